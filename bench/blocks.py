@@ -43,8 +43,8 @@ def check(window: int, bins: list[int], hop: int) -> None:
     rows["numba planar"] = rows["numba planar"][0] + 1j * rows["numba planar"][1]
     rows["livebode"] = SlidingDFT(window, bins).process(x)[window - 1 :: hop]
     for name, found in rows.items():
-        wanted = truth[:, [i for i, k in enumerate(bins) if k < window // 2]] if name == "sdft" else truth
-        difference = np.abs(found - wanted).max() / np.abs(truth).max()
+        expected = truth[:, [i for i, k in enumerate(bins) if k < window // 2]] if name == "sdft" else truth
+        difference = np.abs(found - expected).max() / np.abs(truth).max()
         if not difference < 1e-9:
             raise SystemExit(f"{name} computes different rows ({window=}, {len(bins)} bins, {hop=}): {difference:.1e}")
 

@@ -23,7 +23,7 @@ from livebode.analysis.overview import Overview
 from livebode.core import Block, Lines, Parameters, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.runtime import RunControl
-from livebode.runtime.documents import Fitted, RunStarted, Tracked
+from livebode.runtime.documents import FitResults, RunStarted, TrackerResults
 
 RATE_HZ, WINDOW, UPDATES_PER_S = 4000.0, 2000, 30.0
 FRAMES_MIN, CPU_MAX = 50.0, 0.10
@@ -71,8 +71,8 @@ def publish(hub: Hub, made: Responses, stop: threading.Event, costs: list[float]
         assert hub.overview is not None
         hub.overview.add(one)
         hub(one)
-        hub(Fitted((fit,)))
-        hub(Tracked(block, 0, None))
+        hub(FitResults((fit,)))
+        hub(TrackerResults(block, 0, None))
         costs.append(time.perf_counter() - before)
         n += 1
         stop.wait(max(0.0, began + n / UPDATES_PER_S - time.perf_counter()))

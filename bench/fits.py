@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from livebode.core import Lines, Responses
-from livebode.fitting import Fitter, Grid, TwoMass, two_masses
+from livebode.fitting import EvaluationGrid, Fitter, TwoMass, two_masses
 
 TARGET_MS = 0.25
 LINES = Lines.parse("20:120:5", rate_hz=4000, window=800)
@@ -28,7 +28,7 @@ def responses(seed: int = 0) -> Responses:
     rng = np.random.default_rng(seed)
     values = np.repeat(TRUTH[np.newaxis], ROWS, axis=0)
     values[:, 2] *= 1 + 0.2 * np.sin(np.linspace(0, 2 * np.pi, ROWS))
-    truth = MODEL.at(values, Grid.of(LINES))
+    truth = MODEL.at(values, EvaluationGrid.of(LINES))
     sigma = SIGMA * np.abs(truth)
     value = truth + sigma * (rng.standard_normal(truth.shape) + 1j * rng.standard_normal(truth.shape)) / np.sqrt(2)
     ones, rows = np.ones(truth.shape), np.arange(ROWS)

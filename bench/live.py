@@ -27,7 +27,7 @@ from livebode.configuration import Axis
 from livebode.core import Block, Channel, Responses
 from livebode.dashboard import Dashboard, Serving
 from livebode.runtime import Destination, Document, Session, Subscriber
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "rad/s"))
@@ -48,7 +48,7 @@ class Clock:
     def __call__(self, document: Document) -> None:
         if isinstance(document, Responses):
             self._new += len(document)
-        elif isinstance(document, Tracked):
+        elif isinstance(document, TrackerResults):
             self._measure(document.block)
 
     def _measure(self, block: Block) -> None:
@@ -111,7 +111,7 @@ def send(ports: list[int], end: Flag) -> None:
         count += 1
 
 
-def wake(end: Flag, said: Connection) -> None:
+def wake(end: Flag, results: Connection) -> None:
     """Wake-up delay of an idle process: the computer's own contribution to every latency."""
     late_s, due = [], time.monotonic()
     while not end.is_set():
@@ -119,7 +119,7 @@ def wake(end: Flag, said: Connection) -> None:
         time.sleep(max(0.0, due - time.monotonic()))
         late_s.append(time.monotonic() - due)
         due = max(due, time.monotonic() - WAKE_S)
-    said.send([float(np.quantile(late_s, 0.99)), max(late_s)])
+    results.send([float(np.quantile(late_s, 0.99)), max(late_s)])
 
 
 def look_on(url: str, end: Flag) -> None:
@@ -148,15 +148,15 @@ def _measured(
     clocks = {name: Clock() for name in hubs}  # after the dashboard, so that its work is in the latency
     context = multiprocessing.get_context("spawn")
     ports, end = _free_ports(scenario.axes), context.Event()
-    said, say = context.Pipe(duplex=False)
-    beside = [context.Process(target=send, args=(ports, end)), context.Process(target=wake, args=(end, say))]
+    results, outlet = context.Pipe(duplex=False)
+    beside = [context.Process(target=send, args=(ports, end)), context.Process(target=wake, args=(end, outlet))]
     if url is not None:
         beside.append(context.Process(target=look_on, args=(url, end)))
     with tempfile.TemporaryDirectory() as folder:
         session = Session(
             {name: axis(port, scenario) for name, port in zip(clocks, ports)},
             lambda name, _: Destination(Path(folder) / name, lambda *_: None, subscribers=(*hubs[name], clocks[name])),
-            tell=lambda name, event: print(f"  {name}: {event.message}"),
+            report=lambda name, event: print(f"  {name}: {event.message}"),
             leave=lambda *_: None,
         )
         for process in beside:
@@ -177,7 +177,7 @@ def _measured(
             session.run(look)
         finally:
             end.set()
-            late_s = said.recv()
+            late_s = results.recv()
             for process in beside:
                 process.join()
         for thread in session.all:

@@ -22,10 +22,10 @@ from bench.job import LINES, RATE_HZ, WINDOW
 from livebode.configuration import Axis
 from livebode.core import Channel
 from livebode.excitation import multisine
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.grouped_events import event_counts
 from livebode.runtime import Destination, Document, RunControl, run
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 from livebode.sources.live import Batch, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "A"), Channel("y", "rad/s"))
@@ -40,7 +40,7 @@ class Backlog:
         self._control = control
 
     def __call__(self, document: Document) -> None:
-        if isinstance(document, Tracked) and self._control.source is not None:
+        if isinstance(document, TrackerResults) and self._control.source is not None:
             self.longest_s = max(self.longest_s, self._control.source.waiting_s)
 
 
@@ -90,7 +90,7 @@ def measured(seconds: float, folder: Path) -> dict[str, float]:
     asked, waited_s = time.monotonic(), control.source.waiting_s
     control.end()
     running.join()
-    stop_s, found = time.monotonic() - asked, Run.open(folder)
+    stop_s, found = time.monotonic() - asked, RunRecord.open(folder)
     events = found.events()
     return {
         "samples": found.summary["counts"]["samples"],

@@ -21,7 +21,7 @@ from livebode.analysis.overview import Overview
 from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel
 from livebode.preparation.checks import ChannelCheck
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.query import query
 from livebode.runtime.run_counts import RunCounts
 from livebode.runtime.segmented import SegmentedRecord
@@ -69,7 +69,7 @@ def continued(path: Path) -> None:
 
 def viewed(path: Path) -> None:
     overview = Overview()
-    for part in Run.open(path).batches():
+    for part in RunRecord.open(path).batches():
         overview.add(part)
 
 
@@ -81,8 +81,8 @@ def main() -> None:
         print(f"{len(list((path / 'responses').iterdir()))} segments, {pq.read_metadata(whole).num_rows} rows")
         for name, work in {
             "the rows from one Parquet file": lambda: pq.read_table(whole),
-            "Run.open": lambda: Run.open(path),
-            "query": lambda: query(Run.open(path), SQL, 10),
+            "Run.open": lambda: RunRecord.open(path),
+            "query": lambda: query(RunRecord.open(path), SQL, 10),
             "view": lambda: viewed(path),
             "continue": lambda: continued(path),
         }.items():

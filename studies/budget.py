@@ -24,7 +24,7 @@ from studies.common import (
     within_stroke,
 )
 from studies.drawing import LIGHT, figure_of
-from studies.fig10 import standing
+from studies.fig10 import at_standstill
 from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def linearisation(at_m: Floats, **options: object) -> Floats:
     truth, db = Local()(positions_m), []
     for x, local in zip(positions_m, truth):
         still = Standstill(position_m=float(x))
-        block = standing(EXCITATION, 2 * WINDOW / RATE_HZ, 0, sigma=0.0, motion=still, run_in_s=RUN_IN_S)
+        block = at_standstill(EXCITATION, 2 * WINDOW / RATE_HZ, 0, sigma=0.0, motion=still, run_in_s=RUN_IN_S)
         db.append(error_db(track(block, **options)[-1:], local))
     return over_way(np.concatenate(db), positions_m, at_m)
 

@@ -62,9 +62,9 @@ def track(block: Block, window: int = WINDOW, **options: Any) -> Responses:
     return Tracker(settings(block.rate_hz, window, **options)).process(block)
 
 
-def correct(axis: BeltAxis, block: Block, chunk: int, told: Settings, **options: Any) -> Responses:
+def correct(axis: BeltAxis, block: Block, chunk: int, settings: Settings, **options: Any) -> Responses:
     """The same with a MotionCorrection that fits `chunk` samples at a time."""
-    correction = MotionCorrection(told, radius_m=axis.mechanics.radius_m, chunk_samples=chunk, **options)
+    correction = MotionCorrection(settings, radius_m=axis.mechanics.radius_m, chunk_samples=chunk, **options)
     return Responses.join([correction.process(block), correction.finish()])
 
 

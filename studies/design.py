@@ -29,7 +29,7 @@ LINES = Lines.parse("20:140:20", 4000, 400)
 FINE = Lines.parse("10:150:5", 4000, 1600)
 ALONE = Lines.parse("40", 4000, 400)
 NOISE = Sensor(noise_rad_per_s=0.1)
-STANDING = {
+STANDSTILL = {
     "Schroeder": (BeltAxis(), LINES, multisine(LINES)),
     "with noise, low crest": (BeltAxis(sensor=NOISE), LINES, multisine(LINES, 1.0, "low crest")),
     "a line alone": (BeltAxis(), ALONE, multisine(ALONE)),
@@ -110,7 +110,7 @@ def main() -> int:
     print("| design | torque, N m | speed, m/s | travel beyond, m | following error, m | predicted over simulated "
           "| from rest at once | with a ramp |")  # fmt: skip
     print("|---|---|---|---|---|---|---|---|")
-    for name, (axis, lines, samples) in (STANDING | MOVING).items():
+    for name, (axis, lines, samples) in (STANDSTILL | MOVING).items():
         print(row(name, axis, lines, samples), flush=True)
     return 0
 

@@ -42,7 +42,7 @@ def sampled(frequency_hz: Floats, position_m: float = POSITION_M) -> Complex:
     return BeltAxis().linear(position_m).sampled(RATE_HZ).response(frequency_hz)
 
 
-def standing(excitation: Floats, seconds: float, seed: int, sigma: float = SIGMA, **options: object) -> Block:
+def at_standstill(excitation: Floats, seconds: float, seed: int, sigma: float = SIGMA, **options: object) -> Block:
     options = {"motion": Standstill(position_m=POSITION_M), "mechanics": Mechanics()} | options
     sensor = Sensor(noise_rad_per_s=sigma)
     axis = BeltAxis(sensor=sensor, excitation_n_m=excitation, seconds=seconds, seed=seed, **options)
@@ -53,7 +53,7 @@ def offline(position_m: float = POSITION_M, seed: int = 0) -> Response:
     """The paper's chirp, 5 … 250 Hz in 5 s, 2 N m; (2) from segments of 1 s."""
     ticks = int(SECONDS * RATE_HZ)
     sweep = 2.0 * chirp(np.arange(ticks) / RATE_HZ, 5.0, SECONDS, 250.0)
-    block = standing(sweep, SECONDS, seed, motion=Standstill(position_m=position_m))
+    block = at_standstill(sweep, SECONDS, seed, motion=Standstill(position_m=position_m))
     return welch(block, input="u", output="velocity", excitation="w", window=int(RATE_HZ), overlap=0.75)
 
 
@@ -87,7 +87,7 @@ def bias(found: list[Response]) -> Floats:
 def periodic() -> Block:
     """Two periods of the linear machine, without noise, when it has settled to rounding."""
     frozen = Mechanics(frozen_position_m=POSITION_M)
-    return standing(EXCITATION, 3 * WINDOW / RATE_HZ, 0, sigma=0.0, mechanics=frozen, run_in_s=2 * RUN_IN_S)
+    return at_standstill(EXCITATION, 3 * WINDOW / RATE_HZ, 0, sigma=0.0, mechanics=frozen, run_in_s=2 * RUN_IN_S)
 
 
 def exactness() -> dict[str, float]:

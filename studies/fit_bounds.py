@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Lines, Responses
-from livebode.fitting import Fitter, Grid, TwoMass, fit
+from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit
 from livebode.fitting.extended import LAG, MODE, Extended
 from livebode.simulation import BeltAxis, Mechanics
 from studies.result import Verdict
@@ -61,13 +61,13 @@ class Case:
 
 def belt(**others: float) -> Complex:
     """Two masses with a friction or a delay."""
-    return BELT.at([(TRUTH | others).get(name, 0.0) for name in BELT.names], Grid.of(LINES))
+    return BELT.at([(TRUTH | others).get(name, 0.0) for name in BELT.names], EvaluationGrid.of(LINES))
 
 
 def with_extra(extra: str, **others: float) -> Complex:
     """Two masses with something beside them."""
     model = Extended(BELT, (extra,), LINES.frequency_hz[-1])
-    return model.at([(TRUTH | others).get(name, 0.0) for name in model.names], Grid.of(LINES))
+    return model.at([(TRUTH | others).get(name, 0.0) for name in model.names], EvaluationGrid.of(LINES))
 
 
 def with_mode(frequency_hz: float, share: float) -> Complex:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from livebode import Block, Parameters, Responses, Settings, Tracker
-from livebode.fitting import Fitter, Grid, TwoMass
+from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.fitting.problem import Measured, Problem
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
@@ -31,7 +31,7 @@ PAPER = (
 )
 
 
-def standing(runs: int, periods: int = PERIODS[0]) -> Parameters:
+def fitted_at_standstill(runs: int, periods: int = PERIODS[0]) -> Parameters:
     """Fits of the two masses to averages over `periods`, one run after the other, in the periodic state."""
     span = periods * WINDOW
     lead = round(10 * RATE_HZ)
@@ -51,7 +51,7 @@ def standing(runs: int, periods: int = PERIODS[0]) -> Parameters:
 
 def least_variance(periods: int = PERIODS[0]) -> Floats:
     """Cramér–Rao bound of the logarithms of Js, mL, Keff, bs: white noise on y makes sigma² = N·σ²/|U|² a period."""
-    grid = Grid.of(lines())
+    grid = EvaluationGrid.of(lines())
     u = np.abs(BeltAxis(mechanics=FROZEN).closed_loop(PLACE_M).responses(grid.frequency_hz)[1]) * WINDOW / 2
     sigma = np.sqrt(WINDOW / periods) * SIGMA / u
     exact = Measured(MODEL.at(TRUTH, grid)[np.newaxis], sigma[np.newaxis], np.ones((1, sigma.size), dtype=bool))
@@ -81,7 +81,7 @@ def moving(seed: int) -> tuple[Parameters, BeltAxis]:
 
 def at_standstill(runs: int, periods: int) -> tuple[Floats, Floats, Floats]:
     """Errors over sigma (runs, 4), mean square errors over the least variance, coverage of the 95 % bounds."""
-    still = standing(runs, periods)
+    still = fitted_at_standstill(runs, periods)
     z = (still.value - TRUTH)[:, :4] / still.sigma[:, :4]
     ratio = np.nanmean(np.log(still.value[:, :4] / TRUTH[:4]) ** 2, axis=0) / least_variance(periods)
     return z, ratio, np.mean(np.abs(z) <= ndtri(0.975), axis=0)
@@ -97,7 +97,7 @@ def rubbing(short: bool) -> Table:
         )  # fmt: skip
         settings = Settings(lines=lines(), output="velocity", input="u", excitation="w", hop=80, noise="quiet")
         responses = Tracker(settings).process(SimulatedAxis(axis).run()[0])[60:]
-        truth = MODEL.at(TRUTH, Grid.of(lines()))
+        truth = MODEL.at(TRUTH, EvaluationGrid.of(lines()))
         db = 20 * np.log10(np.abs(responses.value.mean(axis=0) / truth))
         found = Fitter(MODEL).process(responses)
         keff = f"{100 * (np.median(found['Keff'][found.ok]) / TRUTH[2] - 1):+.1f}" if found.ok.any() else "none"

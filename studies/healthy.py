@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Event
-from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor, learn_machine
+from livebode.monitoring import DEFAULT_INTERVAL_S, LearnedMachine, MachineMonitor, learn_machine
 from livebode.simulation import Drive, Friction, FrictionChange, Mechanics, Sensor, StrokeSequence, TensionLoss
 from studies.monitoring_axis import (
     CHANNELS,
@@ -127,17 +127,17 @@ def _late(blocks: Callable[[], Iterable[Block]], samples: int) -> Iterator[Block
         yield Block(data, block.channels, block.rate_hz, start=block.start)
 
 
-def learned(condition: Condition) -> Machine:
+def learned(condition: Condition) -> LearnedMachine:
     runs = [simulated(condition, 9000 + i) for i in range(LEARNED_RUNS)]
     return learn_machine(runs, LINES, input=NAMES[0], output=NAMES[1], schedule=NAMES[2], radius_m=RADIUS_M)
 
 
-def judged(machine: Machine, blocks: Iterable[Block]) -> list[Event]:
+def judged(machine: LearnedMachine, blocks: Iterable[Block]) -> list[Event]:
     monitor = MachineMonitor(machine, LINES, NAMES, DEFAULT_INTERVAL_S)
     return [event for block in blocks for event in monitor.process(block)] + monitor.finish()
 
 
-def healthy_run(condition: Condition, machine: Machine, seed: int) -> list[str]:
+def healthy_run(condition: Condition, machine: LearnedMachine, seed: int) -> list[str]:
     """Sentences of the false alarms."""
     faults = (
         ()
@@ -147,7 +147,7 @@ def healthy_run(condition: Condition, machine: Machine, seed: int) -> list[str]:
     return [e.message for e in judged(machine, simulated(condition, seed, faults=faults)()) if e.kind == "change"]
 
 
-def trial(condition: Condition, machine: Machine, seed: int) -> str:
+def trial(condition: Condition, machine: LearnedMachine, seed: int) -> str:
     """What two strokes with 0.5 % less stiffness are named; empty where nothing is detected."""
     events = judged(machine, simulated(condition, seed, faults=(TensionLoss(loss=0.005),), strokes=2)())
     return next((str(e.details["what"]) for e in events if e.kind == "change"), "")

@@ -18,7 +18,14 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Event
-from livebode.monitoring import DEFAULT_INTERVAL_S, Evidence, Machine, MachineDetector, MachineMonitor, learn_machine
+from livebode.monitoring import (
+    DEFAULT_INTERVAL_S,
+    Evidence,
+    LearnedMachine,
+    MachineDetector,
+    MachineMonitor,
+    learn_machine,
+)
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.machine_detector import CHARTS
 from livebode.simulation import DampingGrowth, LoadChange, SoftSpot, StrokeSequence, TensionLoss
@@ -41,11 +48,11 @@ NAMES = ("u", "velocity", "x")
 SPOT_WIDTH_M = 0.0777  # of the simulation's bell: 10 cm at half its depth
 
 
-def learned() -> Machine:
+def learned() -> LearnedMachine:
     return learn_machine(healthy_runs(), LINES, input=NAMES[0], output=NAMES[1], schedule=NAMES[2], radius_m=RADIUS_M)
 
 
-def monitor(machine: Machine) -> MachineMonitor:
+def monitor(machine: LearnedMachine) -> MachineMonitor:
     return MachineMonitor(machine, LINES, NAMES, DEFAULT_INTERVAL_S)
 
 
@@ -64,7 +71,7 @@ class Trial:
         return self.first is not None and self.first.details["what"] == what
 
 
-def trial(machine: Machine, seed: int, fault: Any, *, whole: bool = False) -> Trial:
+def trial(machine: LearnedMachine, seed: int, fault: Any, *, whole: bool = False) -> Trial:
     """Events up to the stroke's end; `whole`: of the recording, which ends two windows later."""
     generator = np.random.default_rng(seed)
     motion = strokes(1, generator)
@@ -214,7 +221,7 @@ class Study:
         within = 100 * float(np.sum(np.array(errors) <= 0.02)) / self.count
         self.target("soft spot of 10 % over 10 cm: placed within 2 cm after one stroke, %", within, 99, True)
 
-    def told_apart(self) -> None:
+    def distinguished(self) -> None:
         """2 % more or less of stiffness, and of load."""
         for what, fault, truth in (
             ("stiffness", lambda _: TensionLoss(loss=0.02), -2.0),
@@ -293,7 +300,7 @@ def main() -> None:
         study.stiffness,
         study.ramp,
         study.spot,
-        study.told_apart,
+        study.distinguished,
         study.damping,
     ):
         part()

@@ -8,7 +8,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 
-from livebode.monitoring import DEFAULT_INTERVAL_S, Evidence, Machine, MachineMonitor
+from livebode.monitoring import DEFAULT_INTERVAL_S, Evidence, LearnedMachine, MachineMonitor
 from livebode.monitoring.model_evidence import ModelEvidence
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.stretches import Stretches
@@ -25,7 +25,7 @@ _CASES: dict[str, tuple[Any, int]] = {
 _LABEL = ("stiffness", "load")
 
 
-def draw(machine: Machine, path: Path) -> None:
+def draw(machine: LearnedMachine, path: Path) -> None:
     """Estimates of single windows, all else held at the baseline, and where the alarm came."""
     mpl.use("Agg")
     import matplotlib.pyplot as plt

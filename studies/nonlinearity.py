@@ -61,7 +61,7 @@ def passing(speed_m_per_s: float) -> Strokes:
 EXACT = Case("frozen springs, no friction, no noise", mechanics=FROZEN, sigma=0.0)
 LINEAR = Case("frozen springs, no friction", mechanics=FROZEN)
 SMOOTH = Case("no friction")
-STANDING = Case("friction", friction=FRICTION)
+STANDSTILL = Case("friction", friction=FRICTION)
 SLOW = Case("friction, 0.05 m/s, frozen springs", passing(0.05), FROZEN, FRICTION)
 SCHROEDER = Case("friction, Schroeder", friction=FRICTION, schroeder=True)
 CASES = (
@@ -70,7 +70,7 @@ CASES = (
     Case("no friction, no noise", sigma=0.0),
     SMOOTH,
     Case("friction, no noise", friction=FRICTION, sigma=0.0),
-    STANDING,
+    STANDSTILL,
     SCHROEDER,
     Case("friction, 0.02 m/s, frozen springs", passing(0.02), FROZEN, FRICTION),
     SLOW,
@@ -106,16 +106,16 @@ def record(case: Case, period: Floats, seed: int) -> Block:
 
 def measure(short: bool = False) -> Result:
     realisations = 2 if short else 12
-    judged_or_shown = (EXACT, LINEAR, SMOOTH, STANDING, SCHROEDER, SLOW)
+    judged_or_shown = (EXACT, LINEAR, SMOOTH, STANDSTILL, SCHROEDER, SLOW)
     found = {case: levels(case, realisations) for case in (judged_or_shown if short else CASES)}
     truth = BeltAxis().linear(POSITION_M).sampled(RATE_HZ).response(odd_multisine_lines().frequency_hz)
-    best = found[STANDING].response.mean(axis=0)
+    best = found[STANDSTILL].response.mean(axis=0)
     rows, of_bands = [], []
     for case, each in found.items():
         whole = each.within((LOWEST_HZ, HIGHEST_HZ))
         off, apart = (float(rms(decibels(each.response / against))) for against in (truth, best))
-        rows.append((case.name, each.crest, *whole.values(), off, apart if case in (STANDING, SCHROEDER) else ""))
-        if case in (SMOOTH, STANDING, SCHROEDER, SLOW):
+        rows.append((case.name, each.crest, *whole.values(), off, apart if case in (STANDSTILL, SCHROEDER) else ""))
+        if case in (SMOOTH, STANDSTILL, SCHROEDER, SLOW):
             of_bands += [(case.name, f"{a} … {b}", *each.within((a, b)).values()) for a, b in BANDS_HZ]
     header = (
         *("case", "crest factor", "noise, dB", "even, dB", "odd, dB"),
@@ -139,16 +139,16 @@ def judged(found: dict[Case, Levels]) -> list[Verdict]:
         ratio, most = found[LINEAR].above_noise(getattr(found[LINEAR], kind))
         claim = f"{LINEAR.name}: power at the {kind} detection lines over that of the noise"
         verdicts.append(Verdict(claim, ratio, most, why=f"chance exceeds it once in {1 / CHANCE:g}"))
-    standing = whole[STANDING]
-    margin = standing["odd"] - standing["even"]
+    at_standstill = whole[STANDSTILL]
+    margin = at_standstill["odd"] - at_standstill["even"]
     why = "the springs, which follow the cart, are even"
-    verdicts.append(Verdict(f"{STANDING.name}, standstill: odd above even, dB", margin, 20.0, at_least=True, why=why))
-    ratio, least = found[STANDING].above_noise(found[STANDING].odd)
-    claim = f"{STANDING.name}, standstill: power at the odd detection lines over that of the noise"
+    verdicts.append(Verdict(f"{STANDSTILL.name}, standstill: odd above even, dB", margin, 20.0, at_least=True, why=why))
+    ratio, least = found[STANDSTILL].above_noise(found[STANDSTILL].odd)
+    claim = f"{STANDSTILL.name}, standstill: power at the odd detection lines over that of the noise"
     verdicts.append(Verdict(claim, ratio, least, at_least=True, why="the friction is not detected"))
-    quiet_odd = rms(np.abs(found[STANDING].mean[:, found[STANDING].odd]))
-    apart = abs(float(decibels(np.array(found[STANDING].spread() / quiet_odd))))
-    here, there = whole[SCHROEDER]["odd"], standing["odd"]
+    quiet_odd = rms(np.abs(found[STANDSTILL].mean[:, found[STANDSTILL].odd]))
+    apart = abs(float(decibels(np.array(found[STANDSTILL].spread() / quiet_odd))))
+    here, there = whole[SCHROEDER]["odd"], at_standstill["odd"]
     why = "with the phases of one signal, the distortion at each line does not average"
     claim = f"{SCHROEDER.name}, standstill: odd level, difference from that with random phases, dB"
     verdicts.append(Verdict(claim, abs(here - there), 3.0, why=why))
@@ -166,7 +166,7 @@ def draw(result: Result) -> Figure:
     facts += "feedback's share taken off; rms over the phase realisations"
     with figure_of("Noise, even and odd distortion of the velocity", facts, (11.0, 7.4)) as figure:
         panels = figure.subplots(2, 2, sharex=True, sharey=True)
-        for axes, case in zip(panels.flat, (SMOOTH, STANDING, SLOW, SCHROEDER)):
+        for axes, case in zip(panels.flat, (SMOOTH, STANDSTILL, SLOW, SCHROEDER)):
             _spectrum(axes, result.curves["found"][case])
             axes.set_title(case.name + ("" if case is SLOW else ", standstill"), size=10, loc="left")
         for axes in panels[1]:

@@ -37,7 +37,7 @@ from livebode.core import Channel, Lines
 from livebode.dashboard import Dashboard, Serving
 from livebode.excitation import multisine
 from livebode.runtime import Destination, Document, Session, segmented
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from studies.drawing import LIGHT, figure_of
@@ -87,7 +87,7 @@ class Progress:
         self._done = done
 
     def __call__(self, document: Document) -> None:
-        if isinstance(document, Tracked):
+        if isinstance(document, TrackerResults):
             self._done.value = document.block.stop
 
 
@@ -167,7 +167,7 @@ def measured(hours: float, *, as_live: bool = False) -> Curve:
         session = Session(
             {name: axis(port, fitted=name == names[0]) for name, port in zip(names, ports)},
             lambda name, _: Destination(Path(folder) / name, lambda *_: None, subscribers=subscribers[name]),
-            tell=lambda *_: None,
+            report=lambda *_: None,
             leave=lambda *_: None,
         )
         beside.start()

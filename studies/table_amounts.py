@@ -17,7 +17,7 @@ from livebode.monitoring import (
     DEFAULT_INTERVAL_S,
     NonOverlappingWindows,
     Rows,
-    Table,
+    ScheduleTable,
     TableMonitor,
     learn_table,
     places,
@@ -45,13 +45,13 @@ def rows(seed: int, seconds: float, *faults: TensionLoss) -> tuple[BeltAxis, lis
     return axis, [NonOverlappingWindows(WINDOW, place).of_responses(whole) for place in places(WINDOW, SETTINGS.step)]
 
 
-def learned() -> Table:
+def learned() -> ScheduleTable:
     names = [f"{f:g} Hz" for f in LINES.frequency_hz]
     parts = [part for seed in (1, 2, 3) for part in rows(seed, 100.0)[1]]
     return learn_table("lines", names, parts, len(places(WINDOW, SETTINGS.step)))
 
 
-def judged(table: Table, loss: float, seed: int) -> tuple[list[bool], float]:
+def judged(table: ScheduleTable, loss: float, seed: int) -> tuple[list[bool], float]:
     """Whether each reported amount covers the truth, and how many windows off the date is."""
     axis, parts = rows(seed, START_S + 10.0, TensionLoss(loss=loss, start_s=START_S))
     before, after = (axis.linear(0.8, t).sampled(RATE_HZ).response(LINES.frequency_hz) for t in (0.0, START_S + 5.0))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Channel, Event
-from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor, learn_machine
+from livebode.monitoring import DEFAULT_INTERVAL_S, LearnedMachine, MachineMonitor, learn_machine
 from livebode.simulation import Friction, Mechanics, TensionLoss
 from studies.healthy import NAMES, any_start
 from studies.monitoring_axis import HIGH_M, LINES, LOW_M, RADIUS_M, axis, run
@@ -53,13 +53,13 @@ def _with_sensor(blocks: Run, kelvin: float, seconds: float, seed: int) -> Itera
         yield Block(np.vstack([block.data, sensor]), channels, block.rate_hz, start=block.start)
 
 
-def learned(kelvins: Sequence[float], covariates: Sequence[str], seconds: float = 60.0) -> Machine:
+def learned(kelvins: Sequence[float], covariates: Sequence[str], seconds: float = 60.0) -> LearnedMachine:
     runs = [at_temperature(kelvin, 9000 + i, seconds=seconds) for i, kelvin in enumerate(kelvins)]
     u, y, x = NAMES
     return learn_machine(runs, LINES, input=u, output=y, schedule=x, radius_m=RADIUS_M, covariates=covariates)
 
 
-def judged(machine: Machine, blocks: Iterable[Block]) -> list[Event]:
+def judged(machine: LearnedMachine, blocks: Iterable[Block]) -> list[Event]:
     monitor = MachineMonitor(machine, LINES, NAMES, DEFAULT_INTERVAL_S)
     return [event for block in blocks for event in monitor.process(block)] + monitor.finish()
 

@@ -81,15 +81,15 @@ def run(*command: object, cwd: Path | None = None) -> str:
 
 def kept(core: Core, objects: list[Path], names: tuple[str, ...], file: Path) -> Path:
     """One object with only the code that these functions need."""
-    wanted = [f"-Wl,-u,lb_sdft{core.bits}_{name}" for name in names]
-    run("arm-none-eabi-gcc", *core.flags, "-nostdlib", "-r", "-Wl,--gc-sections", *wanted, *objects, "-o", file)
+    required = [f"-Wl,-u,lb_sdft{core.bits}_{name}" for name in names]
+    run("arm-none-eabi-gcc", *core.flags, "-nostdlib", "-r", "-Wl,--gc-sections", *required, *objects, "-o", file)
     return file
 
 
 def flash(core: Core, objects: list[Path], names: tuple[str, ...], program: Path) -> int:
     """Bytes of code and constants that these functions need, with those of libgcc."""
-    wanted = [f"-Wl,-u,lb_sdft{core.bits}_{name}" for name in names]
-    options = ("-nostdlib", "-Wl,--gc-sections", "-Wl,-e,0", *wanted)
+    required = [f"-Wl,-u,lb_sdft{core.bits}_{name}" for name in names]
+    options = ("-nostdlib", "-Wl,--gc-sections", "-Wl,-e,0", *required)
     run("arm-none-eabi-gcc", *core.flags, *options, *objects, "-lgcc", "-o", program)
     return int(run("arm-none-eabi-size", program).splitlines()[1].split()[0])
 

@@ -24,7 +24,7 @@ import pyarrow as pa
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.frames import ROWS, to_frame
 from livebode.records.segments.journal import FOLDER, Commit, Journal, head, name_of
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 
 STATE, SAMPLES, RESPONSES, LINES, SYNC_S = 60_000, 1000, 5, 21, 1.0
 KILLS, FLIPS = 10, 200
@@ -54,7 +54,7 @@ class ByJournal:
 
     def __init__(self, run: Path) -> None:
         (run / FOLDER).mkdir(parents=True)
-        tables = {name: Table(of.schema) for name, of in rows(0).items()}
+        tables = {name: ColumnTable(of.schema) for name, of in rows(0).items()}
         begin = head(tables, Commit(0, 0.0, 0.0, 0, {"tracker": b""}))
         (run / name_of(1)).write_bytes(begin)
         self._file = AppendFile(run, name_of(1), len(begin))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 import tempfile
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from bench.versions import scenarios
 from bench.versions.installed import archived, commit_of, git, installed, working_tree
 
 LIMIT, TURNS = 1.03, 4
-SCRIPT = Path(scenarios.__file__)
+SCRIPT = Path(scenarios.__file__).name
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def environment() -> dict[str, str]:
 
 def opened(python: Path, folder: Path, name: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [python, SCRIPT, folder, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment()
+        [python, folder / SCRIPT, folder, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment()
     )
 
 
@@ -121,6 +122,7 @@ def main() -> None:
         print(f"installing {base} and the working tree …", flush=True)
         sources = {"base": archived(base, folder / "base"), "now": working_tree(folder / "now")}
         pythons = tuple(installed(source, folder / f"{name}-venv") for name, source in sources.items())
+        shutil.copy2(scenarios.__file__, folder / SCRIPT)
         scenarios.write_recordings(folder)
         print(f"processor time; base {base}, now: the working tree at {commit_of('HEAD')}")
         print(f"{'':32}{'base, ms':>10}{'now, ms':>10}{'ratio':>8}{'quartiles':>18}", flush=True)

@@ -12,7 +12,7 @@ from livebode.analysis.difference import ALPHA, Difference, compare
 from livebode.core import PER_LINE, Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import mean_response
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support import command
 from tests.support.command import livebode
 from tests.support.reports import LINES, measured, plant, strokes, write_run
@@ -63,11 +63,11 @@ def test_runs_in_motion_are_compared_at_the_same_places(tmp_path: Path) -> None:
     claims = 0
     for i in range(20):
         one, other = moving(tmp_path / f"a{i}", 2 * i), moving(tmp_path / f"b{i}", 2 * i + 1, rows=960)
-        same = compare(Run.open(one), Run.open(other))
+        same = compare(RunRecord.open(one), RunRecord.open(other))
         assert len(same.places) == 24
         claims += bool(same.overall.differs.any()) + any(p.difference.differs.any() for p in same.places)
     assert claims <= 4  # of 40: chance has 5 or more once in 50 times, and places that vary make it rarer
-    changed = compare(Run.open(one), Run.open(moving(tmp_path / "c", 99, softer=0.95)))
+    changed = compare(RunRecord.open(one), RunRecord.open(moving(tmp_path / "c", 99, softer=0.95)))
     low = [p for p in changed.places if p.high <= 1.0]
     high = [p for p in changed.places if p.low >= 1.1]
     assert not any(p.difference.differs.any() for p in low)
@@ -75,30 +75,30 @@ def test_runs_in_motion_are_compared_at_the_same_places(tmp_path: Path) -> None:
 
 
 def test_runs_of_another_direction_or_speed_are_reported(tmp_path: Path) -> None:
-    usual = Run.open(moving(tmp_path / "a", 1))
-    shorter = compare(usual, Run.open(moving(tmp_path / "b", 2, high=0.9)))
+    usual = RunRecord.open(moving(tmp_path / "a", 1))
+    shorter = compare(usual, RunRecord.open(moving(tmp_path / "b", 2, high=0.9)))
     assert any("only the common part is compared" in w for w in shorter.warnings)
     assert max(p.high for p in shorter.places) <= 0.9 + 1e-9
-    faster = compare(usual, Run.open(moving(tmp_path / "c", 3, per_stroke=40)))
+    faster = compare(usual, RunRecord.open(moving(tmp_path / "c", 3, per_stroke=40)))
     assert any("different speeds" in w for w in faster.warnings)
-    elsewhere = compare(usual, Run.open(moving(tmp_path / "d", 4, low=2.0, high=3.0)))
+    elsewhere = compare(usual, RunRecord.open(moving(tmp_path / "d", 4, low=2.0, high=3.0)))
     assert any("no place in common" in w for w in elsewhere.warnings)
     assert not elsewhere.places
-    standing = compare(usual, Run.open(write_run(tmp_path / "e", measured(300, 5))))
-    assert any("Only one of the runs has a changing schedule" in w for w in standing.warnings)
+    at_standstill = compare(usual, RunRecord.open(write_run(tmp_path / "e", measured(300, 5))))
+    assert any("Only one of the runs has a changing schedule" in w for w in at_standstill.warnings)
 
 
 def test_a_stiffness_lost_halfway_is_the_change_of_the_fitted_parameter(tmp_path: Path) -> None:
     """The belt axis as `run` writes it: 5 % less stiffness halfway is 5 % of Keff between the halves."""
     from livebode.fitting.chains import TwoMass
-    from livebode.fitting.physical import Grid
+    from livebode.fitting.physical import EvaluationGrid
 
     model = TwoMass(radius_m=0.019)
     fit = {"model": "two-mass", "output": "velocity", "radius_m": 0.019}
     configuration = {"signals": {"output": "y"}, "fit": fit}
     paths = []
     for seed, stiffness in ((1, 5e5), (2, 4.75e5)):
-        true = model.at(np.array([0.0028, 6.7, stiffness, 130.0, 0, 0, 0]), Grid(LINES.frequency_hz, 4000.0))
+        true = model.at(np.array([0.0028, 6.7, stiffness, 130.0, 0, 0, 0]), EvaluationGrid(LINES.frequency_hz, 4000.0))
         one = measured(400, seed, noise=0.01)
         scaled = one.value / plant(LINES.frequency_hz, 62.0) * true
         paths.append(write_run(tmp_path / str(seed), replace(one, value=scaled), configuration=configuration))
@@ -109,9 +109,9 @@ def test_a_stiffness_lost_halfway_is_the_change_of_the_fitted_parameter(tmp_path
     assert abs(table["Keff"]["change"] + 0.25e5) < table["Keff"]["change_bound"]
     for name in ("Js", "mL", "bs"):
         assert not table[name]["significant"], name
-    told = livebode("compare", *paths)
-    assert "Keff" in told.out
-    assert "changed" in told.out
+    printed = livebode("compare", *paths)
+    assert "Keff" in printed.out
+    assert "changed" in printed.out
 
 
 def test_runs_of_another_unit_or_quantity_or_without_common_lines_are_refused(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from livebode.core import Block, Channel, Responses, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
 from livebode.fitting import mean_response
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support.command import livebode
 from tests.support.errors import refused
 from tests.support.reports import write_run
@@ -56,7 +56,7 @@ def test_a_run_and_its_export_have_no_average_either(tmp_path: Path) -> None:
     responses = tracked(block(coarse(20)))
     run = write_run(tmp_path / "run", responses)
     with refused(SignalError, "no-valid-response"):
-        averaged(Run.open(run))
+        averaged(RunRecord.open(run))
     done = livebode("export", run, "--to", "csv", "--mean", "--out", tmp_path / "mean.csv")
     assert done.code == 2
     assert "repeat with the excitation" in done.err

@@ -13,7 +13,7 @@ import pytest
 from livebode.core import Event, UsageError
 from livebode.estimation import Tracker
 from livebode.monitoring import Baseline, Monitor
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.runtime import Destination, Document
 from livebode.runtime.demo import LOSS, check_seconds, demo, demo_axis, demo_baseline, demo_settings
 from livebode.simulation import SimulatedAxis
@@ -52,7 +52,7 @@ def test_the_alarm_is_the_same_sentence_in_terminal_page_record_and_report(
     to = Destination(tmp_path / "again", lambda *_: None, subscribers=(published.append,))
     demo(to, seconds=22, seed=1, real_time=False, baseline=baseline())
     assert change["message"] in [document.message for document in published if isinstance(document, Event)]
-    first, again = (Run.open(tmp_path / name).responses() for name in ("run", "again"))
+    first, again = (RunRecord.open(tmp_path / name).responses() for name in ("run", "again"))
     assert np.array_equal(first.value, again.value, equal_nan=True)
 
 

@@ -15,7 +15,7 @@ from livebode.core import LivebodeError
 from livebode.excitation import multisine
 from livebode.experiment_design import Waveform, choose, write
 from livebode.experiments.experiment import Experiment
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.report import save_excitation_picture
 from livebode.simulation import SimulatedAxis
 from tests.support.command import livebode, write_parquet
@@ -58,23 +58,23 @@ def test_the_axis_file_tracks_what_was_designed(kind, tmp_path):
     out = tmp_path / "design"
     made = livebode("design", path, "--out", out, "--json")
     assert made.code == 0, made.err
-    told = json.loads(made.out)
+    printed = json.loads(made.out)
     samples = np.load(out / "excitation.npz")["samples"]
-    played(path, samples, told["recording_s"], out / "log.parquet")
+    played(path, samples, printed["recording_s"], out / "log.parquet")
     ran = livebode("run", out / "axis.toml", "--out", tmp_path / "run")
     assert ran.code == 0, ran.err
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     found = run.responses()
-    np.testing.assert_allclose(found.lines.frequency_hz, told["frequency_hz"], rtol=1e-9)
-    assert run.found["window"] == told["window"]
+    np.testing.assert_allclose(found.lines.frequency_hz, printed["frequency_hz"], rtol=1e-9)
+    assert run.found["window"] == printed["window"]
     newest = found[int(np.flatnonzero(found.valid.all(axis=1))[-1])]
     truth = Experiment.read(path).axis().linear(0.8).sampled(4000).response(newest.lines.frequency_hz)
     error = np.abs(newest.value - truth)
     # Five sigma, with the factor that noise takes near the resonance; of a quantised one the images of its rounding.
-    averaged = told["windows"] if kind == "many windows" else 1
-    assert np.all(error <= 5 * 1.5 * np.array(told["sigma"]) / np.sqrt(averaged)), error / np.array(told["sigma"])
+    averaged = printed["windows"] if kind == "many windows" else 1
+    assert np.all(error <= 5 * 1.5 * np.array(printed["sigma"]) / np.sqrt(averaged)), error / np.array(printed["sigma"])
     if kind == "many windows":
-        assert told["windows"] > 10
+        assert printed["windows"] > 10
         assert np.mean(error / np.abs(truth) <= 0.03) > 0.7
 
 
@@ -82,11 +82,11 @@ def test_the_axis_file_frees_the_responses_of_a_moving_axis_from_its_motion(tmp_
     machine = "[belt.strokes]\nstart_m = 0.6\nend_m = 1.2\n[belt.sensor]\nnoise_rad_per_s = 0.1\n"
     path = described(tmp_path, 'lines = "20:140:20"\nwindow = 400\n', machine)
     out = tmp_path / "design"
-    told = json.loads(livebode("design", path, "--out", out, "--json").out)
-    played(path, np.load(out / "excitation.npz")["samples"], told["recording_s"], out / "log.parquet")
+    printed = json.loads(livebode("design", path, "--out", out, "--json").out)
+    played(path, np.load(out / "excitation.npz")["samples"], printed["recording_s"], out / "log.parquet")
     ran = livebode("run", out / "axis.toml", "--out", tmp_path / "run")
     assert ran.code == 0, ran.err
-    found = Run.open(tmp_path / "run").responses()
+    found = RunRecord.open(tmp_path / "run").responses()
     found = found[np.flatnonzero(found.valid.all(axis=1))]
     assert len(found) > 700
     assert found.schedule.min() < 0.65
@@ -108,13 +108,13 @@ def test_a_design_from_a_run_predicts_as_the_run_s_machine_does(tmp_path):
     again = described(
         tmp_path, 'lines = "20:140:20"\nwindow = 400\nphases = "schroeder"\namplitude_n_m = 1.0\n', measured
     )
-    told = json.loads(livebode("design", again, "--out", tmp_path / "again", "--json").out)
+    printed = json.loads(livebode("design", again, "--out", tmp_path / "again", "--json").out)
     whole = described(
         tmp_path, 'lines = "20:140:20"\nwindow = 400\nphases = "schroeder"\namplitude_n_m = 1.0\n', "[belt.mechanics]\n"
     )
     truth = json.loads(livebode("design", whole, "--out", tmp_path / "truth", "--json").out)
     for name in ("torque", "speed", "following error"):
-        sizes = [max(d["predicted"][name]["high"], -d["predicted"][name]["low"]) for d in (told, truth)]
+        sizes = [max(d["predicted"][name]["high"], -d["predicted"][name]["low"]) for d in (printed, truth)]
         assert sizes[0] == pytest.approx(sizes[1], rel=0.05), name
     outside = described(tmp_path, 'lines = "20:160:20"\nwindow = 400\namplitude_n_m = 1.0\n', measured)
     refused = livebode("design", outside, "--out", tmp_path / "outside")
@@ -219,8 +219,8 @@ def test_the_table_gives_each_choice_with_its_reason(tmp_path):
     assert sorted(p.name for p in (tmp_path / "d").iterdir()) == [
         "axis.toml", "design.json", "excitation.csv", "excitation.png",
     ]  # fmt: skip
-    told = json.loads((tmp_path / "d" / "design.json").read_text())
-    for f, sigma in zip(told["frequency_hz"], told["sigma_relative"]):
+    printed = json.loads((tmp_path / "d" / "design.json").read_text())
+    for f, sigma in zip(printed["frequency_hz"], printed["sigma_relative"]):
         assert re.search(rf"^ *{f:g} Hz .* {100 * sigma:.3g} % of \|G\|", shown.out, re.MULTILINE), f
 
 

@@ -16,7 +16,7 @@ import xarray as xr
 
 from livebode.export import FORMATS, at
 from livebode.fitting import mean_response
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.runs import describe
 
@@ -42,7 +42,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_format_of_a_whole_run(run: Path) -> None:
-    responses = Run.open(run).responses()
+    responses = RunRecord.open(run).responses()
     for to, ending in {"csv": ".csv", "mat": ".mat", "netcdf": ".nc", "uff": ".uff"}.items():
         done = livebode("export", run, "--to", to)
         path = run.with_suffix(ending)
@@ -53,7 +53,7 @@ def test_every_format_of_a_whole_run(run: Path) -> None:
     assert scipy.io.loadmat(run.with_suffix(".mat"))["livebode"][0, 0]["H"].shape == (1, 1, 3, len(responses))
     with xr.open_dataset(run.with_suffix(".nc")) as dataset:
         assert dataset.sizes == {"time_s": len(responses), "frequency_hz": 3}
-        assert json.loads(dataset.attrs["run"]) == Run.open(run).summary
+        assert json.loads(dataset.attrs["run"]) == RunRecord.open(run).summary
     valid = int(np.count_nonzero(responses.valid.sum(axis=1) >= 2))
     assert pyuff.UFF(str(run.with_suffix(".uff"))).get_n_sets() == valid
     assert f"; {len(responses) - valid} with fewer than two valid lines left out" in done.out
@@ -61,7 +61,7 @@ def test_every_format_of_a_whole_run(run: Path) -> None:
 
 
 def test_one_response_or_the_mean_of_a_run_is_exported(run: Path, tmp_path: Path) -> None:
-    batches = Run.open(run).batches
+    batches = RunRecord.open(run).batches
     for options, expected in (
         (("--at", "1.0"), at(batches(), 1.0)),
         (("--mean",), mean_response(batches())[0]),

@@ -100,7 +100,7 @@ def test_a_fit_without_a_result_reports_its_reason(machine: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "message"),
     [
         (("--model", "two"), "there is no model 'two'"),
         (("--fix", "Js"), "is not NAME=VALUE"),
@@ -110,13 +110,13 @@ def test_a_fit_without_a_result_reports_its_reason(machine: Path) -> None:
         (("--model", "two-mass", "--band", "200:300"), "0 lines, too few"),
     ],
 )
-def test_impossible_options_of_fit_are_usage_errors(machine: Path, options: tuple, says: str) -> None:
+def test_impossible_options_of_fit_are_usage_errors(machine: Path, options: tuple, message: str) -> None:
     out = machine / "plain"
     if not out.exists():
         run(machine, "plain", "")
     result = livebode("fit", out, *options)
     assert result.code == 2
-    assert says in result.err
+    assert message in result.err
 
 
 def test_a_directory_that_is_no_run_is_refused(machine: Path, tmp_path: Path) -> None:

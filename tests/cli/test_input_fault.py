@@ -36,7 +36,7 @@ def log(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "message"),
     [
         (("--excitation", "w", "--input", "U", "--output", "y", *GRID), ("'U'", "did you mean 'u'?")),
         (("--excitation", "w", "--output", "y", *GRID), ("joint", "needs the input signal")),
@@ -74,10 +74,10 @@ def log(tmp_path: Path) -> Path:
     ids=lambda value: " ".join(map(str, value)) if isinstance(value, tuple) else None,
 )
 def test_contradictory_options_are_refused_in_one_sentence(
-    log: Path, tmp_path: Path, arguments: tuple, says: tuple
+    log: Path, tmp_path: Path, arguments: tuple, message: tuple
 ) -> None:
     sentence = refused(tmp_path, log, *arguments)
-    for part in says:
+    for part in message:
         assert part in sentence
 
 
@@ -88,7 +88,7 @@ def spoiled(channel: str, change: object) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("columns", "says"),
+    ("columns", "message"),
     [
         (spoiled("u", lambda u: np.full_like(u, 3.25)), ("'u' is constant at 3.25",)),
         (spoiled("y", lambda y: np.full_like(y, np.nan)), ("'y' is empty", "none of its samples is a finite number")),
@@ -99,9 +99,9 @@ def spoiled(channel: str, change: object) -> dict[str, np.ndarray]:
     ],
     ids=["constant", "empty", "backwards", "a step back", "jitter", "noise as excitation"],
 )
-def test_unusable_recordings_are_refused_in_one_sentence(tmp_path: Path, columns: dict, says: tuple) -> None:
+def test_unusable_recordings_are_refused_in_one_sentence(tmp_path: Path, columns: dict, message: tuple) -> None:
     sentence = refused(tmp_path, write_parquet(tmp_path / "log.parquet", columns), *JOINT, *GRID)
-    for part in says:
+    for part in message:
         assert part in sentence
 
 
@@ -131,7 +131,7 @@ def test_missing_empty_and_damaged_recordings_are_refused(log: Path, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "message"),
     [
         ("[source", ("is not TOML",)),
         (f"[lines]\nwindow=0x{'f' * 50_000}", ("lines.window is a whole number of 200000 bits", "correct it")),
@@ -150,11 +150,11 @@ def test_missing_empty_and_damaged_recordings_are_refused(log: Path, tmp_path: P
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("log")
-def test_unusable_configurations_are_refused(tmp_path: Path, text: str, says: tuple) -> None:
+def test_unusable_configurations_are_refused(tmp_path: Path, text: str, message: tuple) -> None:
     axis = tmp_path / "axis.toml"
     axis.write_text(text)
     sentence = refused(tmp_path, axis, *JOINT[:4], *GRID) if "inptu" not in text else refused(tmp_path, axis)
-    for part in says:
+    for part in message:
         assert part in sentence
 
 
@@ -235,7 +235,7 @@ def test_a_run_that_is_ended_leaves_nothing(tmp_path: Path, number: signal.Signa
 
 
 @pytest.mark.parametrize(
-    ("command", "says"),
+    ("command", "message"),
     [
         ("PYTHONIOENCODING=ascii {livebode} inspect {log} --excitation w --output y", ""),
         ("PYTHONIOENCODING=ascii {livebode} run --help", ""),
@@ -248,14 +248,14 @@ def test_a_run_that_is_ended_leaves_nothing(tmp_path: Path, number: signal.Signa
     ],
 )
 def test_closed_pipes_and_unusual_terminals_end_without_a_traceback(
-    log: Path, tmp_path: Path, command: str, says: str
+    log: Path, tmp_path: Path, command: str, message: str
 ) -> None:
     livebode_path = Path(sys.executable).with_name("livebode")
     line = command.format(livebode=livebode_path, log=log, out=tmp_path / "run")
     done = subprocess.run(["bash", "-o", "pipefail", "-c", line], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
-    assert says in done.stderr
+    assert message in done.stderr
 
 
 def test_an_internal_error_ends_with_1(monkeypatch: pytest.MonkeyPatch, log: Path, tmp_path: Path) -> None:

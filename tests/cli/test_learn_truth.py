@@ -95,24 +95,24 @@ def test_changes_of_fitted_parameters_are_learned_and_reported(tmp_path: Path) -
     loss = TensionLoss(start_s=20.0, loss=0.05)
     toml = standing(tmp_path / "b.parquet", 2, loss)
     assert livebode("run", toml, "--baseline", base, "--out", changed_run).code == 0
-    told = {e["details"]["what"]: e for e in events(changed_run) if e["kind"] == "change"}
-    assert set(told) == {"lines", "parameters"}
-    changes = {c["name"]: c["amount"] for c in told["parameters"]["details"]["changes"]}
+    reported = {e["details"]["what"]: e for e in events(changed_run) if e["kind"] == "change"}
+    assert set(reported) == {"lines", "parameters"}
+    changes = {c["name"]: c["amount"] for c in reported["parameters"]["details"]["changes"]}
     assert changes == {"Keff": pytest.approx(-5, abs=0.5)}
-    assert told["parameters"]["details"]["since_s"] == pytest.approx(20, abs=1)
+    assert reported["parameters"]["details"]["since_s"] == pytest.approx(20, abs=1)
     assert "Learned from" in learned.out
     assert "in 1 cell of the schedule. No model" in learned.out
-    live = told_live(toml, base, tmp_path / "live")
-    changes_told = [event for event in events(changed_run) if str(event["kind"]).startswith("change")]
+    live = changes_live(toml, base, tmp_path / "live")
+    reported_changes = [event for event in events(changed_run) if str(event["kind"]).startswith("change")]
     # The sentences differ: those of a live run may name the time of day.
     assert [(e["kind"], e["sample"], e["details"]) for e in live] == [
-        (e["kind"], e["sample"], e["details"]) for e in changes_told
+        (e["kind"], e["sample"], e["details"]) for e in reported_changes
     ]
     assert "Lines and fitted parameters are monitored" in learned.out
     _not_fitted(toml, base, tmp_path)
 
 
-def told_live(toml: Path, base: Path, out: Path) -> list[dict[str, object]]:
+def changes_live(toml: Path, base: Path, out: Path) -> list[dict[str, object]]:
     """The changes that a machine on standard input is told to have, which sends what is in the recording."""
     columns = pq.read_table(toml.with_suffix(".parquet"))
     data = np.array([columns[name].to_numpy() for name in ("w", "u", "velocity")])

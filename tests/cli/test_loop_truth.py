@@ -14,7 +14,7 @@ import pytest
 from livebode.analysis.loop_report import loop_of_run
 from livebode.fitting import mean_response
 from livebode.margins import margins
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.summary_file import to_document
 from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.belt_loops import read
@@ -89,7 +89,7 @@ def delayed(ticks: float) -> np.ndarray:
 
 
 def test_the_run_itself_holds_its_margins(run: Path) -> None:
-    summary = Run.open(run).summary["loop"]
+    summary = RunRecord.open(run).summary["loop"]
     assert summary["status"] == "ok"
     assert set(summary["margins"]) == set(read(Case(BELT)).names)
     table = pq.read_table(run / "parameters.parquet")
@@ -113,16 +113,16 @@ def test_a_true_model_passes_on_fresh_data_and_a_wrong_one_does_not(run: Path) -
     assert one["samples"] == 3000
     assert {c["with"] for c in one["correlations"]} == {"u", "ŷ", "w"}
     assert (run / "validation.png").stat().st_size > 20_000
-    told = livebode("validate", run, "--on", fresh, "--model", "two-mass", "--model", "rigid")
-    assert "two-mass passes" in told.out
-    assert "rigid was not fitted" in told.out
+    done = livebode("validate", run, "--on", fresh, "--model", "two-mass", "--model", "rigid")
+    assert "two-mass passes" in done.out
+    assert "rigid was not fitted" in done.out
 
 
 def test_margins_leave_out_the_transient_that_the_run_names(run: Path, tmp_path: Path) -> None:
     left_out = shutil.copytree(run, tmp_path / "run") / "run.json"
-    left_out.write_bytes(to_document(Run.open(run).summary | {"left_out_samples": 5 * LINES.window}))
-    found, every = loop_of_run(left_out.parent).responses, mean_response(Run.open(run).responses())
-    assert np.array_equal(found.value, mean_response(Run.open(left_out.parent).steady_batches()).value)
+    left_out.write_bytes(to_document(RunRecord.open(run).summary | {"left_out_samples": 5 * LINES.window}))
+    found, every = loop_of_run(left_out.parent).responses, mean_response(RunRecord.open(run).responses())
+    assert np.array_equal(found.value, mean_response(RunRecord.open(left_out.parent).steady_batches()).value)
     assert not np.any(found.value == every.value)
 
 

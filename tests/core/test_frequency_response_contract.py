@@ -52,10 +52,10 @@ def test_sel_is_that_of_xarray(responses: Responses, data: st.DataObject) -> Non
         low, high = sorted((low, high))
     times = slice(float(responses.time_s[0]), float(responses.time_s[len(responses) // 2]))
     found = responses.sel(frequency_hz=slice(low, high), time_s=times).to_xarray()
-    wanted = responses.to_xarray().sel(time_s=times)
+    expected = responses.to_xarray().sel(time_s=times)
     # xarray compares floats exactly; ends that are lines are within both.
-    wanted = wanted.sel(frequency_hz=slice(low, high))
-    assert found.identical(wanted)
+    expected = expected.sel(frequency_hz=slice(low, high))
+    assert found.identical(expected)
 
 
 def test_sel_takes_a_list_of_lines_in_any_order_and_keeps_what_belongs_to_them() -> None:

@@ -45,12 +45,12 @@ def test_nothing_is_shown_without_a_token(watched: Watched) -> None:
 
 
 def test_a_login_gives_a_cookie_that_scripts_and_other_sites_cannot_use(watched: Watched) -> None:
-    status, said = login(watched, TOKEN)
+    status, cookies = login(watched, TOKEN)
     assert status == 200
-    assert "HttpOnly" in said
-    assert "SameSite=strict" in said
-    assert TOKEN not in said
-    mine = said.partition(";")[0]
+    assert "HttpOnly" in cookies
+    assert "SameSite=strict" in cookies
+    assert TOKEN not in cookies
+    mine = cookies.partition(";")[0]
     assert ask(watched, "/", Cookie=mine)[0] == 200
     assert ask(watched, "/api/past?axis=0&from=0&to=1", Cookie=mine)[0] == 200
     assert ask(watched, "/logout", "POST", {}, Origin=origin(watched), Cookie=mine)[0] == 200
@@ -143,8 +143,8 @@ def test_code_of_the_page_never_makes_html_of_data() -> None:
 
 
 def test_wrong_tokens_are_refused_with_increasing_delay_and_reported_once() -> None:
-    now, told = [0.0], list[str]()
-    access = Access(Serving("127.0.0.1", 0, token=TOKEN), told.append, clock=lambda: now[0])
+    now, messages = [0.0], list[str]()
+    access = Access(Serving("127.0.0.1", 0, token=TOKEN), messages.append, clock=lambda: now[0])
     for _ in range(5):
         assert access.login("wrong" * 10, "10.0.0.5") is None
     waits = []
@@ -161,11 +161,11 @@ def test_wrong_tokens_are_refused_with_increasing_delay_and_reported_once() -> N
     assert access.login(TOKEN, "10.0.0.6"), "others do not wait"
     now[0] += 300
     assert access.login(TOKEN, "10.0.0.5")
-    assert told == ["the dashboard rejected a wrong token from 10.0.0.5"]
+    assert messages == ["the dashboard rejected a wrong token from 10.0.0.5"]
     for i in range(5000):
         access.login("wrong", f"2001:db8:{i:x}::1")
     assert len(access._wrong) <= 1024
-    assert len(access._told) <= 1024
+    assert len(access._reported) <= 1024
 
 
 def test_login_sessions_expire_and_their_number_is_limited() -> None:
@@ -314,8 +314,8 @@ def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
         assert not any(TOKEN in text for text in tab.wrong)
         watched.hub(Event("change", 1, 0.1, "changed", {}))
     watched.go(11_000)
-    assert any("wrong token from" in line for line in watched.told)
-    assert len([line for line in watched.told if "127.0.0.1" in line]) == 1
+    assert any("wrong token from" in line for line in watched.messages)
+    assert len([line for line in watched.messages if "127.0.0.1" in line]) == 1
     for file in watched.directory.rglob("*"):
         if file.is_file():
             assert TOKEN.encode() not in file.read_bytes()

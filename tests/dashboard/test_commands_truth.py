@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support.browser import Tab, chromium, until
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.dashboards import Watched
@@ -63,7 +63,7 @@ def test_the_demo_is_served_during_its_run_and_afterwards(tmp_path: Path) -> Non
             tab.until(f"bode.curves.measured.frame.timeS[0] > {first} + 0.5")
             tab.until("!timeline.span.live")  # the run is done, and the page stays
             assert (out / "run.json").is_file()
-            last = Run.open(out).responses()
+            last = RunRecord.open(out).responses()
             at_s = float(last.time_s[last.valid.any(axis=1)][-1])
             tab.until(f"bode.curves.measured.frame.timeS[0] === {at_s!r}")
             assert tab.js("document.getElementById('status-text').textContent") == "demo · recorded"

@@ -17,7 +17,7 @@ from playwright.sync_api import Browser
 from livebode.core import Block, Channel, Event, Lines, Parameters
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Tracker
-from livebode.runtime.documents import ClockSet, Fitted, Tracked
+from livebode.runtime.documents import ClockSet, FitResults, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.browser import Tab, chromium
@@ -47,7 +47,7 @@ def now(hub: Hub, *, at_s: float, ago_s: float = 0.0) -> None:
     """A machine has sent the samples up to this time of the run."""
     start = round(at_s * RATE_HZ) - 40
     block = LiveBlock(np.zeros((1, 40)), ("y",), RATE_HZ, start=start, arrived_s=time.monotonic() - ago_s)
-    hub(Tracked(block, block.stop, None))
+    hub(TrackerResults(block, block.stop, None))
 
 
 def status(tab: Tab) -> tuple[str, str]:
@@ -182,12 +182,12 @@ def test_margins_are_those_of_the_moment_that_is_shown(browser: Browser) -> None
         tab.page.keyboard.press("g")
         span = tab.js("timeline.span")
         for share, gain_db in ((0.1, 12.0), (1.0, 7.0)):
-            hub(Fitted((margins(span["first_s"] + share * (span["last_s"] - span["first_s"]), gain_db),)))
+            hub(FitResults((margins(span["first_s"] + share * (span["last_s"] - span["first_s"]), gain_db),)))
             tab.page.locator("#pane-margins", has_text=f"{gain_db:g} ± 0.2 dB").wait_for()
         tab.page.locator("#time").focus()
         tab.page.keyboard.press("Home")
         tab.page.locator("#pane-margins", has_text="12 ± 0.2 dB").wait_for()
-        hub(Fitted((margins(span["last_s"] + 1, 3.0),)))
+        hub(FitResults((margins(span["last_s"] + 1, 3.0),)))
         tab.page.wait_for_timeout(800)
         assert cell.inner_text() == "12 ± 0.2 dB"
         tab.page.keyboard.press(" ")

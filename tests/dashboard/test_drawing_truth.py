@@ -17,11 +17,11 @@ from livebode.core import Response
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.overlays import grid_hz
 from livebode.estimation.quantities import convert
-from livebode.fitting import Grid, model_named
-from livebode.monitoring import Baseline, Table
-from livebode.monitoring.accuracy import Accuracy
+from livebode.fitting import EvaluationGrid, model_named
+from livebode.monitoring import Baseline, ScheduleTable
+from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.table import BACK, FORTH
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.summary_file import to_document
 from tests.support.browser import Tab, chromium
 from tests.support.dashboards import FIT, LINES, LOOP, RATE_HZ, Watched, whole_run
@@ -87,11 +87,11 @@ def drawn(tab: Tab, index: int, series: int) -> np.ndarray:
     return tab.numbers(f"bode.at.map((i) => bode.charts[{index}].data[{series}][i])")
 
 
-def same_turn(found: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    return found - 360 * np.round((found - wanted) / 360)
+def same_turn(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    return found - 360 * np.round((found - truth) / 360)
 
 
-def in_record(run: Run, time_s: float) -> Response:
+def in_record(run: RunRecord, time_s: float) -> Response:
     responses = run.responses()
     at = int(np.argmin(np.abs(responses.time_s - time_s)))
     assert abs(responses.time_s[at] - time_s) < 1e-9
@@ -112,10 +112,10 @@ def test_the_newest_response_with_its_bands(browser: Browser, watched: Watched, 
             "coherence": drawn(tab, 2, 1),
         }  # fmt: skip
         watched.go(watched.hub.samples + 2000)  # so that the record has it too
-        for name, wanted in expected(in_record(watched.record(), time_s), quantity).items():
+        for name, truth in expected(in_record(watched.record(), time_s), quantity).items():
             if name.startswith("deg"):
-                curves[name] = same_turn(curves[name], wanted)
-            assert np.allclose(curves[name], wanted, **CLOSE), name
+                curves[name] = same_turn(curves[name], truth)
+            assert np.allclose(curves[name], truth, **CLOSE), name
         unit = "1 rad/s/(N m)" if quantity == "plant" else ""
         assert unit in tab.js("bode.charts[0].axes[1].label")
         assert tab.wrong == []
@@ -145,13 +145,13 @@ def test_model_and_margins_are_those_of_the_parameters(browser: Browser, whole: 
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
-        rows = [row for table in Run.open(whole).tables("parameters") for row in table.to_pylist()]
+        rows = [row for table in RunRecord.open(whole).tables("parameters") for row in table.to_pylist()]
         tab.until("bode.curves.model")
         at_s = tab.js("bode.curves.model.frame.timeS[0]")
         fitted = {r["name"]: r["value"] for r in rows if r["model"] == "two-mass" and abs(r["time_s"] - at_s) < 1e-9}
         model = model_named("two-mass", output="velocity", radius_m=FIT["radius_m"])
         grid = grid_hz(LINES)
-        truth = model.at([fitted[name] for name in model.names], Grid(grid, RATE_HZ))
+        truth = model.at([fitted[name] for name in model.names], EvaluationGrid(grid, RATE_HZ))
         assert np.allclose(tab.numbers("bode.grid"), grid)
         assert np.allclose(tab.numbers("bode.charts[0].data[10]"), 20 * np.log10(np.abs(truth)), **CLOSE)
         phase = tab.numbers("bode.charts[1].data[10]")
@@ -175,13 +175,13 @@ def test_model_and_margins_are_those_of_the_parameters(browser: Browser, whole: 
         assert np.allclose(tab.numbers("parameters.items.get('two-mass\\0Keff').t"), [r["time_s"] for r in known])
         drawn_data = [tab.numbers(f"parameters.items.get('two-mass\\0Keff').made.data[{i}]") for i in (1, 2, 3)]
         value, sigma = (np.array([r[name] for r in known], dtype=float) for name in ("value", "sigma"))
-        for found, wanted in zip(drawn_data, (value, value + 1.959964 * sigma, value - 1.959964 * sigma)):
-            assert np.allclose(found, wanted, equal_nan=True, rtol=1e-9)
+        for found, expected in zip(drawn_data, (value, value + 1.959964 * sigma, value - 1.959964 * sigma)):
+            assert np.allclose(found, expected, equal_nan=True, rtol=1e-9)
         assert tab.wrong == []
 
 
 def test_tracking_and_map_are_those_of_the_record(browser: Browser, whole: Path) -> None:
-    responses = Run.open(whole).responses()
+    responses = RunRecord.open(whole).responses()
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
@@ -221,21 +221,21 @@ def test_tracking_and_map_are_those_of_the_record(browser: Browser, whole: Path)
         assert tab.wrong == []
 
 
-def table_of(low: float, high: float) -> Table:
+def table_of(low: float, high: float) -> ScheduleTable:
     """A made-up baseline of four bins, with another mean and spread in each and for each way."""
     rng, shape = np.random.default_rng(0), (4, 3, len(LINES))
     mean = rng.normal(size=shape) + 1j * rng.normal(size=shape)
     covariance = np.einsum("bwl,ij->bwlij", rng.uniform(1e-3, 1e-2, shape), np.eye(2))
     names = tuple(f"{f:g} Hz" for f in LINES.frequency_hz)
     ones = np.ones(2 * len(LINES))
-    accuracy = Accuracy(ones, 0.01 * ones, 0.05 * ones)
+    accuracy = ChangeAccuracy(ones, 0.01 * ones, 0.05 * ones)
     step = (high - low) / 4 * (1 + 1e-9)
     count = np.full((4, 3), 20)
-    return Table("lines", names, low, step, 1e-3, mean, covariance, np.abs(mean) ** 2 * 1e-3, count, accuracy)
+    return ScheduleTable("lines", names, low, step, 1e-3, mean, covariance, np.abs(mean) ** 2 * 1e-3, count, accuracy)
 
 
 def test_the_baseline_is_drawn_where_the_machine_is(browser: Browser, whole: Path, tmp_path: Path) -> None:
-    responses = Run.open(whole).responses()
+    responses = RunRecord.open(whole).responses()
     table = table_of(float(np.nanmin(responses.schedule)), float(np.nanmax(responses.schedule)))
     roles = {"output": "y", "input": "u", "excitation": "w", "schedule": "x"}
     Baseline(LINES, 20, roles, "joint", "plant", (table,), None).save(tmp_path / "healthy.json")

@@ -20,7 +20,7 @@ from websockets.sync.client import ClientConnection, connect
 from livebode.dashboard import Dashboard, Serving, patience
 from livebode.dashboard.client import DISPLACED
 from livebode.dashboard.listener import connections_max
-from livebode.dashboard.places import PLACES, Place, Places
+from livebode.dashboard.places import PLACES, ClientPlace, Places
 from livebode.dashboard.server import Faults
 from tests.support.browser import until
 from tests.support.dashboards import Watched
@@ -61,7 +61,7 @@ def test_too_many_browsers_and_messages_are_let_go(watched: Watched) -> None:
         assert answer(live, "error") == "a message is text, not bytes; send text"
         live.send('{"kind": "watch"}')
         answer(live, "facts")
-    assert not [line for line in watched.told if "internal error" in line]
+    assert not [line for line in watched.messages if "internal error" in line]
 
 
 def test_held_web_sockets_shut_the_owner_out_of_no_page() -> None:
@@ -93,10 +93,10 @@ def test_held_web_sockets_shut_the_owner_out_of_no_page() -> None:
 def test_an_operator_takes_the_place_of_the_oldest_viewer_and_nobody_that_of_an_operator() -> None:
     gone = list[str]()
     places = Places(open=False)
-    viewers = [Place("viewer", f"192.0.2.{n}", lambda n=n: gone.append(f"viewer {n}")) for n in range(PLACES)]
+    viewers = [ClientPlace("viewer", f"192.0.2.{n}", lambda n=n: gone.append(f"viewer {n}")) for n in range(PLACES)]
     assert all(map(places.take, viewers))
-    assert not places.take(Place("viewer", "::1", lambda: None))
-    operators = [Place("operator", "::1", lambda n=n: gone.append(f"operator {n}")) for n in range(PLACES + 1)]
+    assert not places.take(ClientPlace("viewer", "::1", lambda: None))
+    operators = [ClientPlace("operator", "::1", lambda n=n: gone.append(f"operator {n}")) for n in range(PLACES + 1)]
     assert [places.take(one) for one in operators] == [True] * PLACES + [False]
     assert gone == [f"viewer {n}" for n in range(PLACES)]
     places.leave(operators[0])
@@ -147,9 +147,9 @@ def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """As by a reload of the page: its connection is over before a request would have been due."""
-    authority, told = Authority(tmp_path, "authority"), list[str]()
+    authority, messages = Authority(tmp_path, "authority"), list[str]()
     tls, trust = authority.sign("dashboard"), ssl.create_default_context(cafile=str(authority.file))
-    with Dashboard(Serving("127.0.0.1", 0, tls=tls), told.append) as dashboard:
+    with Dashboard(Serving("127.0.0.1", 0, tls=tls), messages.append) as dashboard:
         dashboard.hub("axis")
         url = dashboard.url.replace("https", "wss") + "live"
         # The blocking client reads and writes one TLS session in two threads, and hangs once in about 1,000.
@@ -166,7 +166,7 @@ def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
                 return await live.recv()
 
         assert "facts" in json.loads(asyncio.run(reload_and_pause()))
-    assert told == []
+    assert messages == []
     assert capfd.readouterr().err == ""
 
 
@@ -179,7 +179,7 @@ def test_a_body_that_does_not_come_is_not_waited_for(
     with socket.create_connection(("127.0.0.1", port_of(watched)), timeout=20) as slow:
         slow.sendall(head.encode())
         assert slow.recv(100) == b""
-    assert "internal error" not in " ".join(watched.told)
+    assert "internal error" not in " ".join(watched.messages)
     assert capfd.readouterr().err == ""
 
 
@@ -190,15 +190,15 @@ def test_connections_leave_descriptors_for_the_record(monkeypatch: pytest.Monkey
 
 
 def test_internal_errors_of_the_server_are_reported_once_a_minute() -> None:
-    told = list[str]()
-    faults = Faults(told.append)
+    messages = list[str]()
+    faults = Faults(messages.append)
     for _ in range(1000):
         try:
             raise ValueError("odd")
         except ValueError as error:
             faults.take(error)
-    assert len(told) == 1
-    assert "internal error in the dashboard: ValueError('odd') at" in told[0]
+    assert len(messages) == 1
+    assert "internal error in the dashboard: ValueError('odd') at" in messages[0]
 
 
 def test_the_event_loop_is_quiet() -> None:

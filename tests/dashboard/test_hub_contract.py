@@ -18,14 +18,14 @@ from livebode.core import Block, Event, Lines, Responses, ServerError
 from livebode.dashboard import Hub
 from livebode.dashboard.frames import KINDS, frame
 from livebode.dashboard.hub import EVENTS_MAX, VALUES_MAX
-from livebode.dashboard.notices import CAUSES_MAX, Notices, acknowledgement, event_id
+from livebode.dashboard.notices import CAUSES_MAX, EventCauses, acknowledgement, event_id
 from livebode.dashboard.past import Past
 from livebode.dashboard.quantities import QUANTITIES, Quantities
-from livebode.dashboard.recent import Recent
+from livebode.dashboard.recent import RecentResponses
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import POINTS_MAX, Rows, Trend
 from livebode.runtime import RunControl
-from livebode.runtime.documents import ClockSet, RunEnded, RunStarted, Tracked
+from livebode.runtime.documents import ClockSet, RunEnded, RunStarted, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.dashboards import LINES, LOOP, Watched
@@ -60,12 +60,12 @@ def test_frames_hold_the_responses(responses: Responses) -> None:
     assert (first["kind"], first["axis"], second["kind"]) == ("rows", 3, "newest")
     use = responses.valid & np.isfinite(responses.value)
     with np.errstate(invalid="ignore"):
-        wanted = {
+        expected = {
             "magnitude": np.where(use, responses.magnitude_db, np.nan),
             "reach": np.where(use, 3 * responses.sigma / np.abs(responses.value), np.nan),
             "coherence": np.where(use, responses.coherence, np.nan),
         }
-    for name, values in wanted.items():
+    for name, values in expected.items():
         assert np.allclose(first[name], values, rtol=1e-6, atol=1e-5, equal_nan=True), name
     turned = np.exp(1j * np.radians(np.asarray(first["phase"], dtype=float)))
     assert np.allclose(turned[use], responses.value[use] / np.abs(responses.value[use]), atol=1e-4)
@@ -74,8 +74,8 @@ def test_frames_hold_the_responses(responses: Responses) -> None:
 
 
 @pytest.mark.parametrize("own", QUANTITIES)
-@pytest.mark.parametrize("wanted", QUANTITIES)
-def test_every_quantity_from_every_other(own: str, wanted: str) -> None:
+@pytest.mark.parametrize("expected", QUANTITIES)
+def test_every_quantity_from_every_other(own: str, expected: str) -> None:
     """There and back is the same, and sigma goes with the slope, which a small step shows."""
     rng = np.random.default_rng(3)
     loop = LoopSection.model_validate(LOOP).build(RATE_HZ)
@@ -83,13 +83,13 @@ def test_every_quantity_from_every_other(own: str, wanted: str) -> None:
     value = rng.normal(size=(2, len(LINES))) + 1j * rng.normal(size=(2, len(LINES)))
     responses = made(2, LINES, hole=0.0)
     responses = Responses(**{**vars(responses), "value": value, "quantity": own})
-    there = quantities.of_responses(responses, wanted)  # type: ignore[arg-type]
-    back = Quantities(wanted, "", LINES, loop).of_responses(there, own)  # type: ignore[arg-type]
+    there = quantities.of_responses(responses, expected)  # type: ignore[arg-type]
+    back = Quantities(expected, "", LINES, loop).of_responses(there, own)  # type: ignore[arg-type]
     assert np.allclose(back.value, value)
     assert np.allclose(back.sigma, responses.sigma)
     step = 1e-7
     moved = Responses(**{**vars(responses), "value": value + step})
-    slope = np.abs(quantities.of_responses(moved, wanted).value - there.value) / step  # type: ignore[arg-type]
+    slope = np.abs(quantities.of_responses(moved, expected).value - there.value) / step  # type: ignore[arg-type]
     assert np.allclose(there.sigma, responses.sigma * slope, rtol=1e-4)
 
 
@@ -138,8 +138,8 @@ def test_taking_and_publishing_at_once_loses_nothing() -> None:
     assert seen + len(hub.take()) + hub.given_up == 20_000
 
 
-def tracked(block: Block) -> Tracked:
-    return Tracked(block, block.stop, None)
+def tracked(block: Block) -> TrackerResults:
+    return TrackerResults(block, block.stop, None)
 
 
 def test_delay_is_from_arrival_to_published() -> None:
@@ -151,7 +151,7 @@ def test_delay_is_from_arrival_to_published() -> None:
 
 
 def test_recent_responses_are_the_newest_and_thinned() -> None:
-    recent, hop = Recent(), 20
+    recent, hop = RecentResponses(), 20
     for start in range(0, 40_000, 500):
         rows = made(500, Lines((2, 3), 60, 1000.0), hop=hop, seed=start)
         shift = start * hop
@@ -181,11 +181,11 @@ def test_a_trend_is_evenly_thinned_however_it_came(sizes: list[int]) -> None:
 
 
 def test_notices_are_bounded_and_known_again() -> None:
-    notices = Notices()
+    notices = EventCauses()
     for i in range(CAUSES_MAX + 500):
         notices.take(Event("change", i, float(i), "changed", {"what": f"part {i}"}))
     assert len(notices.since(0)) == CAUSES_MAX
-    notices = Notices()
+    notices = EventCauses()
     event = Event("change", 7, 1.0, "changed")
     notices.take(event)
     notices.take(event)
@@ -197,7 +197,7 @@ def test_notices_are_bounded_and_known_again() -> None:
 
 
 def test_events_of_one_cause_are_one_notice_and_acknowledged_up_to_the_one_that_was_seen() -> None:
-    notices = Notices()
+    notices = EventCauses()
     events = [Event("change", i, float(i), f"stiffness less, {i}", {"what": "stiffness"}) for i in range(1000)]
     for event in events:
         notices.take(event)
@@ -216,7 +216,7 @@ def test_events_of_one_cause_are_one_notice_and_acknowledged_up_to_the_one_that_
 
 def test_groups_that_the_run_made_are_counted_by_what_they_say() -> None:
     """Their repeats share lines; after a pause the same cause begins another group."""
-    notices = Notices()
+    notices = EventCauses()
     for sample, name, count in ((0, "loss@0", 1), (10, "loss@0", 2), (40, "loss@0", 8), (900, "loss@900", 1)):
         notices.take(Event("gap", sample, sample / 10, "a gap", {"group": name, "count": count, "first_s": 0.0}))
     notices.take(Event("overflow", 950, 95.0, "dropped", {"group": "loss@900", "count": 2, "first_s": 90.0}))

@@ -19,7 +19,7 @@ from scipy.io import loadmat
 
 from livebode.core import Event, Lines
 from livebode.dashboard import Dashboard, Hub, Serving
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.browser import TABLET, Tab, chromium, until
 from tests.support.dashboards import LINES, Watched, begin, whole_run
@@ -80,10 +80,10 @@ def test_freezing_pausing_and_scrolling_back(browser: Browser, watched: Watched)
         page.keyboard.press(".")
         tab.until("timeline.atS > timeline.span.first_s + 0.09")
         run = watched.record().responses()
-        wanted = run.time_s[run.valid.any(axis=1)]
+        expected = run.time_s[run.valid.any(axis=1)]
         tab.until("!page.seeking")
         page.wait_for_timeout(150)
-        nearest = wanted[np.argmin(np.abs(wanted - tab.js("timeline.atS")))]
+        nearest = expected[np.argmin(np.abs(expected - tab.js("timeline.atS")))]
         assert shown_s(tab) == pytest.approx(nearest, abs=1e-9)
         at = int(np.flatnonzero(run.time_s == nearest)[0])
         assert np.allclose(tab.numbers("bode.curves.measured.frame.magnitude"), run[at].magnitude_db, atol=2e-5)
@@ -183,7 +183,7 @@ def test_every_key_does_what_the_help_lists(browser: Browser, whole: Path) -> No
         tab.until("document.querySelector('#readout th').textContent === '30 Hz'")
         row = page.locator("#readout [data-name=measured]").inner_text().replace("−", "-")
         numbers = [float(x) for x in re.findall(r"[-+]\d+\.\d+(?= dB|°)", row)]
-        newest = Run.open(whole).responses()
+        newest = RunRecord.open(whole).responses()
         newest = newest[int(np.flatnonzero(newest.valid.any(axis=1))[-1])]
         assert numbers[0] == pytest.approx(newest.magnitude_db[1], abs=0.006)
         for key, pane in (("p", "parameters"), ("g", "margins"), ("m", "map")):
@@ -261,10 +261,10 @@ def test_the_page_is_usable_by_touch_on_a_tablet(browser: Browser, whole: Path) 
         finger("touchStart", 0.3)
         for share in (0.4, 0.5, 0.6):
             finger("touchMove", share)
-        wanted = [tab.js(f"bode.charts[0].posToVal({share} * {box['width']}, 'x')") for share in (0.3, 0.6)]
+        expected = [tab.js(f"bode.charts[0].posToVal({share} * {box['width']}, 'x')") for share in (0.3, 0.6)]
         finger("touchEnd", 0.6)
         tab.until("bode.sight !== bode.whole")
-        assert tab.js("bode.sight") == pytest.approx(wanted, rel=0.03)
+        assert tab.js("bode.sight") == pytest.approx(expected, rel=0.03)
         for _ in range(2):
             tab.page.touchscreen.tap(box["x"] + x, box["y"] + 40)
         tab.until("bode.sight === bode.whole")
@@ -286,7 +286,7 @@ def test_the_page_is_usable_by_touch_on_a_tablet(browser: Browser, whole: Path) 
 
 
 def test_downloads_hold_the_data(browser: Browser, whole: Path, tmp_path: Path) -> None:
-    run = Run.open(whole).responses()
+    run = RunRecord.open(whole).responses()
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
 

@@ -84,8 +84,12 @@ def message(rng: random.Random) -> str:
     pick = rng.random()
     if pick < 0.5:
         kind = rng.choice(["watch", "freeze", "pause", "resume", "unfreeze"])
-        said = {"kind": kind, "axis": rng.choice([0, anything(rng)]), "quantity": rng.choice(["plant", anything(rng)])}
-        text = json.dumps(said | {"time_s": rng.choice([1.0, anything(rng)])})
+        request = {
+            "kind": kind,
+            "axis": rng.choice([0, anything(rng)]),
+            "quantity": rng.choice(["plant", anything(rng)]),
+        }
+        text = json.dumps(request | {"time_s": rng.choice([1.0, anything(rng)])})
     elif pick < 0.8:
         text = json.dumps(anything(rng))
     else:

@@ -14,7 +14,7 @@ from livebode.core import Block, Channel, Event, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.estimation.movement import Movement
 from livebode.excitation import multisine, odd_lines
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support.found import with_events
 from tests.support.reports import write_run
 
@@ -74,7 +74,7 @@ def test_a_run_records_whether_the_axis_moved(hop: int, tmp_path_factory: pytest
         tracker, responses, _ = tracked(x, hop)
         found = tracker.found() | {"quantity": responses.quantity, "unit": responses.unit}
         run = write_run(tmp_path_factory.mktemp(f"{i}") / "run", responses, found=found)
-        assert averaged(Run.open(run)).moved == moved
+        assert averaged(RunRecord.open(run)).moved == moved
 
 
 @settings(max_examples=30, deadline=None)

@@ -26,7 +26,7 @@ from tests.support.moving import SETTINGS, cruising, truth_at
 COGGING_PER_M = 24 / (2 * np.pi * RADIUS_M)
 MEETING_M_PER_S = 0.2985  # 24 a turn are 60.01 Hz there
 AT = LINES.frequency_hz.tolist().index(60.0)
-TOLD = replace(SETTINGS, ripple=(RippleOrder(COGGING_PER_M, 0.05),))
+WITH_RIPPLE = replace(SETTINGS, ripple=(RippleOrder(COGGING_PER_M, 0.05),))
 
 
 def recorded(motion: Motion, seconds: float) -> tuple[BeltAxis, Block]:
@@ -60,15 +60,15 @@ def covered(axis: BeltAxis, responses: Responses, after_s: float = 0.0) -> float
 def test_a_tracked_line_that_a_known_ripple_meets_has_a_bound_that_holds() -> None:
     axis, block = meeting()
     assert covered(axis, Tracker(SETTINGS).process(block)) < 0.6, "a tone on a line is invisible beside it"
-    assert covered(axis, Tracker(TOLD).process(block)) > 0.98
+    assert covered(axis, Tracker(WITH_RIPPLE).process(block)) > 0.98
 
 
 def test_a_corrected_line_that_a_known_ripple_meets_has_a_bound_that_holds() -> None:
     """The added bound is what makes it so: without it 30 % of the errors are within."""
     axis, block = meeting()
-    responses, _ = corrected(block, TOLD)
+    responses, _ = corrected(block, WITH_RIPPLE)
     assert covered(axis, responses) > 0.95
-    added = ripple_power(TOLD.ripple, LINES, np.full((2, len(responses)), MEETING_M_PER_S))
+    added = ripple_power(WITH_RIPPLE.ripple, LINES, np.full((2, len(responses)), MEETING_M_PER_S))
     torque = np.abs(np.fft.rfft(block["u"][8000:8400])[LINES.bins[AT]])
     share = np.abs(responses.value) * np.sqrt(added) / torque
     without = replace(responses, sigma=np.sqrt(np.maximum(responses.sigma**2 - share**2, 0.0)))
@@ -98,7 +98,7 @@ def test_speed_that_changes_within_a_window_counts_where_it_is_nearest() -> None
 
 def test_a_ripple_without_schedule_or_amplitude_is_refused() -> None:
     with refused(UsageError, "missing", argument="schedule"):
-        replace(TOLD, schedule=None)
+        replace(WITH_RIPPLE, schedule=None)
     with refused(UsageError, "out-of-range", argument="amplitude", value=0):
         RippleOrder(COGGING_PER_M, 0)
 

@@ -169,8 +169,8 @@ def test_samples_that_are_not_finite_leave_the_same_windows_out(record: Block) -
     found: list[Event] = []
     ours = Responses.join([tracker.process(block, found.append) for block in sent(broken, what)])
     same(ours, Tracker(described(20, dtype="float32")).process(broken))
-    told = ["noise-from-detection-lines", "not-whole", "not-whole"]  # the position moves
-    assert [event.kind for event in found] == told
+    kinds = ["noise-from-detection-lines", "not-whole", "not-whole"]  # the position moves
+    assert [event.kind for event in found] == kinds
     assert tracker.counts["samples"] == len(record)
 
 
@@ -184,11 +184,11 @@ def test_marks_of_the_drive_and_numbers_that_are_none_are_left_out(record: Block
     found: list[Event] = []
     ours = Responses.join([tracker.process(block, found.append) for block in blocks])
     assert np.flatnonzero(~ours.valid.any(axis=1)).tolist() == [5, 7, 9]
-    told = [("spike", 2399), ("not-whole", 3199), ("implausible", 3999)]
+    kinds = [("spike", 2399), ("not-whole", 3199), ("implausible", 3999)]
     events = [(e.kind, e.sample) for e in found]
-    assert [e for e in events if e[0] != "noise-from-detection-lines"] == told
-    assert len(events) == len(told) + 1  # the position moves: known from the eighth spectrum on
-    assert {kind: tracker.counts[kind] for kind, _ in told} == {kind: 1 for kind, _ in told}
+    assert [e for e in events if e[0] != "noise-from-detection-lines"] == kinds
+    assert len(events) == len(kinds) + 1  # the position moves: known from the eighth spectrum on
+    assert {kind: tracker.counts[kind] for kind, _ in kinds} == {kind: 1 for kind, _ in kinds}
     assert tracker.counts["spectra"] == PERIODS
     # An average goes on over a spike, as it does from samples.
     assert tracked(iter(blocks), what, average=True).valid[5].all()

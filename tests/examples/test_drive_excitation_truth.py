@@ -87,15 +87,15 @@ def test_the_excitation_is_ramped_up_and_down_over_whole_periods_whenever_it_is_
 
 
 @pytest.mark.parametrize(
-    ("excitation", "said"),
+    ("excitation", "message"),
     [
         ((401, 4000, 0.1), "DRIVE_HOP must divide"),
         ((400, 8000, 0.1), "another rate than DRIVE_RATE_HZ"),
         ((400, 4000, 0.5), "exceeds DRIVE_LIMIT_N_M"),
     ],
 )
-def test_a_header_that_the_drive_cannot_play_does_not_compile(excitation, said: str, tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match=said):
+def test_a_header_that_the_drive_cannot_play_does_not_compile(excitation, message: str, tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match=message):
         compiled(tmp_path, made(*excitation), "-fsyntax-only")
 
 

@@ -14,7 +14,7 @@ from livebode.core import Lines
 from livebode.excitation import Slip, find_slips, multisine, recognise
 from livebode.excitation.slips import realigned
 from livebode.preparation.aligned import AlignedLog
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.grouped_events import each_event
 from livebode.sources import open_log
 from tests.support.command import livebode, write_parquet
@@ -101,7 +101,7 @@ def test_a_run_realigns_what_was_dropped_and_reports_it(tmp_path: Path) -> None:
     done = livebode("run", log, *signals, "--average", "--forgetting", 1, "--out", tmp_path / "run")
     assert done.code == 0, done.err
     assert "the phase of 'w' jumps 18 times" in " ".join(done.err.split())
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     assert run.found["phase_slips"] == len(places)
     last = run.responses()[-1]
     assert last.lines.bins == LINES.bins

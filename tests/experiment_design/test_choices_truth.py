@@ -96,10 +96,10 @@ def test_the_amplitude_that_a_refusal_names_passes_in_the_drive_s_steps_too(step
 
 def test_the_worst_line_has_the_specified_accuracy():
     spec = ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.3, accuracy=0.02)
-    told = choose(spec, MACHINE).plain()
-    bounds = np.sqrt(np.log(20) / told["windows"]) * np.array(told["sigma_relative"])
-    np.testing.assert_allclose(told["bound_95_relative"], bounds, rtol=1e-12)
-    assert 0.02 * np.sqrt(1 - 1 / told["windows"]) < bounds.max() <= 0.02
+    predicted = choose(spec, MACHINE).plain()
+    bounds = np.sqrt(np.log(20) / predicted["windows"]) * np.array(predicted["sigma_relative"])
+    np.testing.assert_allclose(predicted["bound_95_relative"], bounds, rtol=1e-12)
+    assert 0.02 * np.sqrt(1 - 1 / predicted["windows"]) < bounds.max() <= 0.02
 
 
 def test_a_recording_longer_than_an_hour_reports_the_accuracy_of_one_hour():

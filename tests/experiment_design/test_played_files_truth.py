@@ -10,7 +10,7 @@ import pytest
 from livebode.core import ConfigError
 from livebode.experiment_design import ExperimentSpec, MachineLimits, belt_machine, choose, worst, write
 from livebode.experiments.experiment import Experiment
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.simulation import BeltAxis, SimulatedAxis, extremes
 from tests.support.command import livebode, write_parquet
 from tests.support.errors import refused
@@ -102,7 +102,7 @@ def runs(tmp_path_factory):
         )
         done = livebode("run", folder / f"{name}.toml", "--out", folder / f"run-{name}")
         assert done.code == 0, done.err
-    assert Run.open(folder / "run-theta").found["unit"] == "rad/(N m)"
+    assert RunRecord.open(folder / "run-theta").found["unit"] == "rad/(N m)"
     return folder
 
 
@@ -120,11 +120,11 @@ def test_a_design_from_a_run_adopts_the_description_of_the_run(runs):
     assert axis["tracking"]["differenced"] == ["speed"]
     for part in ("velocity", "position"):
         assert was["loop"][part].items() <= axis["loop"][part].items()
-    told = json.loads(done.out)["predicted"]
+    predicted = json.loads(done.out)["predicted"]
     belt = worst(choose(ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0),
                         belt_machine(BeltAxis())).peaks)  # fmt: skip
     for name in ("torque", "speed", "following error"):
-        assert max(told[name]["high"], -told[name]["low"]) == pytest.approx(belt[name].size, rel=0.05), name
+        assert max(predicted[name]["high"], -predicted[name]["low"]) == pytest.approx(belt[name].size, rel=0.05), name
     (runs / "log2.parquet").write_bytes((runs / "log.parquet").read_bytes())
     (runs / "again" / "axis.toml").write_text(
         (runs / "again" / "axis.toml").read_text().replace("log.parquet", str(runs / "log2.parquet"))

@@ -7,7 +7,7 @@ import pytest
 
 from livebode.core import Block, Lines, Parameters, Response, Responses, SignalError, UsageError
 from livebode.estimation import Settings, Tracker
-from livebode.fitting import Fitter, Grid, Rigid, ThreeMass, TwoMass, TwoMassGain, fit, mean_response
+from livebode.fitting import EvaluationGrid, Fitter, Rigid, ThreeMass, TwoMass, TwoMassGain, fit, mean_response
 from livebode.fitting.problem import Measured, Problem
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill
 from tests.support.axes import MULTISINE
@@ -22,7 +22,7 @@ BELT = TwoMass(radius_m=0.019)
 
 def bound_of(model, values, lines: Lines, relative: float) -> np.ndarray:
     """Cramér–Rao variances of the free parameters' coordinates."""
-    grid = Grid.of(lines)
+    grid = EvaluationGrid.of(lines)
     exact = model.at(values, grid)[np.newaxis]
     sigma = relative * np.abs(exact)
     problem = Problem(model, grid)
@@ -35,7 +35,7 @@ def bound_of(model, values, lines: Lines, relative: float) -> np.ndarray:
 @pytest.mark.parametrize(("lines", "dof"), [(LINES, np.inf), (FINE, np.inf), (FINE, 9.0), (FINE, 49.0)])
 def test_a_thousand_fits_reach_the_cramer_rao_bound_and_their_bounds_hold(lines: Lines, dof: float) -> None:
     relative = 0.02
-    found = Fitter(BELT).process(noisy(BELT.at(TRUTH, Grid.of(lines)), lines, relative, 1000, dof=dof))
+    found = Fitter(BELT).process(noisy(BELT.at(TRUTH, EvaluationGrid.of(lines)), lines, relative, 1000, dof=dof))
     assert found.ok.all()
     ratio = np.mean(np.log(found.value[:, :4] / TRUTH[:4]) ** 2, axis=0) / bound_of(BELT, TRUTH, lines, relative)
     cover = np.mean(np.abs(found.value - TRUTH)[:, :4] <= found.bound()[:, :4], axis=0)
@@ -68,7 +68,7 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_every_model_finds_itself_from_no_start(case: str) -> None:
     model, values, free = CASES[case]
-    exact = noisy(model.at(values, Grid.of(FINE)), FINE, 1e-6, 2, reported=1.0)
+    exact = noisy(model.at(values, EvaluationGrid.of(FINE)), FINE, 1e-6, 2, reported=1.0)
     found = fit(exact[0], model, free=free)
     assert found.status == "ok", found.sentence
     assert np.allclose(found.parameters.value[0], values, rtol=1e-3, atol=1e-7)
@@ -84,7 +84,7 @@ def test_every_model_finds_itself_from_no_start(case: str) -> None:
 
 def test_epsilon_corrects_sigmas_that_are_far_too_small() -> None:
     """Noise of 3 % that is said to be 0.1 %: ε finds the 3 %, and the bounds hold."""
-    found = Fitter(BELT).process(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.03, 400, reported=1 / 30))
+    found = Fitter(BELT).process(noisy(BELT.at(TRUTH, EvaluationGrid.of(FINE)), FINE, 0.03, 400, reported=1 / 30))
     assert np.median(found.epsilon) == pytest.approx(0.03, rel=0.05)
     cover = np.mean(np.abs(found.value - TRUTH)[:, :4] <= found.bound()[:, :4], axis=0)
     assert cover.min() >= 0.92
@@ -92,7 +92,7 @@ def test_epsilon_corrects_sigmas_that_are_far_too_small() -> None:
 
 
 def test_without_any_sigma_lines_weigh_by_their_size() -> None:
-    blind = noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.01, 40)
+    blind = noisy(BELT.at(TRUTH, EvaluationGrid.of(FINE)), FINE, 0.01, 40)
     found = Fitter(BELT).process(Responses(**{**vars(blind), "sigma": np.full(blind.sigma.shape, np.nan)}))
     assert found.ok.all()
     assert np.isnan(found.chi2).all()
@@ -103,7 +103,7 @@ def test_without_any_sigma_lines_weigh_by_their_size() -> None:
 def test_lines_that_do_not_show_the_mode_give_no_numbers_and_an_event() -> None:
     low = Lines.parse("2:10:1", rate_hz=4000, window=4000)
     fitter = Fitter(BELT)
-    found, (event, *_) = with_events(fitter.process, noisy(BELT.at(TRUTH, Grid.of(low)), low, 0.02, 20))
+    found, (event, *_) = with_events(fitter.process, noisy(BELT.at(TRUTH, EvaluationGrid.of(low)), low, 0.02, 20))
     assert not found.ok.any()
     assert np.isnan(found.value).all()
     assert np.isnan(found.bound()).all()
@@ -119,7 +119,7 @@ def test_something_else_than_the_model_gives_no_numbers() -> None:
 
 
 def test_invalid_lines_are_left_out_and_too_few_are_no_response() -> None:
-    good = noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 1e-4, 4)
+    good = noisy(BELT.at(TRUTH, EvaluationGrid.of(FINE)), FINE, 1e-4, 4)
     valid = good.valid.copy()
     valid[1, ::2] = False
     valid[2, 2:] = False
@@ -151,22 +151,22 @@ def test_friction_at_standstill_is_rejected_and_a_machine_without_friction_is_fi
 
 @pytest.mark.parametrize("free", [["B"], ["BL"], ["B", "BL"]])
 def test_a_friction_that_is_not_there_leaves_the_other_parameters_valid_and_has_an_upper_limit(free: list[str]) -> None:
-    found = Fitter(BELT, free=free).process(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.01, 200))
+    found = Fitter(BELT, free=free).process(noisy(BELT.at(TRUTH, EvaluationGrid.of(FINE)), FINE, 0.01, 200))
     assert found.ok.all()
     cover = np.mean(np.abs(found.value - TRUTH) <= found.bound(), axis=0)
     assert cover[:4].min() >= 0.95 - 3 * 0.0155
     assert np.all(found.value[:, 4:6] >= 0)
-    one = fit(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.01, 1)[0], BELT, free=free)
+    one = fit(noisy(BELT.at(TRUTH, EvaluationGrid.of(FINE)), FINE, 0.01, 1)[0], BELT, free=free)
     assert {name for name in BELT.names if one.at_most(name) is not None} == set(free)
 
 
 def test_a_friction_that_is_there_is_found_with_its_bound() -> None:
     truth = TRUTH + np.array([0, 0, 0, 0, 0.01, 20.0, 0])
-    found = Fitter(BELT, free=["B", "BL"]).process(noisy(BELT.at(truth, Grid.of(FINE)), FINE, 0.01, 200))
+    found = Fitter(BELT, free=["B", "BL"]).process(noisy(BELT.at(truth, EvaluationGrid.of(FINE)), FINE, 0.01, 200))
     assert found.ok.all()
     cover = np.mean(np.abs(found.value - truth) <= found.bound(), axis=0)
     assert cover.min() >= 0.95 - 3 * 0.0155
-    one = fit(noisy(BELT.at(truth, Grid.of(FINE)), FINE, 0.01, 1)[0], BELT, free=["B", "BL"])
+    one = fit(noisy(BELT.at(truth, EvaluationGrid.of(FINE)), FINE, 0.01, 1)[0], BELT, free=["B", "BL"])
     assert one.at_most("BL") is None
     assert one.at_most("Js") is None
 
@@ -237,7 +237,7 @@ def test_the_mean_of_responses_has_the_scatter_of_independent_windows() -> None:
 
 
 def test_parameters_join_slice_and_refuse() -> None:
-    found = Fitter(BELT).process(noisy(BELT.at(TRUTH, Grid.of(LINES)), LINES, 0.01, 6))
+    found = Fitter(BELT).process(noisy(BELT.at(TRUTH, EvaluationGrid.of(LINES)), LINES, 0.01, 6))
     again = Parameters.join([found[:2], found[2:]])
     assert np.array_equal(again.value, found.value)
     assert len(found[found.ok]) == 6

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Event, FitError, GridError, Lines, Parameters, Responses, SignalError, UsageError
-from livebode.fitting import Fitter, Grid, TwoMass, fit, model_named
+from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit, model_named
 from livebode.fitting.weighing import epsilon_for
 from tests.support.errors import refused
 from tests.support.fitted import LINES, TRUTH, noisy
@@ -22,7 +22,7 @@ ROWS = 70
 
 def run(late_s: float = 0.0) -> Responses:
     """A wandering stiffness, with some rows that hold nothing, and a delay."""
-    grid = Grid.of(LINES)
+    grid = EvaluationGrid.of(LINES)
     values = np.repeat(TRUTH[np.newaxis], ROWS, axis=0)
     values[:, 2] *= np.linspace(1.0, 1.4, ROWS)
     values[:, -1] = late_s

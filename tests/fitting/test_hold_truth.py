@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import FitError, UsageError
-from livebode.fitting import Grid, Parameter, Rigid, ThreeMass, TwoMass, TwoMassGain, two_masses
+from livebode.fitting import EvaluationGrid, Parameter, Rigid, ThreeMass, TwoMass, TwoMassGain, two_masses
 from livebode.fitting.hold import to_continuous, to_discrete
 from livebode.fitting.modal import chain_of
 from livebode.fitting.transfer import Transfer, roots
@@ -19,7 +19,7 @@ from tests.support.fitted import Pendulum
 
 RATE_HZ = 4000.0
 F_HZ = np.arange(20.0, 141.0, 20.0)
-GRID = Grid(F_HZ, RATE_HZ)
+GRID = EvaluationGrid(F_HZ, RATE_HZ)
 BELT = np.array([0.0028, 6.7, 5.0e5, 130.0, 0.0, 0.0, 0.0])
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from livebode.core import FitError, Lines, Responses, UsageError
-from livebode.fitting import Grid, Rational, TwoMass, fit_rational, rational_of
+from livebode.fitting import EvaluationGrid, Rational, TwoMass, fit_rational, rational_of
 from livebode.fitting.hold import to_discrete
 from tests.support.errors import refused
 from tests.support.fitted import TRUTH, noisy
@@ -104,5 +104,5 @@ def test_impossible_orders_are_refused_and_lines_without_a_response_are_left_out
 
 
 def test_a_discrete_model_has_the_response_of_the_held_continuous_one() -> None:
-    grid = Grid.of(LINES)
+    grid = EvaluationGrid.of(LINES)
     assert np.allclose(Rational(B, A, RATE_HZ).response(LINES.frequency_hz), BELT.at(TRUTH, grid), rtol=1e-8)

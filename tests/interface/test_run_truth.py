@@ -48,9 +48,9 @@ def test_nothing_but_the_summary_is_read_at_first(run: Run, tmp_path: Path) -> N
 
 
 def test_the_average_is_the_mean_of_the_responses(run: Run) -> None:
-    wanted = mean_response(run.responses)[0]
-    np.testing.assert_array_equal(run.average.value, wanted.value)
-    np.testing.assert_array_equal(run.average.sigma, wanted.sigma)
+    expected = mean_response(run.responses)[0]
+    np.testing.assert_array_equal(run.average.value, expected.value)
+    np.testing.assert_array_equal(run.average.sigma, expected.sigma)
     parts = list(run.batches(from_s=0.5))
     assert all((part.time_s >= 0.5).all() for part in parts)
     assert sum(map(len, parts)) == np.count_nonzero(run.responses.time_s >= 0.5)
@@ -67,17 +67,17 @@ def test_the_average_is_the_mean_of_the_responses(run: Run) -> None:
 )
 def test_a_fit_is_that_of_the_command(run: Run, options: tuple[str, ...], arguments: dict) -> None:
     done = command("fit", run.path, *options, "--json")
-    found, wanted = run.fit(**arguments), json.loads(done.out)
+    found, expected = run.fit(**arguments), json.loads(done.out)
     assert found.asked is not None
-    assert (found.status, found.asked.name) == (wanted["status"], wanted["model"])
+    assert (found.status, found.asked.name) == (expected["status"], expected["model"])
     for name, value, _, _ in found.rows() if found.status == "ok" else ():
-        assert value == pytest.approx(wanted["quantities"][name]["value"], rel=1e-9)
+        assert value == pytest.approx(expected["quantities"][name]["value"], rel=1e-9)
 
 
 def test_margins_are_those_of_the_command(run: Run) -> None:
-    found, wanted = run.margins(), printed("margins", run.path)["margins"]
+    found, expected = run.margins(), printed("margins", run.path)["margins"]
     for name in NAMES:
-        assert found.of(name)[0] == pytest.approx(wanted[name]["value"], rel=1e-9)
+        assert found.of(name)[0] == pytest.approx(expected[name]["value"], rel=1e-9)
     assert repr(found).startswith("<Margins: 1 row; gain_margin ")
     doubled = run.margins(run.fit(), loop=Loop(feedback=2 * livebode.PID(gain=0.2308, rate_hz=4000)))
     assert doubled.of("gain_margin")[0] < found.of("gain_margin")[0] - 5
@@ -112,9 +112,9 @@ MACHINE = {"belt": {"standstill": {"position_m": 0.8}}, "excitation": {"band_hz"
 def test_a_design_writes_what_the_command_writes(tmp_path: Path) -> None:
     file = tmp_path / "experiment.toml"
     file.write_text("[belt.standstill]\nposition_m = 0.8\n[excitation]\nband_hz = [20, 140]\nwindow = 400\n")
-    wanted = printed("design", file, "--out", tmp_path / "command", "--amplitude", 0.5, "--to", "csv")
+    expected = printed("design", file, "--out", tmp_path / "command", "--amplitude", 0.5, "--to", "csv")
     found = json.loads(to_json(livebode.design(str(file), amplitude_n_m=0.5).plain()))
-    assert found == {name: wanted[name] for name in found}
+    assert found == {name: expected[name] for name in found}
     livebode.design(MACHINE, tmp_path / "python", amplitude_n_m=0.5)
     text = [(tmp_path / place / "axis.toml").read_text() for place in ("command", "python")]
     assert text[0] == text[1]

@@ -77,7 +77,7 @@ def texts() -> str:
 @cache
 def calls() -> tuple[ast.Call, ...]:
     """The calls of modules that translate or report, also within f-strings."""
-    used = (text for text in sources() if re.search(r"\b(?:trn?|marked|Event|_?say(?:_event)?)\(", text))
+    used = (text for text in sources() if re.search(r"\b(?:trn?|marked|Event|report|_report_to_axes)\(", text))
     return tuple(n for text in used for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Call) and n.args)
 
 
@@ -100,13 +100,13 @@ def test_every_call_is_found_by_the_extraction() -> None:
 
 
 def kinds() -> set[str]:
-    """The kinds of events that the package writes: first argument of Event(…), say(…) and the like."""
+    """The kinds of events that the package writes: first argument of Event(…), report(…) and the like."""
     found = set()
     for node in calls():
         if isinstance(node.args[0], ast.Constant):
             name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
             kind = str(node.args[0].value)
-            if name in ("Event", "say", "_say", "say_event") and re.fullmatch("[a-z]+(-[a-z]+)*", kind):
+            if name in ("Event", "report", "_report_to_axes") and re.fullmatch("[a-z]+(-[a-z]+)*", kind):
                 found.add(kind)
     alarms = re.search(r"ALARMS = new Set\(\[(.*?)\]", (STATIC / "events.js").read_text("utf-8"), re.S)
     assert alarms is not None

@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import PID, FitError, LivebodeError, Loop, Responses, UsageError
-from livebode.fitting import Fitter, Grid, Rigid
+from livebode.fitting import EvaluationGrid, Fitter, Rigid
 from livebode.margins import Margins, OpenLoop, against_lines, margins
 from tests.support.belt_loops import BAND_HZ, LINES, read, responses_of
 from tests.support.errors import refused
@@ -79,7 +79,7 @@ def test_peak_and_bandwidth_are_those_of_a_fine_comb(case: Case) -> None:
 @pytest.mark.parametrize("case", [Case(BELT, gain=4 * 0.2308, delay_ticks=4), Case(BELT, delay_ticks=8)])
 def test_bounds_hold_what_they_promise(case: Case) -> None:
     """1,000 fits to noisy lines: 95 % of the true margins within the 95 % bound, ± 2 points."""
-    truth = MODEL.at(parameters(BELT[np.newaxis]).value[0], Grid.of(LINES))
+    truth = MODEL.at(parameters(BELT[np.newaxis]).value[0], EvaluationGrid.of(LINES))
     noisy = responses_of(truth, 0.03 * float(np.median(np.abs(truth))), 1000, seed=1)
     found = margins(Fitter(MODEL).process(noisy), case.open, BAND_HZ)
     assert found.ok.all()
@@ -93,7 +93,9 @@ def test_bounds_hold_what_they_promise(case: Case) -> None:
 def test_a_margin_without_a_crossing_is_infinite_and_marked() -> None:
     """A rigid axis under a P controller: no phase crossing but the sampled one at half the rate; L never below −1."""
     loop = OpenLoop(Rigid(), Loop(feedback=PID(gain=0.2, rate_hz=4000)), 4000.0)
-    fits = Fitter(Rigid()).process(responses_of(Rigid().at([0.005, 0.0, 0.0], Grid.of(LINES)), 0.01, 5, seed=2))
+    fits = Fitter(Rigid()).process(
+        responses_of(Rigid().at([0.005, 0.0, 0.0], EvaluationGrid.of(LINES)), 0.01, 5, seed=2)
+    )
     found = margins(fits, loop, BAND_HZ)
     assert np.all(np.isinf(found.of("gain_reduction")))
     assert np.all(found.place[:, found.index("gain_reduction")] == "none")
@@ -132,7 +134,7 @@ def delayed(gain: float, ticks: float) -> tuple[Case, Margins, Responses]:
     """A loop, its true margins with a delay in the plant, and 100 noisy responses of that plant."""
     case, at = Case(BELT, gain=gain), values(BELT[np.newaxis])
     at[:, -1] = ticks / case.rate_hz
-    truth = MODEL.at(at[0], Grid.of(LINES))
+    truth = MODEL.at(at[0], EvaluationGrid.of(LINES))
     true = margins(replace(parameters(BELT[np.newaxis]), value=at), case.open, BAND_HZ)
     return case, true, responses_of(truth, 0.01 * float(np.median(np.abs(truth))), 100, seed=4)
 

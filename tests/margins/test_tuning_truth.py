@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from livebode.core import PID, Loop, UsageError
-from livebode.fitting import Fitter, Grid, Rigid
+from livebode.fitting import EvaluationGrid, Fitter, Rigid
 from livebode.margins import OpenLoop, low_pass, notch, peak_sensitivity_at_lines, tuning, worst
 from livebode.margins.filters import notch_over
 from tests.support.belt_loops import BAND_HZ, LINES, responses_of
@@ -88,7 +88,9 @@ def test_a_stable_loop_needs_no_filter_and_an_uncertain_one_gets_none() -> None:
 
 
 def test_a_model_without_a_resonance_has_nothing_to_filter() -> None:
-    fits = Fitter(Rigid()).process(responses_of(Rigid().at([0.005, 0.0, 0.0], Grid.of(LINES)), 0.01, 3, seed=2))
+    fits = Fitter(Rigid()).process(
+        responses_of(Rigid().at([0.005, 0.0, 0.0], EvaluationGrid.of(LINES)), 0.01, 3, seed=2)
+    )
     loop = OpenLoop(Rigid(), Loop(feedback=PID(gain=4.0, rate_hz=4000, delay_ticks=3)), 4000.0)
     assert "no resonance" in tuning(fits, loop, BAND_HZ).sentence
 
@@ -103,7 +105,7 @@ def test_impossible_specifications_are_refused() -> None:
 def test_lines_alone_bound_the_peak_from_below() -> None:
     """Never above the model's Ms, and at it where a line stands on the peak."""
     case = Case(BELT, gain=3 * 0.2308, delay_ticks=8)
-    truth = MODEL.at(parameters(BELT[np.newaxis]).value[0], Grid.of(LINES))
+    truth = MODEL.at(parameters(BELT[np.newaxis]).value[0], EvaluationGrid.of(LINES))
     size, bound, at_hz = peak_sensitivity_at_lines(responses_of(truth, 1e-3, 1, seed=3), case.loop)
     f = np.geomspace(1.0, 1999.0, 20_000)
     sensitivity = 1 / np.abs(1 + case.open.at(parameters(BELT[np.newaxis]).value, f)[0])

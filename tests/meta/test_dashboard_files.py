@@ -15,8 +15,8 @@ def test_uplot_is_as_it_was_published() -> None:
     words = (HERE / "_vendor/uplot/README.md").read_text()
     sums = dict(re.findall(r"^ {4}([0-9a-f]{64})  (\S+)$", words, re.M))
     assert set(sums.values()) == {"uPlot.esm.js", "uPlot.min.css"}
-    for wanted, name in sums.items():
-        assert hashlib.sha256((HERE / "_vendor/uplot" / name).read_bytes()).hexdigest() == wanted
+    for expected, name in sums.items():
+        assert hashlib.sha256((HERE / "_vendor/uplot" / name).read_bytes()).hexdigest() == expected
     assert "MIT" in (HERE / "_vendor/uplot/LICENSE").read_text()
     assert re.search(r"uPlot 1\.\d+\.\d+", words)
 

@@ -15,7 +15,7 @@ from livebode.records import PARAMETERS, RESPONSES
 from livebode.records.segments import frames
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE
 from livebode.records.segments.journal import Journal
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 from livebode.records.versions import VERSIONS
 
 ROOT = Path(__file__).parents[2]
@@ -36,7 +36,7 @@ def names(cell: str) -> list[str]:
 
 
 @pytest.mark.parametrize(("name", "written"), [("responses", RESPONSES), ("parameters", PARAMETERS)])
-def test_the_columns_of_the_tables_are_those_that_are_written(name: str, written: Table) -> None:
+def test_the_columns_of_the_tables_are_those_that_are_written(name: str, written: ColumnTable) -> None:
     listed = [(names(row[0])[0], row[1]) for row in table(PAGE, name)]
     assert listed == [(field.name, str(field.type)) for field in written.schema]
     assert isinstance(written.schema, pa.Schema)

@@ -110,13 +110,13 @@ def test_wide_objects_use_wide_registers(built):
 
 
 def test_undefined_symbols_are_few_and_known(built):
-    own, wanted = set(), set()
+    own, expected = set(), set()
     for file in built[2]:
         for line in run(needed("nm"), file).splitlines():
             kind, name = line.split()[-2:]
-            (wanted if kind == "U" else own).add(name)
+            (expected if kind == "U" else own).add(name)
     allowed = FREESTANDING | ({"__cpu_model", "__cpu_indicator_init", "_GLOBAL_OFFSET_TABLE_"} if X86 else set())
-    assert wanted - own <= allowed
+    assert expected - own <= allowed
 
 
 def test_misuse_is_refused(built, tmp_path):

@@ -166,8 +166,8 @@ def test_locks_name_no_host_and_agree_with_each_other() -> None:
     for others in pins[1:]:
         for package in pins[0].keys() & others.keys():
             assert pins[0][package] == others[package], package
-    wanted = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
-    assert {re.match(r"[a-z0-9-]+", w).group() for w in wanted} <= set(pins[0])
+    expected = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    assert {re.match(r"[a-z0-9-]+", w).group() for w in expected} <= set(pins[0])
 
 
 def _pins(lock: Path) -> dict[str, set[str]]:

@@ -52,7 +52,7 @@ def test_expressions_are_computed_as_on_a_controller(body: str, name: str, value
 
 
 @pytest.mark.parametrize(
-    ("body", "said"),
+    ("body", "message"),
     [
         ("n := n - 1;", "-1 overflows UDINT"),
         ("n := 4294967295; n := n + 1;", "4294967296 overflows UDINT"),
@@ -80,8 +80,8 @@ def test_expressions_are_computed_as_on_a_controller(body: str, name: str, value
         ("yes := (n > 0) AND (t[0, n + 5] > 0.0);", "subscript 5"),
     ],
 )
-def test_code_that_controllers_run_differently_is_refused(body: str, said: str) -> None:
-    with pytest.raises(RefusedError, match=said):
+def test_code_that_controllers_run_differently_is_refused(body: str, message: str) -> None:
+    with pytest.raises(RefusedError, match=message):
         ran(body)
 
 
@@ -106,7 +106,7 @@ def test_blocks_keep_their_own_memory_and_share_what_is_handed_over() -> None:
 
 
 @pytest.mark.parametrize(
-    ("body", "said"),
+    ("body", "message"),
     [
         ("f(x := 1.0);", "called without its"),
         ("f(r := s, z := 1.0);", "has no input z"),
@@ -117,8 +117,8 @@ def test_blocks_keep_their_own_memory_and_share_what_is_handed_over() -> None:
         ("a := f.x;", "no x that can be read"),
     ],
 )
-def test_calls_are_held_to_the_declaration(body: str, said: str) -> None:
-    with pytest.raises(RefusedError, match=said):
+def test_calls_are_held_to_the_declaration(body: str, message: str) -> None:
+    with pytest.raises(RefusedError, match=message):
         ran(body, USES, BLOCK)
 
 

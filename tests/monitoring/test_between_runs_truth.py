@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from livebode.core import Block, Event
-from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor
-from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring import DEFAULT_INTERVAL_S, LearnedMachine, MachineMonitor
+from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.between_runs import BetweenRuns, between_runs, chance
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import JUDGED, Evidence
@@ -24,7 +24,7 @@ SMALLEST = np.array([0.005, 0.005, 0.05, 0.01])
 BELT = BetweenRuns(np.array([-0.005, 0.0, 0.0, 0.0]), spread=2.0)
 
 
-def without_sensor() -> Machine:
+def without_sensor() -> LearnedMachine:
     """The axis as it is, as learned from runs whose stiffness scatters by 1 %."""
     return replace(ideal(), between=BELT)
 
@@ -122,7 +122,7 @@ def test_a_loss_is_found_in_a_run_that_begins_without_torque() -> None:
 
 
 def test_an_offset_is_followed_and_forgotten_after_a_pause() -> None:
-    held = Accuracy(np.ones(4), np.zeros(4), SMALLEST)
+    held = ChangeAccuracy(np.ones(4), np.zeros(4), SMALLEST)
     own, information = RunOffset(BELT, held, 20.0), np.diag(60.0 / SMALLEST**2)
     for mark in range(30):
         assert own.known == (mark >= 2)
@@ -134,7 +134,10 @@ def test_an_offset_is_followed_and_forgotten_after_a_pause() -> None:
 
 
 def test_windows_that_wait_for_longer_than_an_alarm_looks_back_enter_the_offset() -> None:
-    own, information = RunOffset(BELT, Accuracy(np.ones(4), np.zeros(4), SMALLEST), 20.0), np.diag(60.0 / SMALLEST**2)
+    own, information = (
+        RunOffset(BELT, ChangeAccuracy(np.ones(4), np.zeros(4), SMALLEST), 20.0),
+        np.diag(60.0 / SMALLEST**2),
+    )
     for mark in range(610):
         own.step(information @ (0.2 * BELT.direction), information, mark, mark / 10)
         own.settle(0, idle=True)

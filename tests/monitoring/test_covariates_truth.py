@@ -12,7 +12,7 @@ import pytest
 from livebode.analysis.learning import learn
 from livebode.configuration import Axis
 from livebode.core import BaselineError, Block, Event
-from livebode.monitoring import Baseline, Machine, MachineMonitor
+from livebode.monitoring import Baseline, LearnedMachine, MachineMonitor
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
 from livebode.runtime import Destination, run
 from livebode.simulation import TensionLoss
@@ -25,7 +25,7 @@ from tests.support.warm import MEAN_C, PER_KELVIN, Run, at_temperature, judged
 SHORT_S = 6.0
 
 
-def warm() -> Machine:
+def warm() -> LearnedMachine:
     """The axis as it is, with its dependence on the temperature."""
     limits = np.array([MEAN_C - 2.5]), np.array([MEAN_C + 2.8])
     slope = np.array([[-PER_KELVIN], [0.0], [0.0], [0.0]])
@@ -145,14 +145,14 @@ def test_a_slope_from_runs_with_offsets_is_as_uncertain_as_the_offsets_make_it()
     """Ordinary least squares over runs that share an offset each: its own covariance would be 50 times too small."""
     generator, size = np.random.default_rng(2), 50
     kelvin = np.repeat(np.linspace(-2, 2, 12), size)
-    slopes, told = [], []
+    slopes, bounds = [], []
     for _ in range(60):
         value = 0.5 * kelvin + np.repeat(generator.normal(0.0, 1.0, 12), size) + generator.normal(0, 0.1, kelvin.size)
         parts = parts_of([size] * 12)
         left = [np.polyfit(np.delete(kelvin, part), np.delete(value, part), 1)[:1] for part in parts]
         slopes.append(np.polyfit(kelvin, value, 1)[0])
-        told.append(np.sqrt(jackknife(np.array(left))[0, 0]))
-    assert np.mean(told) == pytest.approx(np.std(slopes), rel=0.3)
+        bounds.append(np.sqrt(jackknife(np.array(left))[0, 0]))
+    assert np.mean(bounds) == pytest.approx(np.std(slopes), rel=0.3)
 
 
 def test_a_single_run_is_cut_into_five_parts() -> None:

@@ -14,7 +14,7 @@ from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_
 from livebode.simulation import TensionLoss
 from tests.support.axes import LINES
 from tests.support.errors import refused
-from tests.support.monitored import machine, pieces, recorded, told
+from tests.support.monitored import changes_of, machine, pieces, recorded
 
 SETTINGS = Settings(lines=LINES, output="velocity", input="u", excitation="w", schedule="x", noise="quiet")
 FAULT = TensionLoss(start_s=6.0, loss=0.03)
@@ -62,7 +62,7 @@ def test_a_gap_costs_its_windows_alone() -> None:
     parts = [holed.cut(0, 20000), replace(holed.cut(24000, len(block)), gap=True)]
     monitor, tracker = Monitor(baseline(True), SETTINGS), Tracker(SETTINGS)
     found = [e for part in parts for e in monitor.process(part, tracker.process(part))]
-    assert told(found) == [("change", "stiffness")]
+    assert changes_of(found) == [("change", "stiffness")]
     assert abs(found[0].details["since_s"] - 6.0) < 1.5
 
 

@@ -36,7 +36,7 @@ def baseline(hop: int) -> Baseline:
     return Baseline(LINES, hop, signals_of(settings), "joint", "plant", (table,), None)
 
 
-def told(learned: Baseline, block: Block, hop: int) -> Sequence[Event]:
+def events_of(learned: Baseline, block: Block, hop: int) -> Sequence[Event]:
     settings = replace(SETTINGS, hop=hop)
     monitor = Monitor(learned, settings)
     events = monitor.process_responses(Tracker(settings).process(block)) + monitor.finish()
@@ -54,18 +54,18 @@ def test_no_hop_and_no_beginning_makes_a_healthy_machine_another(learned: int) -
         block = recorded(seed, JUDGED_S)
         for hop, begin in ((20, 0), (40, 0), (100, 0), (400, 0), (89, 0), (20, 50), (100, 80), (400, 350)):
             later = Block(block.data[:, begin:], block.channels, block.rate_hz)
-            assert told(baseline(learned), later, hop) == [], (seed, hop, begin)
+            assert events_of(baseline(learned), later, hop) == [], (seed, hop, begin)
 
 
 def test_the_same_change_is_detected_at_every_hop() -> None:
     """Loss of 5 % at 10 s, at the latest two strokes later; the windows that are judged are the same ones."""
     block = recorded(4, JUDGED_S, TensionLoss(start_s=10.0, loss=0.05))
-    first, *others = (told(baseline(20), block, hop) for hop in (20, 50, 100, 200, 400))
+    first, *others = (events_of(baseline(20), block, hop) for hop in (20, 50, 100, 200, 400))
     assert [event.kind for event in first] == ["change"]
     assert 10.0 < first[0].time_s < 17.0
     assert abs(first[0].details["since_s"] - 10.0) < 1.0
-    said = [(event.sample, event.message) for event in first]
-    assert [[(event.sample, event.message) for event in events] for events in others] == [said] * 4
+    messages = [(event.sample, event.message) for event in first]
+    assert [[(event.sample, event.message) for event in events] for events in others] == [messages] * 4
 
 
 @pytest.mark.parametrize(("learned", "hop"), [(20, 800), (400, 89), (100, 89), (800, 1200)])

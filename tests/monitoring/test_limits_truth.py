@@ -4,16 +4,27 @@ from __future__ import annotations
 
 from functools import cache
 
-from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor, learn_machine
+from livebode.monitoring import DEFAULT_INTERVAL_S, LearnedMachine, MachineMonitor, learn_machine
 from livebode.simulation import SimulatedAxis, TensionLoss
 from tests.support.axes import LINES
-from tests.support.monitored import CHANNELS, NAMES, RADIUS_M, THERE, axis, pieces, recorded, strokes, told, watcher
+from tests.support.monitored import (
+    CHANNELS,
+    NAMES,
+    RADIUS_M,
+    THERE,
+    axis,
+    changes_of,
+    pieces,
+    recorded,
+    strokes,
+    watcher,
+)
 
 SPEED_M_PER_S = 0.3
 
 
 @cache
-def one_way() -> Machine:
+def one_way() -> LearnedMachine:
     """From the strokes there alone, all of one speed."""
     simulated = axis(strokes((SPEED_M_PER_S,) * 2, THERE), 80)
     half = int(simulated.motion.edges_s(4000)[1] * 4000)
@@ -49,6 +60,6 @@ def test_a_slow_drift_with_temperature_is_detected() -> None:
     monitor = watcher()
     parts = pieces(recorded((0.3,) * 36, drift, seed=92), [40_000])
     first = next(event for part in parts for event in monitor.process(part))
-    assert told([first]) == [("change", "stiffness")]
+    assert changes_of([first]) == [("change", "stiffness")]
     assert abs(first.details["amount_percent"]) < 1.0
     assert first.time_s < 160.0

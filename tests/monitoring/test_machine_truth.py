@@ -7,7 +7,7 @@ import pytest
 
 from livebode.monitoring import Evidence, MachineDetector
 from livebode.simulation import DampingGrowth, LoadChange, Mechanics, Sensor, SoftSpot, TensionLoss
-from tests.support.monitored import BACK, changed, machine, recorded, told, watcher
+from tests.support.monitored import BACK, changed, changes_of, machine, recorded, watcher
 
 
 def test_the_learned_model_is_the_machine() -> None:
@@ -32,7 +32,7 @@ def test_the_learned_model_is_the_machine() -> None:
 def test_a_change_is_found_named_and_sized(fault: object, what: str, percent: float) -> None:
     monitor = watcher()
     events = monitor.process(recorded((0.25, 0.3), fault, seed=3)) + monitor.finish()
-    assert told(events) == [("change", what)]
+    assert changes_of(events) == [("change", what)]
     details = events[0].details
     assert abs(details["amount_percent"] - percent) < max(2 * details["bound_percent"], 0.05 * abs(percent))
     assert abs(details["since_s"] - 6.0) < 0.5
@@ -44,7 +44,7 @@ def test_a_change_is_found_named_and_sized(fault: object, what: str, percent: fl
 def test_a_soft_spot_is_located_and_its_alarm_remains_active(ends: tuple[float, float]) -> None:
     spot = SoftSpot(position_m=1.1, width_m=0.0777, loss=0.1)
     events = watcher().process(recorded((0.3, 0.35, 0.2), spot, seed=4, ends=ends))
-    assert told(events) == [("change", "stiffness")]
+    assert changes_of(events) == [("change", "stiffness")]
     assert abs(events[0].details["place_m"] - 1.1) < 0.02
     assert "around position 1.1" in events[0].message
 
@@ -52,7 +52,7 @@ def test_a_soft_spot_is_located_and_its_alarm_remains_active(ends: tuple[float, 
 def test_a_ramp_is_found_early() -> None:
     """At one percent of its stiffness a minute, the alarm comes before two thirds of a percent have gone."""
     events = watcher().process(recorded((0.3,) * 10, TensionLoss(loss=0.01, ramp_s=60.0), seed=5))
-    assert told(events) == [("change", "stiffness")]
+    assert changes_of(events) == [("change", "stiffness")]
     assert events[0].time_s < 40.0
 
 
@@ -60,7 +60,7 @@ def test_an_alarm_clears_once_when_the_load_is_removed() -> None:
     """A load that is picked up and put down again: one alarm, one that it has gone."""
     load = LoadChange(start_s=5.0, load_kg=0.1), LoadChange(start_s=20.0, load_kg=-0.1)
     events = watcher().process(recorded((0.3,) * 8, *load, seed=6))
-    assert told(events) == [("change", "load"), ("change-cleared", "load")]
+    assert changes_of(events) == [("change", "load"), ("change-cleared", "load")]
     assert 20.0 < events[1].time_s < 22.0
 
 
@@ -68,7 +68,7 @@ def test_speed_and_direction_are_no_change() -> None:
     """Slow, fast, there and back: a baseline of one speed would fake one to two percent."""
     fast, slow = 0.98 * machine().fastest_m_per_s, 1.02 * machine().slowest_m_per_s
     for seed, ends in enumerate((BACK, BACK[::-1])):
-        assert told(watcher().process(recorded((fast, slow, fast, 0.2), seed=20 + seed, ends=ends))) == []
+        assert changes_of(watcher().process(recorded((fast, slow, fast, 0.2), seed=20 + seed, ends=ends))) == []
 
 
 def test_noise_and_excitation_are_no_change() -> None:
@@ -80,21 +80,21 @@ def test_noise_and_excitation_are_no_change() -> None:
         half = data.shape[1] // 2
         data[2, half:] += 0.28 * generator.standard_normal(data.shape[1] - half)
 
-    assert told(watcher().process(changed(block, louder))) == []
+    assert changes_of(watcher().process(changed(block, louder))) == []
     loud = recorded((0.3, 0.3), seed=8, sensor=Sensor(noise_rad_per_s=0.4))
-    assert told(watcher().process(loud)) == []
+    assert changes_of(watcher().process(loud)) == []
 
 
 def test_speeds_and_positions_that_were_not_learned_are_not_judged_and_reported_once() -> None:
     fast = watcher()
-    assert told(fast.process(recorded((1.2, 1.2), seed=9))) == [("baseline-unknown", "fast")]
+    assert changes_of(fast.process(recorded((1.2, 1.2), seed=9))) == [("baseline-unknown", "fast")]
     assert fast.detector.judged < 10  # at the ends of the strokes
     beyond = recorded((0.3, 0.3), seed=10)
 
     def moved(data: np.ndarray) -> None:
         data[3] += 0.4
 
-    assert ("baseline-unknown", "place") in told(watcher().process(changed(beyond, moved)))
+    assert ("baseline-unknown", "place") in changes_of(watcher().process(changed(beyond, moved)))
 
 
 def test_standstill_and_creeping_are_not_judged() -> None:
@@ -149,7 +149,7 @@ def test_two_changes_at_once_are_reported_together() -> None:
     faults = TensionLoss(start_s=6.0, loss=0.04), LoadChange(start_s=6.0, load_kg=0.335)
     truth, monitor = {"stiffness": -4.0, "load": 5.0}, watcher()
     events = monitor.process(recorded((0.3, 0.33, 0.3, 0.3), *faults, seed=71)) + monitor.finish()
-    kinds = told(events)
+    kinds = changes_of(events)
     assert sorted(k for k in kinds if k[0] == "change") == [("change", "load"), ("change", "stiffness")]
     assert [k for k in kinds if k[0] == "change-corrected"] == [("change-corrected", kinds[0][1])]
     for details in [e.details for e in events[1:]] + monitor.standing():

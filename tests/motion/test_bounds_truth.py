@@ -46,7 +46,7 @@ def test_the_tracker_alone_counts_the_motion_as_noise() -> None:
     assert np.median(plain.sigma[rows] / ours.sigma[rows]) > 2
 
 
-def standing(friction_n: float) -> tuple[BeltAxis, Block]:
+def at_standstill(friction_n: float) -> tuple[BeltAxis, Block]:
     """Two strokes with dwells of 1 s."""
     motion, friction = Strokes(dwell_s=1.0), Friction(load_coulomb_n=friction_n)
     seconds = (motion.cycle(4000)[0].size + 400) / 4000
@@ -57,7 +57,7 @@ def standing(friction_n: float) -> tuple[BeltAxis, Block]:
 
 @pytest.mark.parametrize("friction_n", [0.0, 5.0, 15.0])
 def test_standstill_is_invalid_where_dry_friction_holds_and_only_there(friction_n: float) -> None:
-    run, block = standing(friction_n)
+    run, block = at_standstill(friction_n)
     correction = MotionCorrection(SETTINGS, radius_m=0.019, chunk_samples=run.motion.cycle(4000)[0].size // 2)
     events: list[Event] = []
     found = Responses.join([correction.process(block, events.append), correction.finish(events.append)])

@@ -15,7 +15,7 @@ from livebode.excitation import multisine
 from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.early_spikes import early_spikes
 from livebode.preparation.transients import leading_transient
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.sources import open_log
 from tests.support.command import livebode, write_parquet
 from tests.support.real_recordings import recording
@@ -36,13 +36,13 @@ def recorded(transient: float, periods: int = 20, spike: int | None = None) -> d
     return {"w": w, "u": u, "y": 2 * u + transient * decay + 0.05 * rng.standard_normal(w.size)}
 
 
-def ran(tmp_path: Path, columns: dict[str, np.ndarray], *arguments: object) -> Run:
+def ran(tmp_path: Path, columns: dict[str, np.ndarray], *arguments: object) -> RunRecord:
     log = write_parquet(tmp_path / "log.parquet", columns)
     names = [word for role, name in NAMES.items() for word in (f"--{role}", name)]
     grid = ("--rate", RATE_HZ, "--lines", "20:140:20", "--window", WINDOW, "--average", "--forgetting", 1)
     done = livebode("run", log, *names, *grid, *arguments, "--out", tmp_path / f"run{len(arguments)}")
     assert done.code == 0, done.err
-    return Run.open(tmp_path / f"run{len(arguments)}")
+    return RunRecord.open(tmp_path / f"run{len(arguments)}")
 
 
 def test_a_transient_is_left_out_of_averages_and_bounds_and_reported(tmp_path: Path) -> None:

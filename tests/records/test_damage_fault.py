@@ -17,17 +17,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import DamageWarning, Event, RecordError
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.segments.damage import total
 from livebode.records.segments.frames import COMMIT, ROWS, frames, to_frame
 from livebode.records.segments.journal import Commit, Journal, head, name_of, read_sealed
 from livebode.records.segments.json_lines import in_line, to_line
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 from tests.support.errors import refused
 from tests.support.recorded import check_beginning, expected, machine, record_machine, same
 
 SAMPLES = 2600
-TABLE = Table(pa.schema([("sample", pa.int64()), ("time_s", pa.float64())]))
+TABLE = ColumnTable(pa.schema([("sample", pa.int64()), ("time_s", pa.float64())]))
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def test_a_journal_that_expands_is_refused_in_a_sentence(tmp_path: Path, attack:
         message = message.replace(struct.pack("<q", 8 * rows * columns), struct.pack("<q", 8 * rows), 1)
         message = message[: -8 * rows * (columns - 1)]
         assert pa.ipc.read_record_batch(pa.py_buffer(message), schema).nbytes > 30 * len(message)
-    data = head({"a": Table(schema)}, commit(0)) + to_frame(ROWS, message) + commit(1).to_frame()
+    data = head({"a": ColumnTable(schema)}, commit(0)) + to_frame(ROWS, message) + commit(1).to_frame()
     (tmp_path / "open").mkdir()
     with (tmp_path / name_of(1)).open("wb") as file:
         file.write(data)
@@ -178,7 +178,7 @@ def test_a_damaged_file_is_reported_once_and_a_clock_that_was_set_back_is_explai
         if done > 600:
             raise StopError
 
-    run, told = tmp_path / "run", list[Event]()
+    run, reported = tmp_path / "run", list[Event]()
     with pytest.raises(StopError):
         record_machine(machine(SAMPLES), run, progress=stop)
     data = bytearray((run / name).read_bytes())
@@ -188,10 +188,10 @@ def test_a_damaged_file_is_reported_once_and_a_clock_that_was_set_back_is_explai
     monkeypatch.setattr(time, "time", lambda: now() - 3600)
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
-        record_machine(machine(SAMPLES), run, tell=told.append)
-    damaged = [event.message for event in told if event.kind == "record-damaged"]
+        record_machine(machine(SAMPLES), run, report=reported.append)
+    damaged = [event.message for event in reported if event.kind == "record-damaged"]
     assert len(damaged) + len(warned) == (name == "run.json")
-    (continued,) = [event for event in told if event.kind == "record-continued"]
+    (continued,) = [event for event in reported if event.kind == "record-continued"]
     assert "this computer's clock was set back, so" in continued.message
     assert continued.details["away_s"] is None
 
@@ -245,14 +245,14 @@ def test_a_changed_file_of_a_finished_run_is_reported_and_the_rest_is_read(finis
     at = data.draw(st.integers(0, len(content) - 1))
     content[at] ^= data.draw(st.integers(1, 255))
     (other / name).write_bytes(content)
-    whole = Run.open(finished)
+    whole = RunRecord.open(finished)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DamageWarning)
-        run = Run.open(other)
+        run = RunRecord.open(other)
         found = run.responses(), run.events(), list(run.tables("samples"))
-    told = [str(damage.details["file"]) for damage in run.damages]
-    assert told == ([] if name.name == "run-copy.json" else [str(name)] * len(told))
-    assert told or name.name == "run-copy.json"
+    reported = [str(damage.details["file"]) for damage in run.damages]
+    assert reported == ([] if name.name == "run-copy.json" else [str(name)] * len(reported))
+    assert reported or name.name == "run-copy.json"
     segment = next((s for s in whole.segments if s.name == str(name)), None)
     lost = dict.fromkeys(("responses", "samples"), 0) | ({segment.table: segment.rows} if segment else {})
     assert len(found[0]) == len(whole.responses()) - lost["responses"] // len(whole.lines)
@@ -285,28 +285,28 @@ def test_a_run_with_a_damaged_journal_is_continued_behind_the_damage(tmp_path: P
     content = journals[-1].read_bytes()
     commits = [frame for frame in frames(content) if frame.kind == COMMIT]
     flip(journals[-1], at * commits[-1].start / len(content))  # before the last commit, however long a state is
-    told: list[Event] = []
-    record_machine(machine(SAMPLES), run, tell=told.append)
-    assert [event.kind for event in told] == ["record-continued", "record-damaged"]
-    assert told[0].sample == held
-    check_damage(run, told[1], journals[-1].name)
+    reported: list[Event] = []
+    record_machine(machine(SAMPLES), run, report=reported.append)
+    assert [event.kind for event in reported] == ["record-continued", "record-damaged"]
+    assert reported[0].sample == held
+    check_damage(run, reported[1], journals[-1].name)
     with refused(RecordError, "finished", path=str(run)):
         record_machine(machine(SAMPLES), run)
 
 
-def check_damage(run: Path, told: Event, journal: str) -> None:
+def check_damage(run: Path, reported: Event, journal: str) -> None:
     """That exactly what the event says is missing, and everything else is there."""
-    assert told in Run.open(run).events()
+    assert reported in RunRecord.open(run).events()
     assert (run / "damaged" / journal).exists()
-    details = told.details
+    details = reported.details
     place = details["places"][0]
-    assert Run.open(run).summary["record"]["damaged"] == {
+    assert RunRecord.open(run).summary["record"]["damaged"] == {
         "files": [f"damaged/{journal}"], **{key: details[key] for key in ("samples", "seconds", "rows")},
     }  # fmt: skip
-    number = np.concatenate([table["sample"].to_numpy() for table in Run.open(run).tables("samples")])
+    number = np.concatenate([table["sample"].to_numpy() for table in RunRecord.open(run).tables("samples")])
     lost = np.setdiff1d(np.arange(SAMPLES), number)
     assert lost.size == details["rows"].get("samples", 0)
-    responses = Run.open(run).responses()
+    responses = RunRecord.open(run).responses()
     due = expected(SAMPLES)[0]
     gone = ~np.isin(due.sample, responses.sample)
     assert np.count_nonzero(gone) * len(due.lines) == details["rows"].get("responses", 0)
@@ -322,12 +322,12 @@ def test_a_journal_that_is_damaged_while_the_process_runs_is_closed_without_what
         if start == 850:
             flip(run / "open" / "000001.journal", 0.6)
 
-    told: list[Event] = []
-    record_machine(machine(SAMPLES, each), run, tell=told.append)
-    assert [event.kind for event in told] == ["record-damaged"]
-    check_damage(run, told[0], "000001.journal")
-    assert told[0].details["rows"]
-    assert "are lost" in told[0].message
+    reported: list[Event] = []
+    record_machine(machine(SAMPLES, each), run, report=reported.append)
+    assert [event.kind for event in reported] == ["record-damaged"]
+    check_damage(run, reported[0], "000001.journal")
+    assert reported[0].details["rows"]
+    assert "are lost" in reported[0].message
 
 
 def test_a_lost_journal_is_reported(tmp_path: Path) -> None:

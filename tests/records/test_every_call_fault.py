@@ -96,15 +96,15 @@ def test_a_call_that_fails_once_costs_nothing(folder: Path) -> None:
     paused = unclosed = 0
     begun, ended, calls = calls_of_a_run(folder / "whole")
     for at in range(1, calls + 1):
-        out, said = folder / str(at), []
+        out, reported = folder / str(at), []
         with disk_that(full, at):
             if begun < at <= ended - BESIDE:
-                record_machine(machine(SAMPLES), out, tell=said.append)
+                record_machine(machine(SAMPLES), out, report=reported.append)
             else:  # at its very beginning or end the user may be told
                 with suppress(LivebodeError):
-                    record_machine(machine(SAMPLES), out, tell=said.append)
-        kinds = [event.kind for event in said if event.kind not in CLOSING]
-        unclosed += len(kinds) < len(said)
+                    record_machine(machine(SAMPLES), out, report=reported.append)
+        kinds = [event.kind for event in reported if event.kind not in CLOSING]
+        unclosed += len(kinds) < len(reported)
         assert kinds in ([], ["record-paused", "record-resumed"], ["record-paused"]), at
         paused += kinds == ["record-paused", "record-resumed"]
         if unfinished(out):

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from livebode.core import Block, Channel, Event
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.sample_table import as_rows, samples_of
 from livebode.records.segments import journal
 from livebode.records.segments.frames import COMMIT, to_frame
-from livebode.records.segments.limits import Limits
+from livebode.records.segments.limits import SegmentLimits
 from livebode.records.segments.store import Store
 from tests.support.starved import on_a_limited_file
 
@@ -29,8 +29,8 @@ Y = samples_of([Channel("y", "m")])
 SUMMARY = {"found": {"bins": [1], "window": 10, "rate_hz": RATE_HZ, "quiet_bins": [], "quantity": "plant", "unit": ""}}
 
 
-def _send(say: Connection, run: Path) -> None:
-    say.send([event.kind for event in on_a_limited_file(run)])
+def _send(outlet: Connection, run: Path) -> None:
+    outlet.send([event.kind for event in on_a_limited_file(run)])
 
 
 def check_pause(kinds: list[str]) -> None:
@@ -46,12 +46,12 @@ def check_pause(kinds: list[str]) -> None:
 
 def test_a_file_at_its_size_limit_pauses_the_record(tmp_path: Path) -> None:
     context = multiprocessing.get_context("spawn")
-    said, say = context.Pipe(duplex=False)
-    process = context.Process(target=_send, args=(say, tmp_path / "run"))
+    results, outlet = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(outlet, tmp_path / "run"))
     process.start()
     process.join()
     assert process.exitcode == 0
-    check_pause(said.recv())
+    check_pause(results.recv())
 
 
 def test_the_record_pauses_on_a_full_disk_and_continues(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_the_record_pauses_on_a_full_disk_and_continues(tmp_path: Path) -> None:
 
 def test_the_lost_samples_are_reported_exactly(tmp_path: Path) -> None:
     # It is lost where memory holds no more; events are not.
-    limits = Limits(interval_samples=1, segment_samples=10**9, interval_s=0.0, held_bytes=10_000)
+    limits = SegmentLimits(interval_samples=1, segment_samples=10**9, interval_s=0.0, held_bytes=10_000)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     events: list[Event] = []
     with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
@@ -83,7 +83,7 @@ def test_the_lost_samples_are_reported_exactly(tmp_path: Path) -> None:
         paused, resumed = events
         store.finish(SUMMARY, finished=True)
     assert taken == [True] * 5 + [False] * 22 + [True] * 13
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     number = np.concatenate([table["sample"].to_numpy() for table in run.tables("samples")])
     missing = np.setdiff1d(np.arange(4000), number)
     lost = resumed.details["lost"]["samples"]
@@ -98,7 +98,7 @@ def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(journal, "_SPARSE_BYTES_MAX", 10_000)
-    limits = Limits(interval_samples=1, segment_samples=300, interval_s=0.0)
+    limits = SegmentLimits(interval_samples=1, segment_samples=300, interval_s=0.0)
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     events: list[Event] = []
     with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
@@ -110,7 +110,7 @@ def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(
             resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
         unclosed = [event.kind for event in events]
         assert (tmp_path / "run/open/000001.journal").stat().st_size > 30_000
-        (table,) = Run.open(tmp_path / "run").tables("samples")
+        (table,) = RunRecord.open(tmp_path / "run").tables("samples")
         taken.append(_second(store, 20, None, hard))
     events: list[Event] = []
     with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
@@ -120,11 +120,11 @@ def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(
     assert all(taken)
     assert unclosed == ["record-unclosed"] * 5  # of 18 attempts the 1st, 2nd, 4th, 8th and 16th
     assert table.num_rows == 2000
-    assert sum(table.num_rows for table in Run.open(tmp_path / "run").tables("samples")) == 2100
+    assert sum(table.num_rows for table in RunRecord.open(tmp_path / "run").tables("samples")) == 2100
 
 
 def test_segments_are_closed_again_when_the_next_journal_could_be_opened(tmp_path: Path) -> None:
-    limits = Limits(interval_samples=1, segment_samples=300, interval_s=0.0)
+    limits = SegmentLimits(interval_samples=1, segment_samples=300, interval_s=0.0)
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     events: list[Event] = []
     with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
@@ -138,7 +138,7 @@ def test_segments_are_closed_again_when_the_next_journal_could_be_opened(tmp_pat
 
 
 def test_a_journal_that_holds_what_no_run_writes_ends_no_run(tmp_path: Path) -> None:
-    limits = Limits(interval_samples=1, segment_samples=300, interval_s=0.0)
+    limits = SegmentLimits(interval_samples=1, segment_samples=300, interval_s=0.0)
     events: list[Event] = []
     with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
         store.begin(SUMMARY, 0, 0.0, {"state": b""})
@@ -172,10 +172,10 @@ def size_of(run: Path) -> int:
 def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> None:
     # Segments of 0.8 MB, as random numbers do not compress; 40 of samples and of responses each are 64 MB.
     budget, rng = 8 << 20, np.random.default_rng(0)
-    limits = Limits(interval_samples=1, segment_samples=50_000, budget_bytes=budget)
+    limits = SegmentLimits(interval_samples=1, segment_samples=50_000, budget_bytes=budget)
     used: list[int] = []
-    said: list[Event] = []
-    with Store(tmp_path / "run", {"samples": Y, "responses": Y}, limits, said.append) as store:
+    results: list[Event] = []
+    with Store(tmp_path / "run", {"samples": Y, "responses": Y}, limits, results.append) as store:
         store.begin(SUMMARY, 0, 0.0, {"state": b""})
         for start in range(0, 40 * 50_000, 10_000):
             block = Block(rng.standard_normal((1, 10_000)), (Channel("y"),), RATE_HZ, start=start)
@@ -185,7 +185,7 @@ def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> No
             store.commit(block.stop, block.stop / RATE_HZ, {"state": bytes(100)})
             used.append(size_of(tmp_path / "run"))
         store.finish(SUMMARY, finished=True)
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     assert max(used) <= budget
     assert max(used) > budget / 2
     # Samples went first, all but those closed last, and of responses the newest stay.
@@ -196,7 +196,7 @@ def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> No
     assert number[0] > 0
     marks = [event for event in run.events() if event.kind == "mark"]
     assert len(marks) == 200
-    gone = [name for event in said for name in event.details.get("removed", [])]
+    gone = [name for event in results for name in event.details.get("removed", [])]
     of_samples = gone.index("responses/000001.parquet")
     assert gone[:of_samples] == [f"samples/{k:06d}.parquet" for k in range(1, of_samples + 1)]
     assert not any((tmp_path / "run" / name).exists() for name in gone)

@@ -22,7 +22,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from livebode.core import DamageWarning, LivebodeError, RecordError
-from livebode.records import Run, RunDirectory
+from livebode.records import RunDirectory, RunRecord
 from livebode.records.query import query
 from livebode.records.segments.json_lines import to_line
 from livebode.records.summary_file import to_document
@@ -123,9 +123,11 @@ def make_hostile(run: Path, place: Path, rng: np.random.Generator) -> None:
 
 def attempts(run: Path, folder: Path) -> list[Callable[[], Any]]:
     return [
-        lambda: [table for name in ("responses", "samples", "parameters") for table in Run.open(run).tables(name)],
-        lambda: Run.open(run).events(),
-        lambda: query(Run.open(run), "FROM samples", 100_000).rows,
+        lambda: [
+            table for name in ("responses", "samples", "parameters") for table in RunRecord.open(run).tables(name)
+        ],
+        lambda: RunRecord.open(run).events(),
+        lambda: query(RunRecord.open(run), "FROM samples", 100_000).rows,
         *commands(run, folder).values(),
         lambda: record_run(run),
         lambda: make_way(run),
@@ -178,7 +180,7 @@ def test_continuing_removes_no_file_that_it_did_not_write(tmp_path: Path, runs: 
         path.write_text("mine")
     record_run(tmp_path / "run")
     assert [path.read_text() for path in mine] == ["mine"] * 3
-    assert Run.open(tmp_path / "run").finished
+    assert RunRecord.open(tmp_path / "run").finished
 
 
 def test_continuing_does_not_wait_at_a_pipe_in_place_of_the_pictures(tmp_path: Path, runs: dict[str, Path]) -> None:
@@ -215,7 +217,7 @@ def test_a_segment_that_expands_beyond_reason_is_named_and_left_out(
     (run / "manifest.jsonl").write_bytes(b"".join(to_line(line) * 2 for line in lines))
     assert len(content) < n // 8
     with pytest.warns(DamageWarning, match="more than a segment can have"):
-        assert sum(table.num_rows for table in Run.open(run).tables("samples")) < 2600
+        assert sum(table.num_rows for table in RunRecord.open(run).tables("samples")) < 2600
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -251,7 +253,7 @@ def test_a_run_without_its_number_of_samples_is_reported(tmp_path: Path, runs: d
     del whole["crc32"]
     (run / "run.json").write_bytes(to_document(whole | {"counts": whole["counts"] | {"samples": None}}))
     assert livebode("report", run).code == 0
-    last = Run.open(run).responses().sample[-1]
+    last = RunRecord.open(run).responses().sample[-1]
     assert f"{last + 1:,}" in (run / "report.html").read_text()
 
 

@@ -19,7 +19,7 @@ import pytest
 from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Event, RecordError
 from livebode.estimation import Tracker
-from livebode.records import Run, RunDirectory
+from livebode.records import RunDirectory, RunRecord
 from livebode.records.grouped_events import each_event
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.errors import refused
@@ -57,7 +57,7 @@ def record_until(sample: int, directory: Path, **options: object) -> None:
         record_machine(machine(SAMPLES), directory, progress=stop_at(sample), **options)
 
 
-def each(run: Run) -> list[Event]:
+def each(run: RunRecord) -> list[Event]:
     """Its events as they happened, before they were grouped."""
     return [one for event in run.events() for one in each_event(event)]
 
@@ -66,7 +66,7 @@ def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
     record_machine(machine(SAMPLES), tmp_path / "segments")
     record(machine(SAMPLES), Tracker(SETTINGS), tmp_path / "piece", about={})
     check_whole(tmp_path / "segments", SAMPLES)
-    runs = [Run.open(tmp_path / name) for name in ("segments", "piece")]
+    runs = [RunRecord.open(tmp_path / name) for name in ("segments", "piece")]
     assert same(runs[0].responses(), runs[1].responses())
     assert runs[0].events() == runs[1].events()
     assert each(runs[0]) == list(expected(SAMPLES)[1])
@@ -82,11 +82,11 @@ def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
 def test_a_run_that_ended_anywhere_is_read_and_continues(tmp_path: Path, sample: int) -> None:
     record_until(sample, tmp_path / "run")
     held = check_beginning(tmp_path / "run", SAMPLES, sample - RATE_HZ)
-    assert not Run.open(tmp_path / "run").finished
-    said: list[Event] = []
-    record_machine(machine(SAMPLES), tmp_path / "run", tell=said.append)
+    assert not RunRecord.open(tmp_path / "run").finished
+    reported: list[Event] = []
+    record_machine(machine(SAMPLES), tmp_path / "run", report=reported.append)
     check_whole(tmp_path / "run", SAMPLES)
-    assert [(event.kind, event.sample) for event in said] == [("record-continued", held)]
+    assert [(event.kind, event.sample) for event in reported] == [("record-continued", held)]
     with refused(RecordError, "finished", path=str(tmp_path / "run")):
         record_machine(machine(SAMPLES), tmp_path / "run")
 
@@ -99,13 +99,13 @@ def test_a_run_is_read_while_it_is_written(tmp_path: Path) -> None:
     def read() -> None:
         while not going.wait(0.001):
             if (directory / "run.json").exists():
-                run = Run.open(directory)
-                seen, said = run.responses(), each(run)
+                run = RunRecord.open(directory)
+                seen, reported = run.responses(), each(run)
                 number = np.concatenate([np.zeros(0, int), *(t["sample"].to_numpy() for t in run.tables("samples"))])
                 assert same(seen, responses[: len(seen)])
-                assert said == list(events[: len(said)])
+                assert reported == list(events[: len(reported)])
                 assert np.array_equal(number, np.arange(number.size))
-                found.append((len(seen), len(said), number.size))
+                found.append((len(seen), len(reported), number.size))
                 assert found[-1] >= found[-2]
 
     def reading() -> None:
@@ -132,7 +132,7 @@ def test_a_machine_that_cannot_go_back_leaves_a_gap(tmp_path: Path) -> None:
     missing = 250
     without_end = replace(machine(SAMPLES), samples=None, first=held + missing)
     record_machine(without_end, tmp_path / "run", again=False)
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     assert not run.finished  # it was stopped, and may go on
     assert run.summary["counts"]["gaps"] == 1
     number = np.concatenate([table["sample"].to_numpy() for table in run.tables("samples")])
@@ -146,7 +146,7 @@ def test_a_machine_that_cannot_go_back_leaves_a_gap(tmp_path: Path) -> None:
     assert same(run.responses(), type(parts[0]).join(parts))
     assert [event.kind for event in run.events()].count("gap") == 1
     record_machine(replace(without_end, first=held + 2 * missing + SAMPLES), tmp_path / "run", again=False)
-    assert Run.open(tmp_path / "run").summary["counts"]["gaps"] == 2
+    assert RunRecord.open(tmp_path / "run").summary["counts"]["gaps"] == 2
 
 
 def test_a_run_of_another_configuration_or_of_a_running_process_is_not_written(tmp_path: Path) -> None:
@@ -215,11 +215,11 @@ def test_the_same_command_continues_where_it_was_ended(
     assert done.returncode == (-number if number == signal.SIGKILL else 128 + number), done.stderr
     assert "Traceback" not in done.stderr
     assert ("continues the run" in done.stderr) == (number != signal.SIGKILL)
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     assert run.responses().sample[-1] > 40_000 - RATE_HZ
     assert livebode("run", *given).code == 0
     whole = Path(str(given[0])).with_name("whole")
-    assert same(Run.open(tmp_path / "run").responses(), Run.open(whole).responses())
+    assert same(RunRecord.open(tmp_path / "run").responses(), RunRecord.open(whole).responses())
     assert (tmp_path / "run" / "bode.png").stat().st_size > 10_000
     assert "is finished" in livebode("run", *given).err
     assert livebode("run", *given, "--force").code == 0
@@ -228,7 +228,7 @@ def test_the_same_command_continues_where_it_was_ended(
 def test_other_tools_read_the_segments(tmp_path: Path) -> None:
     duckdb = pytest.importorskip("duckdb", reason="DuckDB is not installed")
     record_machine(machine(SAMPLES), tmp_path / "run")
-    responses = Run.open(tmp_path / "run").responses()
+    responses = RunRecord.open(tmp_path / "run").responses()
     rows = duckdb.sql(f"SELECT re FROM '{tmp_path}/run/responses/*.parquet' ORDER BY sample, frequency_hz").fetchall()
     assert np.array_equal(np.array(rows)[:, 0], responses.value.real.ravel(), equal_nan=True)
     assert duckdb.sql(f"SELECT count(*) FROM '{tmp_path}/run/manifest.jsonl'").fetchall() == [(10,)]
@@ -236,7 +236,7 @@ def test_other_tools_read_the_segments(tmp_path: Path) -> None:
     assert kinds == ["noise-from-detection-lines", "non-finite", "spike"]
     table = pq.read_table(tmp_path / "run" / "samples")
     assert np.array_equal(table["u"].to_numpy(), data(SAMPLES)[1])
-    for segment in Run.open(tmp_path / "run").segments:
+    for segment in RunRecord.open(tmp_path / "run").segments:
         done = subprocess.run(
             ["sha256sum", tmp_path / "run" / segment.name], capture_output=True, text=True, check=True
         )
@@ -250,8 +250,8 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
     else:
         record_until(sample, tmp_path / "run")
     held = check_beginning(tmp_path / "run", SAMPLES, 0)
-    wanted = expected(SAMPLES)[0]
-    wanted = wanted[: int(np.count_nonzero(wanted.sample < held))]
+    due = expected(SAMPLES)[0]
+    due = due[: int(np.count_nonzero(due.sample < held))]
 
     def ask(sql: str, *options: object) -> dict[str, object]:
         done = livebode("query", tmp_path / "run", sql, "--json", *options)
@@ -260,21 +260,21 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
 
     assert ask("SELECT max(sample) + 1 AS held, count(*) FROM samples")["rows"] == [[held, held]]
     found = ask("SELECT sum(re), count(*) FROM responses WHERE valid")["rows"][0]
-    assert found[1] == np.count_nonzero(wanted.valid)
-    assert found[0] == pytest.approx(wanted.value[wanted.valid].real.sum())
+    assert found[1] == np.count_nonzero(due.valid)
+    assert found[0] == pytest.approx(due.value[due.valid].real.sum())
     documented = "SELECT frequency_hz, avg(coherence) FROM responses WHERE valid GROUP BY ALL ORDER BY 1"
-    known = wanted.valid & np.isfinite(wanted.coherence)  # the first period has no coherence yet
-    usual = np.mean(wanted.coherence, axis=0, where=known)
+    known = due.valid & np.isfinite(due.coherence)  # the first period has no coherence yet
+    usual = np.mean(due.coherence, axis=0, where=known)
     np.testing.assert_allclose(np.array(ask(documented)["rows"])[:, 1], usual)
     first = ask("FROM responses ORDER BY sample, frequency_hz", "--rows", 2)
     assert (first["more"], len(first["rows"]), first["columns"][0]) == (True, 2, "first")
     assert ask("SELECT count(*) FROM events WHERE kind = 'non-finite'")["rows"] == [[int(held > SAMPLES // 3)]]
     text = livebode("query", tmp_path / "run", "SELECT sample, valid FROM responses LIMIT 1", "--csv").out
-    assert text == f"sample,valid\n{wanted.sample[0]},False\n"
+    assert text == f"sample,valid\n{due.sample[0]},False\n"
 
 
 @pytest.mark.parametrize(
-    ("sql", "says"),
+    ("sql", "message"),
     [
         ("FROM responsess", "Did you mean"),
         ("SELEC 1", "syntax error"),
@@ -286,19 +286,19 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
         ("FROM sys", "does not exist"),
     ],
 )
-def test_a_query_that_cannot_be_run_is_refused(tmp_path: Path, sql: str, says: str) -> None:
+def test_a_query_that_cannot_be_run_is_refused(tmp_path: Path, sql: str, message: str) -> None:
     record_until(1200, tmp_path / "run")
     before = sorted(os.listdir(tmp_path / "run"))
     done = livebode("query", tmp_path / "run", sql.format(run=tmp_path / "run"))
     assert done.code == 2
-    assert says in done.err
+    assert message in done.err
     assert sorted(os.listdir(tmp_path / "run")) == before
 
 
 def test_a_constant_excitation_is_reported_and_the_run_is_finished(tmp_path: Path) -> None:
     silent = replace(machine(SAMPLES), data=data(SAMPLES) * np.array([[0.0], [1.0], [1.0], [1.0]]))
     record_machine(silent, tmp_path / "run")
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     assert run.finished
     assert len(run.responses()) == SAMPLES // SETTINGS.step
     assert ["constant at 0" in event.message for event in run.events() if event.kind == "doubtful"] == [True]

@@ -10,7 +10,7 @@ import pytest
 
 from livebode.core import Block, DamageWarning, Lines, RecordError
 from livebode.estimation import Settings, Tracker
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.summary_file import to_document
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.errors import refused
@@ -34,7 +34,7 @@ def test_responses_come_back_exactly(run: Path, rows: int, monkeypatch: pytest.M
     lines = Lines.parse("50,100,200", RATE_HZ, 100)
     block = Block(np.array([columns[n] for n in "wuyt"]), tuple("wuyt"), RATE_HZ)
     expected = Tracker(Settings(lines=lines, output="y", input="u", excitation="w", schedule="t", hop=1)).process(block)
-    read = Run.open(run)
+    read = RunRecord.open(run)
     assert read.lines == lines
     found = read.responses()
     for field in fields(found):
@@ -45,22 +45,22 @@ def test_responses_come_back_exactly(run: Path, rows: int, monkeypatch: pytest.M
 
 def test_an_incomplete_run_is_read_with_a_warning_or_refused(run: Path, tmp_path: Path) -> None:
     with refused(RecordError, "not-a-run", path=str(tmp_path)):
-        Run.open(tmp_path)
+        RunRecord.open(tmp_path)
     table = run / "responses.parquet"
     whole = table.read_bytes()
     table.write_bytes(whole[: len(whole) // 2])
     with pytest.warns(DamageWarning, match=r"responses\.parquet is damaged: its end is damaged, so it cannot be read"):
-        assert len(Run.open(run).responses()) == 0
+        assert len(RunRecord.open(run).responses()) == 0
     (run / "run.json").write_text("{")
     with pytest.warns(DamageWarning, match=r"run\.json' is damaged: it has no checksum; its copy"):
-        assert Run.open(run).events()
+        assert RunRecord.open(run).events()
     (run / "run-copy.json").write_text("[]")
     with refused(RecordError, "damaged", path=str(run / "run.json"), reason="it has no checksum"):
-        Run.open(run)
+        RunRecord.open(run)
     (run / "run-copy.json").unlink()
     (run / "run.json").write_bytes(to_document({}))
     with refused(RecordError, "unexpected-content", path=str(run / "run.json"), reason="found: Field required"):
-        Run.open(run)
+        RunRecord.open(run)
     (run / "run.json").write_bytes(to_document({"format": "another", "found": {}}))
     with refused(RecordError, "not-a-run", path=str(run)):
-        Run.open(run)
+        RunRecord.open(run)

@@ -12,7 +12,7 @@ import pytest
 from livebode.core import Block, Lines, RecordError
 from livebode.estimation import Tracker
 from livebode.monitoring import Baseline, Monitor
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.segments.frames import FORMAT, to_frame
 from livebode.records.segments.json_lines import to_line
 from livebode.records.segments.last_commit import last_commit
@@ -34,7 +34,7 @@ def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 
 
 def test_an_unfinished_run_is_read_exactly(folder: Path) -> None:
-    run = Run.open(folder / "segments")
+    run = RunRecord.open(folder / "segments")
     responses = run.responses()
     assert (run.finished, run.lines) == (False, Lines((2, 5), 20, 400.0, run.lines.quiet))
     assert (len(responses), responses.sample[-1], responses.unit) == (32, 639, "")
@@ -61,7 +61,7 @@ def test_its_state_continues_with_the_responses_of_a_run_without_end() -> None:
 
 
 def test_a_finished_run_is_read_exactly(folder: Path) -> None:
-    run = Run.open(folder / "piece")
+    run = RunRecord.open(folder / "piece")
     responses = run.responses()
     assert (run.finished, len(responses), int(responses.valid.sum())) == (True, 30, 58)
     assert responses.time_s[-1] == 1.47375
@@ -89,7 +89,7 @@ def test_a_run_of_a_newer_livebode_is_refused_in_one_sentence(name: str, tmp_pat
     newer(run, name)
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     with refused(RecordError, "newer-version", format=name, found=2, readable=1):
-        Run.open(run).responses()
+        RunRecord.open(run).responses()
     with refused(RecordError, "newer-version", format=name):
         recover(run)
     assert before == {path: path.read_bytes() for path in before}

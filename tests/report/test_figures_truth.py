@@ -111,14 +111,14 @@ def test_tracking_draws_each_line_against_time_with_gaps_and_its_bound() -> None
     figure = tracking_figure(replace(run, valid=valid, schedule=np.full(41, np.nan)))
     (axes,) = figure.axes
     traces = drawn(axes, "magnitude")
-    wanted = np.where(valid, run.magnitude_db, np.nan)
+    expected = np.where(valid, run.magnitude_db, np.nan)
     for i, trace in enumerate(traces):
         np.testing.assert_allclose(trace.get_xdata(), run.time_s)
-        np.testing.assert_allclose(trace.get_ydata(), wanted[:, i])
+        np.testing.assert_allclose(trace.get_ydata(), expected[:, i])
     bands = [band.get_datalim(axes.transData) for band in drawn(axes, "bound")]
     for i, band in enumerate(bands):
-        assert band.y0 == pytest.approx(np.nanmin(wanted[:, i]) + 20 * np.log10(1 - 0.02 * BOUND_C))
-        assert band.y1 == pytest.approx(np.nanmax(wanted[:, i]) + 20 * np.log10(1 + 0.02 * BOUND_C))
+        assert band.y0 == pytest.approx(np.nanmin(expected[:, i]) + 20 * np.log10(1 - 0.02 * BOUND_C))
+        assert band.y1 == pytest.approx(np.nanmax(expected[:, i]) + 20 * np.log10(1 + 0.02 * BOUND_C))
     assert {text.get_text() for text in axes.texts} == {f"{f:g} Hz" for f in LINES.frequency_hz}
 
 
@@ -150,14 +150,14 @@ def test_many_lines_become_maps_of_the_same_numbers() -> None:
         for axes in tracking_figure(replace(run, valid=valid, schedule=np.full(41, np.nan))).axes
         if axes.get_ylabel() == "frequency in Hz"
     )
-    wanted = np.where(valid, run.magnitude_db, np.nan)
-    np.testing.assert_allclose(level.filled(np.nan), wanted.T)
-    np.testing.assert_allclose(change.filled(np.nan), (wanted - np.nanmedian(wanted, axis=0)).T)
+    expected = np.where(valid, run.magnitude_db, np.nan)
+    np.testing.assert_allclose(level.filled(np.nan), expected.T)
+    np.testing.assert_allclose(change.filled(np.nan), (expected - np.nanmedian(expected, axis=0)).T)
 
 
 def test_labels_keep_their_distance_and_their_order() -> None:
-    wanted = np.array([0.5, 0.5, 0.1, 0.52, 0.9])
-    placed = spread(wanted, 0.1)
+    expected = np.array([0.5, 0.5, 0.1, 0.52, 0.9])
+    placed = spread(expected, 0.1)
     assert np.diff(np.sort(placed)).min() >= 0.1 - 1e-12
     assert placed[2] == pytest.approx(0.1)
     assert placed[3] > placed[1] > placed[0]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from livebode.core import Block, Responses
-from livebode.fitting import Fit, Grid, fit
+from livebode.fitting import EvaluationGrid, Fit, fit
 from livebode.margins import Margins, OpenLoop, margins
 from livebode.report import save_loop_picture, save_validation_picture
 from livebode.validation import validate
@@ -26,7 +26,7 @@ class Found:
 
 
 def found(case: Case) -> Found:
-    truth = MODEL.at(parameters(BELT[np.newaxis]).value[0], Grid.of(LINES))
+    truth = MODEL.at(parameters(BELT[np.newaxis]).value[0], EvaluationGrid.of(LINES))
     measured = responses_of(truth, 0.05, 1, seed=1)
     model = fit(measured, MODEL)
     return Found(model, case.open, margins(model.parameters, case.open, model.band_hz), measured)

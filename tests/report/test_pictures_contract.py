@@ -120,8 +120,8 @@ def test_the_callers_matplotlib_keeps_its_settings_and_does_not_change_ours(tmp_
 
 def test_importing_the_report_loads_no_plotting_library() -> None:
     look = "import sys, livebode.report; print('matplotlib' in sys.modules)"
-    said = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == "False"
+    done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
 
 
 def test_drawing_never_imports_pyplot(tmp_path) -> None:
@@ -130,10 +130,10 @@ def test_drawing_never_imports_pyplot(tmp_path) -> None:
         f"save_pictures(some(), {str(tmp_path)!r}); print('matplotlib.pyplot' in sys.modules)"
     )
     here = __file__.rsplit("/", 1)[0]
-    said = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", f"import sys; sys.path.insert(0, {here!r}); {look}"],
         capture_output=True,
         text=True,
         check=True,
     )
-    assert said.stdout.strip() == "False"
+    assert done.stdout.strip() == "False"

@@ -13,7 +13,7 @@ from pypdf import PdfReader
 
 from livebode.core.document import Document, Picture, Table
 from livebode.fitting import mean_response
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.report.figures import drawn
 from livebode.report.svg import inline_svg
 from livebode.reporting.compare_report import Comparison
@@ -50,7 +50,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_table_of_lines_is_the_mean_with_its_bounds(run: Path) -> None:
     document = run_report(run, made=MADE)
     (table,) = parts(document, Table, "Frequency response")
-    responses = Run.open(run).responses()
+    responses = RunRecord.open(run).responses()
     mean = mean_response(responses)
     size, radius = np.abs(mean.value[0]), mean.bound(np.sqrt(np.log(20)))[0]
     for row, f, db, r, angle, c in zip(
@@ -69,7 +69,7 @@ def test_the_picture_draws_the_mean_its_bounds_and_the_fit(run: Path) -> None:
     document = run_report(run, made=MADE)
     (picture,) = parts(document, Picture, "Frequency response")
     magnitude, phase, _ = drawn(picture).axes
-    mean = mean_response(Run.open(run).responses())
+    mean = mean_response(RunRecord.open(run).responses())
     size, radius = np.abs(mean.value[0]), mean.bound(np.sqrt(np.log(20)))[0]
     np.testing.assert_allclose(artists(magnitude, "newest")[0].get_ydata(), 20 * np.log10(size))
     bars = np.array([bar[:, 1] for bar in artists(magnitude, "bound")[0].get_segments()])
@@ -84,7 +84,9 @@ def test_the_picture_draws_the_mean_its_bounds_and_the_fit(run: Path) -> None:
 def test_parameters_over_time_are_those_of_the_table(run: Path) -> None:
     document = run_report(run, made=MADE)
     (picture,) = parts(document, Picture, "Parameters")
-    rows = [row for table in Run.open(run).tables("parameters") for row in table.to_pylist() if row["name"] == "Keff"]
+    rows = [
+        row for table in RunRecord.open(run).tables("parameters") for row in table.to_pylist() if row["name"] == "Keff"
+    ]
     curves = {name: (value, half) for name, _, value, half in picture.data["curves"]}
     np.testing.assert_array_equal(curves["Keff"][0], [row["value"] for row in rows])
     np.testing.assert_allclose(curves["Keff"][1], 1.96 * np.array([row["sigma"] for row in rows]))

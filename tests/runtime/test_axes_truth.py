@@ -14,12 +14,12 @@ import pytest
 from livebode.configuration.axes import axes_of
 from livebode.core import ConfigError, Lines
 from livebode.estimation import Settings, Tracker
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.peers.machine import Machine
 from tests.support.peers.peer import free_port
 from tests.support.recorded import same
-from tests.support.session_process import SHARED, Running, block, check_samples, events, numbers, said, source
+from tests.support.session_process import SHARED, Running, block, check_samples, events, numbers, source, summary_of
 
 LINES = Lines.parse("50,100,200", 1000.0, 100)
 SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="n", hop=20)
@@ -42,13 +42,13 @@ def test_each_axis_leaves_what_it_would_have_left_alone(tmp_path: Path, number: 
     assert (code, err) == (0, "")
     summaries = json.loads(out)["axes"]
     for name, samples in sent.items():
-        run = Run.open(running.out / name)
+        run = RunRecord.open(running.out / name)
         check_samples([run.path], samples)
         assert run.lines.window == {"x": 100, "y": 200}[name]
         assert summaries[name]["counts"]["samples"] == samples
         assert (run.path / "bode.png").stat().st_size > 10_000
         assert not {e.kind for e in run.events()} - {"connected", "noise-from-detection-lines"}
-    assert same(Run.open(running.out / "x").responses(), Tracker(SETTINGS).process(block(sent["x"])))
+    assert same(RunRecord.open(running.out / "x").responses(), Tracker(SETTINGS).process(block(sent["x"])))
 
 
 def test_an_axis_that_fails_does_not_end_the_others(tmp_path: Path) -> None:
@@ -133,7 +133,9 @@ def test_each_of_two_recordings_has_the_run_that_it_has_alone(tmp_path: Path) ->
             "50,100,200", "--window", 100, "--hop", hop, "--out", tmp_path / f"{name}-alone",
         )  # fmt: skip
         assert alone.code == 0
-        assert same(Run.open(tmp_path / "runs" / name).responses(), Run.open(tmp_path / f"{name}-alone").responses())
+        assert same(
+            RunRecord.open(tmp_path / "runs" / name).responses(), RunRecord.open(tmp_path / f"{name}-alone").responses()
+        )
     assert not (tmp_path / "runs" / "c").exists()
 
 
@@ -161,17 +163,17 @@ def test_impossible_axes_are_refused(tmp_path: Path, axes: str, code: str, facts
 
 
 @pytest.mark.parametrize(
-    ("fit", "says"),
+    ("fit", "message"),
     [
         ('fit.model = "two-masses"', "axis x: [fit]: there is no model 'two-masses'"),
         ('fit = {model = "rigid", fixed = {Jx = 1.0}}', "no parameter 'Jx'"),
     ],
 )
-def test_an_impossible_fit_is_refused_before_the_start(tmp_path: Path, fit: str, says: str) -> None:
+def test_an_impossible_fit_is_refused_before_the_start(tmp_path: Path, fit: str, message: str) -> None:
     (tmp_path / "axes.toml").write_text(f'[axes.x]\nsource.url = "udp://h:1"\n{fit}\n{SHARED}')
     result = livebode("run", tmp_path / "axes.toml", "--out", tmp_path / "runs")
     assert result.code == 2
-    assert says in result.err
+    assert message in result.err
     assert result.err.count("\n") == 1
     assert not (tmp_path / "runs").exists()
 
@@ -192,4 +194,4 @@ def test_events_after_a_restart_have_the_sample_numbers_of_the_record(tmp_path: 
     (loss,) = [event for event in events(running.out / "x") if event.kind == "loss"]
     assert (loss.sample, loss.details["missing_samples"]) == (number[held], number[held] - held)
     assert np.array_equal(np.diff(number[held:]), np.ones(number.size - held - 1))
-    assert said(running.out / "x")["counts"]["gaps"] == 1
+    assert summary_of(running.out / "x")["counts"]["gaps"] == 1

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.grouped_events import each_event
 from livebode.sources.live.inbox import INBOX_S_MAX, Inbox
 from tests.support.live_session import LiveSession, Stuck, hurried
@@ -34,7 +34,7 @@ def test_fits_are_left_out_and_no_sample_is_lost(tmp_path: Path) -> None:
         until(lambda: source.health.waiting_s > 29.0, "half a minute to wait")
         stuck.released.set()
         until(lambda: not source.health.waiting_s, "the queue to be empty")
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     assert run.found["hop"] == RATE_HZ / 20
     assert run.summary["counts"]["missing"] == run.summary["source"]["lost"] == 0
     events = [one for event in run.events() for one in each_event(event)]

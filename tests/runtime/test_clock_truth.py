@@ -15,7 +15,7 @@ from livebode.core import Event
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.query import query
 from livebode.runtime.clock_relation import STEP_S, ClockRelation
 from livebode.sources.live import LiveBlock
@@ -126,7 +126,7 @@ def test_a_live_run_whose_sender_numbers_from_0_is_dated_everywhere_the_same(tmp
             peer.send(batch)
         until(lambda: any(event.kind == "gap" for event in session.events()), "the gap to be recorded")
         after_s = time.time()
-    run = Run.open(session.run)
+    run = RunRecord.open(session.run)
     ((_, unix_s),) = RunClock.of(run.summary).pieces
     gap = next(event for event in run.events() if event.kind == "gap")
     assert before_s - 2.6 <= unix_s + gap.time_s <= after_s

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Event, Lines
-from livebode.dashboard.notices import Notices, event_id
+from livebode.dashboard.notices import EventCauses, event_id
 from livebode.estimation import Settings, Tracker
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.grouped_events import each_event, event_counts, event_rows
 from livebode.records.query import query
 from livebode.reporting.event_summary import EventSummary
@@ -163,7 +163,7 @@ class Page:
     """Keeps what a dashboard would show."""
 
     def __init__(self) -> None:
-        self.notices = Notices()
+        self.notices = EventCauses()
 
     def __call__(self, document: Document) -> None:
         if isinstance(document, Event):
@@ -194,19 +194,19 @@ def test_the_record_of_a_killed_run_contains_every_event_until_a_second_before(t
         machine, Tracker(Settings(lines=lines, output="y", input="u", excitation="w", hop=25)), machine.run,
         segments=RecordSection(segment_s=5.0), again=False, subscribers=[page],
     )  # fmt: skip
-    killed, whole = Run.open(machine.killed), Run.open(machine.run)
+    killed, whole = RunRecord.open(machine.killed), RunRecord.open(machine.run)
     every = [one.sample for event in whole.events() for one in each_event(event) if one.kind == "gap"]
-    told = [one.sample for event in killed.events() for one in each_event(event) if one.kind == "gap"]
+    reported_event = [one.sample for event in killed.events() for one in each_event(event) if one.kind == "gap"]
     assert len(every) > 3 * AT_ONCE
-    assert told == every[: len(told)]
-    assert len(told) >= sum(sample < 9_000 for sample in every)
+    assert reported_event == every[: len(reported_event)]
+    assert len(reported_event) >= sum(sample < 9_000 for sample in every)
     (row,) = [row for row in event_rows(killed.events()) if row.newest.kind == "gap"]
-    assert (row.count, row.first_s) == (len(told), every[0] / RATE_HZ)
+    assert (row.count, row.first_s) == (len(reported_event), every[0] / RATE_HZ)
     assert row.last_s >= 9.0 - 2 * WINDOW / RATE_HZ
-    assert EventSummary.of(killed.events()).count("gap") == len(told)
+    assert EventSummary.of(killed.events()).count("gap") == len(reported_event)
     found = query(killed, "SELECT count, last_s FROM events WHERE kind = 'gap'", 10)
-    assert found.rows == [(len(told), row.last_s)]
-    assert query(killed, "SELECT count(*) FROM single_events WHERE kind = 'gap'", 1).rows == [(len(told),)]
+    assert found.rows == [(len(reported_event), row.last_s)]
+    assert query(killed, "SELECT count(*) FROM single_events WHERE kind = 'gap'", 1).rows == [(len(reported_event),)]
     assert len((machine.run / "events.jsonl").read_text().splitlines()) < len(every) / 3
     (shown,) = [notice for notice in page.notices.since(0) if notice["cause"] == "loss"]
     ids = [event_id(event) for event in whole.events() if event.kind == "gap"]

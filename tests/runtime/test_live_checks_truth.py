@@ -16,7 +16,7 @@ from livebode.core import Block, Channel, Event, Lines
 from livebode.core.state import Stage, decode
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.segments.journal import Commit
 from livebode.records.segments.last_commit import last_commit
 from livebode.records.summary_file import COPY, RUN, to_document
@@ -179,7 +179,7 @@ def test_a_run_that_is_continued_before_it_was_judged_is_judged_then(tmp_path: P
         with Again(tmp_path) as peer, LiveSession(tmp_path, peer, **EXCHANGED) as session:
             send(peer, recorded, first, stop)
             until(lambda stop=stop: (now := committed()) and now.sample >= stop, "all to be recorded")
-        kinds = [event.kind for event in Run.open(session.run).events()]
+        kinds = [event.kind for event in RunRecord.open(session.run).events()]
         assert (kinds.count("roles-doubtful"), kinds.count("transient")) == (judged, 0)
         now = committed()
         assert now is not None
@@ -201,7 +201,7 @@ def test_a_live_run_records_shows_and_leaves_out_what_it_found(tmp_path: Path, r
         with LiveSession(tmp_path, peer, **EXCHANGED) as session:
             send(peer, data, data.shape[1] - 500)
             until(lambda: "record-continued" in {e.kind for e in session.events()}, "the record to continue")
-    run = Run.open(session.run)
+    run = RunRecord.open(session.run)
     assert run.summary["counts"]["samples"] == data.shape[1]
     left_out = run.summary["left_out_samples"]
     assert 3 * WINDOW <= left_out <= 4 * WINDOW
@@ -212,7 +212,7 @@ def test_a_live_run_records_shows_and_leaves_out_what_it_found(tmp_path: Path, r
 
 def forget_what_was_found(run: Path) -> None:
     """Leave run.json as a disk does that is full from the beginning of a run on."""
-    summary = dict(Run.open(run).summary)
+    summary = dict(RunRecord.open(run).summary)
     for name in ("left_out_samples", "clock"):
         summary.pop(name, None)
     for name in (RUN, COPY):

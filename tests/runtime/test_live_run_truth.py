@@ -136,9 +136,9 @@ def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
         until(lambda: b"restart" in (tmp_path / "live" / "events.jsonl").read_bytes(), "the restart to be recorded")
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=PATIENCE_S)
-    said = err.decode().splitlines()
-    assert sum("does not belong to the stream and was dropped" in line for line in said) == 1
-    assert sum("the sender restarted at its sample 0" in line for line in said) == 1
+    printed = err.decode().splitlines()
+    assert sum("does not belong to the stream and was dropped" in line for line in printed) == 1
+    assert sum("the sender restarted at its sample 0" in line for line in printed) == 1
 
 
 def test_events_of_a_silent_machine_are_recorded_at_once(tmp_path):

@@ -20,7 +20,7 @@ from livebode.core import Block, Channel, ConfigError, GridError, Lines, Spectra
 from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.preparation.spectra_plan import check_spectra
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.runtime.change_detection import change_detection
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from livebode.sources.live import SpectraBatch, encode_spectra, encode_spectra_layout
@@ -145,13 +145,13 @@ def run_live(
     return json.loads(out), folder / name
 
 
-def ended(process: subprocess.Popen[bytes], said: bytes = b"") -> bytes:
-    """Its output after Ctrl-C, which it gets when it has had the time to take all; `said` is how its errors begin."""
+def ended(process: subprocess.Popen[bytes], message: bytes = b"") -> bytes:
+    """Its output after Ctrl-C, sent when it has read everything; `message` is how its errors begin."""
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(2.5)  # it goes on, for the machine may send more
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE_S)
-    assert (process.returncode, err[: len(said) or None]) == (0, said)
+    assert (process.returncode, err[: len(message) or None]) == (0, message)
     return out
 
 
@@ -191,7 +191,7 @@ def test_a_run_on_spectra_is_the_run_on_the_samples(tmp_path: Path, kind: type[P
         mine_at, other_at = (np.lexsort((rows["name"], rows["sample"])) for rows in (mine, other))
         for name in other.keys() - {"schedule"}:
             np.testing.assert_array_equal(mine[name][mine_at], other[name][other_at], err_msg=name)
-        newest, theirs = summary["fit"]["newest"], Run.open(tmp_path / "recorded").summary["fit"]["newest"]
+        newest, theirs = summary["fit"]["newest"], RunRecord.open(tmp_path / "recorded").summary["fit"]["newest"]
         assert newest | {"schedule": None} == theirs | {"schedule": None}
 
 
@@ -247,9 +247,9 @@ def test_the_model_of_the_machine_is_left_out_and_this_is_reported(tmp_path: Pat
     small_baseline().save(tmp_path / "baseline.json")
     axis = configured(REST + f'[monitoring]\nbaseline = "{tmp_path / "baseline.json"}"\n')
     tracker_settings = settings()
-    told = change_detection(axis, tracker_settings, samples=False).summary()
-    assert told["judged_by"] == "tables"
-    assert "model of the machine is not used: it needs samples, but the drive sends spectra" in told["message"]
+    summary = change_detection(axis, tracker_settings, samples=False).summary()
+    assert summary["judged_by"] == "tables"
+    assert "model of the machine is not used: it needs samples, but the drive sends spectra" in summary["message"]
     assert change_detection(axis, tracker_settings).summary()["judged_by"] == "model"
 
 

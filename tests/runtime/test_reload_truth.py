@@ -11,12 +11,12 @@ import pyarrow as pa
 
 from livebode.core import Event, Lines, Responses
 from livebode.estimation import Settings, Tracker
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support.command import livebode
 from tests.support.peers.machine import Machine
 from tests.support.peers.peer import until
 from tests.support.recorded import same
-from tests.support.session_process import SHARED, Running, block, check_samples, events, numbers, said, source
+from tests.support.session_process import SHARED, Running, block, check_samples, events, numbers, source, summary_of
 
 LINES = Lines.parse("50,100,200", 1000.0, 100)
 SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="n", hop=20)
@@ -28,7 +28,7 @@ def one(machine: Machine, shared: str = SHARED) -> str:
 
 
 def joined(runs: list[Path]) -> Responses:
-    parts = [Run.open(run).responses() for run in runs]
+    parts = [RunRecord.open(run).responses() for run in runs]
     return Responses.join(parts)
 
 
@@ -49,20 +49,20 @@ def test_every_sample_is_in_one_of_the_records_and_no_window_is_lost(tmp_path: P
         sent = machine.sent
     assert code == 0, err
     check_samples(runs, sent)
-    assert [(said(run).get("continues"), said(run).get("continued_in")) for run in runs] == [
+    assert [(summary_of(run).get("continues"), summary_of(run).get("continued_in")) for run in runs] == [
         (None, "x-2"), ("x", "x-3"), ("x-2", "x-4"), ("x-3", None),
     ]  # fmt: skip
-    assert [said(run)["record"]["finished"] for run in runs] == [True, True, True, False]
-    assert sum(said(run)["counts"]["samples"] for run in runs[:3]) == numbers(runs[3])[0]
+    assert [summary_of(run)["record"]["finished"] for run in runs] == [True, True, True, False]
+    assert sum(summary_of(run)["counts"]["samples"] for run in runs[:3]) == numbers(runs[3])[0]
     # The first three share their settings of tracking: the state went on, and it is as if nothing had been changed.
     first, same_settings = numbers(runs[3])[0], joined(runs[:3])
     truth = Tracker(SETTINGS).process(block(int(first)))
     assert same(same_settings, truth)
     # The last one tracks otherwise: as a tracker that begins at its first sample.
     tracker = Tracker(Settings(**{**SETTINGS.__dict__, "hop": 10}))
-    assert same(Run.open(runs[3]).responses(), tracker.process(block(sent).cut(int(first), sent)))
-    assert said(runs[1])["fit"]["model"] == "rigid"
-    assert pa.concat_tables(Run.open(runs[1]).tables("parameters")).num_rows > 0
+    assert same(RunRecord.open(runs[3]).responses(), tracker.process(block(sent).cut(int(first), sent)))
+    assert summary_of(runs[1])["fit"]["model"] == "rigid"
+    assert pa.concat_tables(RunRecord.open(runs[1]).tables("parameters")).num_rows > 0
     applied = [[e for e in events(run) if e.kind == "configuration-applied"] for run in runs]
     assert [[e.details["sections"] for e in found] for found in applied] == [[["fit"]], [["fit"]], [["tracking"]], []]
     assert [found[0].sample for found in applied[:3]] == [numbers(run)[-1] + 1 for run in runs[:3]]
@@ -74,13 +74,13 @@ def test_how_the_record_is_cut_changes_in_place(tmp_path: Path) -> None:
     with Machine(tmp_path) as machine, Running(tmp_path, one(machine)) as running:
         running.tracked("x", 500)
         running.edit(one(machine, SHARED.replace("segment_s = 2", "segment_s = 0.2\nbudget_bytes = 20000000")))
-        running.told("x", "configuration-applied")
+        running.reported_event("x", "configuration-applied")
         at = numbers(running.out / "x").size
         running.tracked("x", at + 2500)
         code, _, err = running.end()
     assert code == 0, err
     assert not (running.out / "x-2").exists()
-    long = [s.last_sample - s.first_sample for s in Run.open(running.out / "x").segments if s.table == "samples"]
+    long = [s.last_sample - s.first_sample for s in RunRecord.open(running.out / "x").segments if s.table == "samples"]
     assert len(long) >= 5
     assert min(long) < 1000
     number = numbers(running.out / "x")
@@ -103,17 +103,17 @@ def reported(run: Path) -> list[Event]:
 def test_an_edit_that_cannot_be_applied_is_refused_once_and_the_run_continues(tmp_path: Path) -> None:
     with Machine(tmp_path) as machine, Running(tmp_path, one(machine)) as running:
         running.tracked("x", 300)
-        for count, (before, after, says) in enumerate(REFUSED, 2):
+        for count, (before, after, message) in enumerate(REFUSED, 2):
             running.file.write_text(one(machine).replace(before, after))
-            until(lambda count=count: len(reported(running.out / "x")) >= count, says)
-            assert says in reported(running.out / "x")[-1].message
+            until(lambda count=count: len(reported(running.out / "x")) >= count, message)
+            assert message in reported(running.out / "x")[-1].message
             at = numbers(running.out / "x").size
             running.tracked("x", at + 2500)  # more than a look at the file
         code, _, err = running.end()
     assert code == 0
     assert [event.kind for event in reported(running.out / "x")] == ["connected", *["configuration-refused"] * 4]
-    for _, _, says in REFUSED:
-        assert err.count(says) == 1
+    for _, _, message in REFUSED:
+        assert err.count(message) == 1
     number = numbers(running.out / "x")
     assert np.array_equal(number, np.arange(number.size))
 
@@ -123,7 +123,10 @@ def test_a_silent_axis_holds_up_no_edit_of_the_others(tmp_path: Path) -> None:
     with Machine(tmp_path) as machine, Running(tmp_path, one(machine) + silent) as running:
         running.tracked("x", 300)
         running.edit(one(machine) + silent.replace("3600", "1800"))
-        assert "axis z: the live source has sent no samples yet" in running.told("x", "configuration-refused").message
+        assert (
+            "axis z: the live source has sent no samples yet"
+            in running.reported_event("x", "configuration-refused").message
+        )
         running.edit(one(machine) + FIT + silent)
         running.tracked("x-2", 300)
         running.edit(one(machine) + FIT)
@@ -155,7 +158,7 @@ def test_axes_are_added_and_removed_during_the_run(tmp_path: Path) -> None:
             running.edit(one(a) + second)
             running.tracked("y", 300)
             running.edit(SHARED + second)
-            until(lambda: "counts" in said(running.out / "x"), "the end of the axis that was taken out")
+            until(lambda: "counts" in summary_of(running.out / "x"), "the end of the axis that was taken out")
             left = numbers(running.out / "x")
             running.tracked("y", numbers(running.out / "y").size + 500)
             running.edit(one(a) + second)
@@ -188,7 +191,7 @@ def test_the_same_command_continues_the_newest_run(tmp_path: Path) -> None:
         number = np.concatenate([numbers(run) for run in runs])
         assert np.array_equal(number[: number.size], np.unique(number))
         assert np.count_nonzero(np.diff(number) != 1) == 1  # where it was killed
-        assert [said(run).get("continues") for run in runs] == [None, "x", "x-2"]
+        assert [summary_of(run).get("continues") for run in runs] == [None, "x", "x-2"]
         with Running(tmp_path, one(machine), "--force") as running:
             until(lambda: not runs[1].exists() and not runs[2].exists(), "the end of what is replaced")
             running.tracked("x", 300)

@@ -12,10 +12,10 @@ from livebode import MotionCorrection, Tracker
 from livebode.configuration.axis import FitSection, RecordSection
 from livebode.monitoring import Baseline, Monitor
 from livebode.preparation.follower import Follower
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.runtime import Document, Outcome
 from livebode.runtime.change_detection import ChangeDetection
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 from livebode.runtime.fits import Fits
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 from tests.support.axes import MULTISINE
@@ -42,7 +42,7 @@ def detection() -> ChangeDetection:
 
 def record_axis(follower: Follower, directory: Path, until: int | None = None) -> Outcome:
     def stop(document: Document) -> None:
-        if isinstance(document, Tracked) and until is not None and document.samples > until:
+        if isinstance(document, TrackerResults) and until is not None and document.samples > until:
             raise StopError
 
     return record(
@@ -64,15 +64,15 @@ def test_correction_fits_and_monitoring_continue_in_a_resumed_run(
         with pytest.raises(StopError):
             record_axis(follower(), tmp_path / "run", until)
     outcome = record_axis(follower(), tmp_path / "run")
-    runs = [Run.open(tmp_path / name) for name in ("run", "whole")]
+    runs = [RunRecord.open(tmp_path / name) for name in ("run", "whole")]
     assert same(runs[0].responses(), runs[1].responses())
     parameters = [pa.concat_tables(run.tables("parameters")).combine_chunks() for run in runs]
     assert parameters[0].num_rows > 1000
     # NaN is not equal to itself, and its text is.
     assert str(parameters[0].to_pydict()) == str(parameters[1].to_pydict())
-    said = [[event for event in run.events() if not event.kind.startswith("record-")] for run in runs]
-    assert said[0] == said[1]
-    assert "change" in [event.kind for event in said[0]]
+    reported = [[event for event in run.events() if not event.kind.startswith("record-")] for run in runs]
+    assert reported[0] == reported[1]
+    assert "change" in [event.kind for event in reported[0]]
     for part in ("found", "counts", "fit", "monitoring"):
         assert outcome.summary[part] == whole.summary[part], part
     assert runs[0].finished

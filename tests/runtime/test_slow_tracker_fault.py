@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.sources.live import Batch
 from livebode.sources.live.inbox import INBOX_BYTES_MAX, INBOX_BYTES_MIN, INBOX_S_MAX, Inbox
 from tests.support.live_session import SIZE, LiveSession, Stuck, hurried
@@ -46,7 +46,7 @@ def test_samples_that_exceed_the_queue_become_a_gap_and_memory_is_bounded(tmp_pa
             peer.send(batch)
         until(lambda: source.health.lost, "the loss to be seen")
     assert grown < INBOX_S_MAX * RATE_HZ * 2 * 8 + SLACK_BYTES
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     kinds = [event.kind for event in run.events()]
     assert "overflow" in kinds
     assert "loss" in kinds

@@ -234,7 +234,7 @@ def test_the_truth_of_a_sample_is_that_of_its_place_and_time() -> None:
     f = np.array([40.0])
     for sample in (0, 1500):
         axis = BeltAxis(mechanics=Mechanics(load_kg=float(truth.load_kg[sample])))
-        wanted = axis.linear(float(truth.position_m[sample])).response(f)
-        assert truth.linear(sample).response(f) == pytest.approx(wanted, rel=1e-12)
+        expected = axis.linear(float(truth.position_m[sample])).response(f)
+        assert truth.linear(sample).response(f) == pytest.approx(expected, rel=1e-12)
     with pytest.raises(IndexError, match="2000"):
         truth.sampled(2000)

@@ -73,9 +73,9 @@ def test_c_and_python_give_the_same_bits(masses: int, options: dict) -> None:
 def test_the_stages_are_those_of_the_book() -> None:
     text = (ROOT / "simulation" / "dop853.h").read_text()
     rows = re.findall(r"\{(\d+),\s+\{([^}]*)\},\s+\{([^}]*)\}\}", text)
-    wanted = [*DOP853.A[1:], DOP853.B]
-    assert len(rows) == len(wanted) == 12
-    for (terms, stages, weights), row in zip(rows, wanted):
+    expected = [*DOP853.A[1:], DOP853.B]
+    assert len(rows) == len(expected) == 12
+    for (terms, stages, weights), row in zip(rows, expected):
         found = np.zeros(12)
         found[[int(s) for s in stages.split(",")]] = [float(w) for w in weights.split(",")]
         assert int(terms) == np.count_nonzero(row)

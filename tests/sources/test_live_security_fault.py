@@ -89,10 +89,10 @@ def test_mqtt_with_certificates_and_a_password_delivers_the_samples(broker, pki)
             parts.append(block["y"])
             if block["w"][-1] == given[-1].stop - 1:
                 break
-        told = repr(source.take_events()) + repr(source.health)
+        published = repr(source.take_events()) + repr(source.health)
     stop(client)
     np.testing.assert_array_equal(np.concatenate(parts), np.concatenate([batch.data[1] for batch in given]))
-    assert SECRET not in told
+    assert SECRET not in published
 
 
 @pytest.mark.parametrize(
@@ -145,9 +145,9 @@ def test_opc_ua_signed_and_encrypted(pki, tmp_path):
                 parts.append(block["y"])
                 if block["w"][-1] == given[-1].stop - 1:
                     break
-            told = repr(source.take_events()) + repr(source.health)
+            published = repr(source.take_events()) + repr(source.health)
     np.testing.assert_array_equal(np.concatenate(parts), np.concatenate([batch.data[1] for batch in given]))
-    assert SECRET not in told
+    assert SECRET not in published
 
 
 @pytest.mark.parametrize(

@@ -37,8 +37,8 @@ def made(what: SpectraLayout, a: int, b: int, epoch: int = 1) -> SpectraBatch:
     return SpectraBatch(a * what.hop, sums, number[np.newaxis], state, what, RATE_HZ, epoch, arrived_s=0.0)
 
 
-def passed(batches: list[SpectraBatch | Batch], said: SourceEvents, reorder: int) -> list[LiveSpectra]:
-    sequencer = Sequencer(said, reorder=reorder)
+def passed(batches: list[SpectraBatch | Batch], source_events: SourceEvents, reorder: int) -> list[LiveSpectra]:
+    sequencer = Sequencer(source_events, reorder=reorder)
     return [block for batch in batches for block in sequencer.push(batch)] + sequencer.finish()
 
 
@@ -59,11 +59,11 @@ def test_lost_batches_are_exactly_the_gaps_and_phases_are_unchanged(hop, lengths
     kept = [batch for i, batch in enumerate(batches) if i not in lost]
     # A longer jump is believed only when more batches follow it (tests/sources/test_sequencer_truth.py).
     assume(max(b.first_sample - a.stop for a, b in pairwise(kept)) <= JUMP_S * RATE_HZ)
-    said = SourceEvents()
-    blocks = passed(displaced(kept, bound, data), said, bound)
+    source_events = SourceEvents()
+    blocks = passed(displaced(kept, bound, data), source_events, bound)
     assert [block.start for block in blocks] == [batch.first_sample - first * hop for batch in kept]
     assert [b.gap for b in blocks] == [False, *(a.stop != b.first_sample for a, b in pairwise(kept))]
-    assert sum(e.details["missing_samples"] for e in said.take() if e.kind == "loss") == sum(
+    assert sum(e.details["missing_samples"] for e in source_events.take() if e.kind == "loss") == sum(
         b.first_sample - a.stop for a, b in pairwise(kept)
     )
     for block, batch in zip(blocks, kept):
@@ -88,34 +88,34 @@ def test_any_overlapping_batches_give_correct_ascending_spectra(hop, pieces, bou
 
 
 def test_a_restart_is_a_gap_and_keeps_the_grid_of_hops():
-    said = SourceEvents()
-    blocks = passed(stream(20, [1] * 50, 1000) + stream(20, [1] * 10, 0, epoch=2), said, 4)
+    source_events = SourceEvents()
+    blocks = passed(stream(20, [1] * 50, 1000) + stream(20, [1] * 10, 0, epoch=2), source_events, 4)
     assert [block.gap for block in blocks[49:52]] == [False, True, False]
     assert [block.start for block in blocks[49:52]] == [980, 1000, 1020]
     assert [block.place for block in blocks[50:]] == [20 * n % WINDOW for n in range(1, 11)]
-    assert said.counts["restart"] == 1
+    assert source_events.counts["restart"] == 1
 
 
 def test_samples_and_other_layouts_in_a_stream_of_spectra_are_left_out_and_reported_once():
     given_, samples = stream(20, [1] * 12), Batch(40, np.zeros((2, 20)), SIGNALS, RATE_HZ, 1, arrived_s=0.0)
     other = made(layout(20, lines=(2, 6)), 4, 5)
-    said = SourceEvents()
-    blocks = passed([*given_[:4], samples, samples, other, other, *given_[4:]], said, 0)
+    source_events = SourceEvents()
+    blocks = passed([*given_[:4], samples, samples, other, other, *given_[4:]], source_events, 0)
     assert [block.start for block in blocks] == list(range(0, 240, 20))
-    messages = [event.message for event in said.take() if event.kind == "layout-changed"]
+    messages = [event.message for event in source_events.take() if event.kind == "layout-changed"]
     assert messages == [
         "the sender now sends samples; they are skipped until the first layout is back",
         "the sender now sends spectra of another layout; they are skipped until the first layout is back",
     ]
     # The other way round.
-    said = SourceEvents()
+    source_events = SourceEvents()
     begun = [replace(samples, first_sample=at) for at in (0, 20)]
-    assert len(passed([begun[0], given_[1], begun[1]], said, 0)) == 2
-    assert [e.message[:31] for e in said.take()] == ["the sender now sends spectra; t"]
+    assert len(passed([begun[0], given_[1], begun[1]], source_events, 0)) == 2
+    assert [e.message[:31] for e in source_events.take()] == ["the sender now sends spectra; t"]
 
 
 def test_a_changed_rate_is_reported():
-    said = SourceEvents()
+    source_events = SourceEvents()
     first, second = stream(20, [1, 1])
-    assert len(passed([first, replace(second, rate_hz=8000.0)], said, 0)) == 1
-    assert said.counts["wrong-rate"] == 1
+    assert len(passed([first, replace(second, rate_hz=8000.0)], source_events, 0)) == 1
+    assert source_events.counts["wrong-rate"] == 1

@@ -90,7 +90,7 @@ def test_the_block_that_the_design_leaves_fits_the_program(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("axis", "more", "said"),
+    ("axis", "more", "message"),
     [
         (RATED, ("--rate", 1000, "--amplitude", 1), "is 1000 Hz, but source.rate_hz is 2000 Hz"),
         (AXIS, ("--rate", 4000, "--amplitude", 1), "gives 1000 Hz, but the sampling rate is 4000 Hz"),
@@ -108,11 +108,13 @@ def test_the_block_that_the_design_leaves_fits_the_program(tmp_path: Path) -> No
         (AXIS.replace("gain = 1.0\n", ""), (FILE,), "'loop.velocity.gain' is missing; add it"),
     ],
 )  # fmt: skip
-def test_options_that_contradict_the_axis_or_the_design_are_refused(axis: str, more, said: str, tmp_path: Path) -> None:
+def test_options_that_contradict_the_axis_or_the_design_are_refused(
+    axis: str, more, message: str, tmp_path: Path
+) -> None:
     given = [part for word in more for part in ([word, tmp_path / "excitation.npz"] if word == FILE else [word])]
     done = plc(tmp_path, *given, axis=axis)
     assert done.code == 2
-    assert said in " ".join(done.err.split())
+    assert message in " ".join(done.err.split())
     assert not (tmp_path / "plc").exists()
 
 

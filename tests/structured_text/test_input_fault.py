@@ -136,7 +136,7 @@ def test_blocks_too_large_for_a_plc_are_refused_with_the_largest_that_fits() -> 
 
 
 @pytest.mark.parametrize(
-    ("change", "more", "said"),
+    ("change", "more", "message"),
     [
         (("", ""), ("--rate", 0), "rate"),
         (("", ""), (), "the rate of the PLC task is missing"),
@@ -151,12 +151,12 @@ def test_blocks_too_large_for_a_plc_are_refused_with_the_largest_that_fits() -> 
         (("", ""), ("--rate", 1000, "--ring", 1), "too short"),
     ],
 )
-def test_the_command_refuses_in_a_sentence_and_writes_nothing(change, more, said: str, tmp_path: Path) -> None:
+def test_the_command_refuses_in_a_sentence_and_writes_nothing(change, more, message: str, tmp_path: Path) -> None:
     axis, out = tmp_path / "axis.toml", tmp_path / "out"
     axis.write_text(AXIS.replace(*change) if change[0] else AXIS)
     done = livebode("plc", axis, "--amplitude", 0.3, "--limit", 2, *more, "--out", out)
     assert done.code == 2
-    assert said in done.err
+    assert message in done.err
     assert not out.exists()
 
 

@@ -6,12 +6,12 @@ import pytest
 from livebode.experiment_design import belt_machine, peaks, worst
 from livebode.experiment_design.waveform import Waveform
 from livebode.simulation import extremes
-from studies.design import MOVING, STANDING
+from studies.design import MOVING, STANDSTILL
 
 
-@pytest.mark.parametrize("case", STANDING)
+@pytest.mark.parametrize("case", STANDSTILL)
 def test_predicted_peaks_at_standstill_are_simulated_within_ten_percent(case):
-    axis, lines, samples = STANDING[case]
+    axis, lines, samples = STANDSTILL[case]
     _within_ten_percent(axis, lines, samples, extremes(axis, samples))
 
 
@@ -30,7 +30,7 @@ def _within_ten_percent(axis, lines, samples, simulated):
         # Of the travel what comes beyond each end of the way; of the rest each extreme.
         ends = (at_m.min(), at_m.max()) if name == "travel" else (0.0, 0.0)
         beyond = np.array([ends[0] - low, high - ends[1]])
-        told = np.array([ends[0] - predicted[name].low, predicted[name].high - ends[1]])
+        margin = np.array([ends[0] - predicted[name].low, predicted[name].high - ends[1]])
         if at_m.size == 1:  # the smaller end of a standing axis is as the noise has it
-            told, beyond = np.max(told), np.max(beyond)
-        assert np.all(np.abs(told - beyond) <= 0.1 * np.max(beyond)), (name, told, beyond)
+            margin, beyond = np.max(margin), np.max(beyond)
+        assert np.all(np.abs(margin - beyond) <= 0.1 * np.max(beyond)), (name, margin, beyond)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines, Responses
-from livebode.fitting import Grid, TwoMass, fit
+from livebode.fitting import EvaluationGrid, TwoMass, fit
 from studies.fit_bounds import BELT, cases, measure, responses_of
 
 RUNS = 6
@@ -54,7 +54,7 @@ def test_a_pattern_that_no_model_explains_is_reported_and_no_95_percent() -> Non
     """A gain that waves over the lines, as no mode, lag or friction makes it."""
     lines = Lines.parse("20:120:2", rate_hz=4000, window=2000)
     waves = 1 + 0.05 * np.cos(np.linspace(0, 9 * np.pi, len(lines)))
-    value = BELT.at([0.0028, 6.7, 5e5, 130.0, 0, 0, 0], Grid.of(lines)) * waves
+    value = BELT.at([0.0028, 6.7, 5e5, 130.0, 0, 0, 0], EvaluationGrid.of(lines)) * waves
     ones, one = np.ones((1, len(lines))), np.zeros(1, dtype=int)
     measured = Responses(
         lines, value[np.newaxis], 1e-3 * np.abs(value)[np.newaxis], one + np.inf, ones, ones > 0, one, one, one + 0.0,

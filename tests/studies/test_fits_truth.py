@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies.fits import AFTER_S, TRUTH, least_variance, moving, standing
+from studies.fits import AFTER_S, TRUTH, fitted_at_standstill, least_variance, moving
 
 
 def test_fits_at_standstill_reach_the_cramer_rao_bound_and_their_bounds_cover_the_truth() -> None:
-    found = standing(120)
+    found = fitted_at_standstill(120)
     assert found.ok.all()
     ratio = np.mean(np.log(found.value[:, :4] / TRUTH[:4]) ** 2, axis=0) / least_variance()
     cover = np.mean(np.abs(found.value - TRUTH)[:, :4] <= found.bound()[:, :4], axis=0)

@@ -25,7 +25,7 @@ def arx_record(samples: int) -> tuple[np.ndarray, np.ndarray]:
     return u, lfilter([0, *THETA[3:]], [1, *THETA[:3]], u)
 
 
-def standing(seconds: float, noise_rad_per_s: float) -> Recording:
+def at_standstill(seconds: float, noise_rad_per_s: float) -> Recording:
     axis = BeltAxis(
         mechanics=Mechanics(frozen_position_m=0.8),
         motion=Standstill(position_m=0.8),
@@ -40,7 +40,7 @@ def standing(seconds: float, noise_rad_per_s: float) -> Recording:
 
 @pytest.fixture(scope="module")
 def quiet() -> Recording:
-    return standing(5.0, 0.0)
+    return at_standstill(5.0, 0.0)
 
 
 def apart(found: np.ndarray, true: np.ndarray) -> float:
@@ -129,7 +129,7 @@ def test_livebode_is_dated_at_the_centre_by_default(quiet: Recording) -> None:
 
 
 def test_the_filter_converges_to_the_machine_at_standstill() -> None:
-    recording = standing(2.5, 0.1)
+    recording = at_standstill(2.5, 0.1)
     answer = kalman.tuned(recording).at(recording.judged)
     assert apart(answer.parameters[0, [0, 2]], two_mass.NOMINAL[[0, 2]]) < 0.02
     assert apart(answer.value[0], recording.true_response(recording.judged)[0]) < 0.05
@@ -176,8 +176,8 @@ def test_the_smoother_goes_back_as_rauch_tung_and_striebel_wrote_it() -> None:
     block, tick_s = starts.beginning(0), 1 / RATE_HZ
     u, y, count = block["u"], block["velocity"], 300
     covariances = np.empty((len(y), 9, 9))
-    told = kalman.START, kalman.DOUBT, kalman.WANDER, 0.1, tick_s
-    states = kalman.filtered(u, y, *told, covariances)
+    start = kalman.START, kalman.DOUBT, kalman.WANDER, 0.1, tick_s
+    states = kalman.filtered(u, y, *start, covariances)
     found = smoother.backwards(u, states, covariances, 0, count - 1, kalman.WANDER, tick_s)
     assert np.array_equal(found[-1], states[count - 1])
     later = states[count - 1]

@@ -149,11 +149,11 @@ def _look_at_the_record(attacked: Attacked, over: threading.Event, noticed: Noti
         noticed.memory_mb = max(noticed.memory_mb, attacked.memory_mb())
 
 
-def held(count: int, say: str = "", *, deaf: bool = False) -> Callable[[Attacked, threading.Event], None]:
+def held(count: int, request: str = "", *, deaf: bool = False) -> Callable[[Attacked, threading.Event], None]:
     """So many connections that say this and then nothing, each opened again when it is closed."""
 
     def attack(attacked: Attacked, over: threading.Event) -> None:
-        data = say.replace("{head}", _HEAD).replace("{origin}", attacked.origin)
+        data = request.replace("{head}", _HEAD).replace("{origin}", attacked.origin)
         data = data.replace("{host}", attacked.origin.partition("//")[2]).encode()
         with selectors.DefaultSelector() as selector:
             for _ in range(count):

@@ -20,11 +20,11 @@ from livebode.core import DamageWarning, Event, LivebodeError, UsageError
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 from livebode.estimation import Tracker
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.query import query
 from livebode.reporting.run_report import run_report
 from livebode.runtime import Document
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 from livebode.runtime.fits import Fits
 from tests.support.command import livebode
 from tests.support.recorded import SETTINGS, machine
@@ -44,14 +44,16 @@ class StopError(Exception):
     pass
 
 
-def record_run(directory: Path, *, until: int = 10**9, segments: bool = True, told: list[Event] | None = None) -> None:
+def record_run(
+    directory: Path, *, until: int = 10**9, segments: bool = True, reported: list[Event] | None = None
+) -> None:
     """Record the machine up to a sample, or continue to its end."""
 
     def listen(document: Document) -> None:
-        if isinstance(document, Tracked) and document.samples > until:
+        if isinstance(document, TrackerResults) and document.samples > until:
             raise StopError
-        if isinstance(document, Event) and document.kind.startswith("record-") and told is not None:
-            told.append(document)
+        if isinstance(document, Event) and document.kind.startswith("record-") and reported is not None:
+            reported.append(document)
 
     record(
         machine(SAMPLES), Tracker(SETTINGS), directory, fits=Fits(FIT), segments=KEPT if segments else None,
@@ -83,7 +85,7 @@ def seen(path: Path) -> Seen:
     """By `Run`."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DamageWarning)
-        run = Run.open(path)
+        run = RunRecord.open(path)
         rows = {}
         for name in TABLES:
             tables = [table.to_pylist() for table in run.tables(name)]
@@ -100,7 +102,7 @@ def by_query(path: Path) -> dict[str, list[str]]:
         found = {}
         for name in TABLES:
             try:
-                answer = query(Run.open(path), f"FROM {name}", _MOST)
+                answer = query(RunRecord.open(path), f"FROM {name}", _MOST)
             except UsageError as error:
                 if "does not exist" not in error.reason:
                     raise
@@ -188,17 +190,17 @@ def _check_rows(name: str, before: Seen, after: Seen) -> None:
 
 
 def _check_continued(name: str, path: Path) -> None:
-    told: list[Event] = []
-    record_run(path, told=told)
+    reported: list[Event] = []
+    record_run(path, reported=reported)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DamageWarning)
-        run = Run.open(path)
+        run = RunRecord.open(path)
         number = pa.concat_tables(run.tables("samples"))["sample"].to_numpy()
-    damages = [event for event in told if event.kind == "record-damaged"]
+    damages = [event for event in reported if event.kind == "record-damaged"]
     damages += [damage for damage in run.damages if damage not in damages]
     lost = sum(damage.details.get("rows", {}).get("samples", 0) for damage in damages)
     assert run.finished
     assert np.array_equal(number, np.unique(number))
     assert number[0] == 0 or lost
     assert number[-1] == SAMPLES - 1
-    assert number.size == SAMPLES - lost, (name, told)
+    assert number.size == SAMPLES - lost, (name, reported)

@@ -17,7 +17,7 @@ from livebode.core import Block, Channel, Lines, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.runtime import RunControl
 from livebode.runtime.documents import RunStarted
 from livebode.runtime.fits import Fits
@@ -88,8 +88,8 @@ class Watched:
         self, directory: Path, serving: Serving | None = None, loop: dict[str, Any] | None = LOOP, name: str = "axis"
     ) -> None:
         self.directory, self.machine = directory, Machine()
-        self.told: list[str] = []
-        self.dashboard = Dashboard(serving or Serving("127.0.0.1", 0), self.told.append)
+        self.messages: list[str] = []
+        self.dashboard = Dashboard(serving or Serving("127.0.0.1", 0), self.messages.append)
         self.hub = self.dashboard.hub(name)
         words = {"loop": loop or {}, "fit": FIT, "signals": {"output": "y", "input": "u", "schedule": "x"}}
         section = FitSection.model_validate(FIT)
@@ -127,9 +127,9 @@ class Watched:
         self._thread.join(60)
         assert not self._thread.is_alive()
 
-    def record(self) -> Run:
+    def record(self) -> RunRecord:
         """What is recorded by now."""
-        return Run.open(self.directory)
+        return RunRecord.open(self.directory)
 
 
 def whole_run(directory: Path, loop: dict[str, Any] | None = LOOP) -> Path:

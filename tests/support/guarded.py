@@ -56,9 +56,9 @@ def login(watched: Watched, token: str) -> tuple[int, str]:
 
 
 def cookie(watched: Watched, token: str) -> str:
-    status, said = login(watched, token)
+    status, cookies = login(watched, token)
     assert status == 200
-    return said.partition(";")[0]
+    return cookies.partition(";")[0]
 
 
 def closed(live: ClientConnection) -> bool:
@@ -77,6 +77,6 @@ def answer(live: ClientConnection, word: str) -> Any:
     """What stands under this word in the next message that has it."""
     for _ in range(200):
         message = live.recv(timeout=20)
-        if isinstance(message, str) and word in (said := json.loads(message)):
-            return said[word]
+        if isinstance(message, str) and word in (cookies := json.loads(message)):
+            return cookies[word]
     raise AssertionError(f"no message said {word!r}")

@@ -23,22 +23,22 @@ def start(directory: Path) -> tuple[ForkServerProcess, Connection]:
     # Its server has imported what is slow, and starts a process in some milliseconds.
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["tests.support.killed"])
-    said, say = context.Pipe(duplex=False)
-    process = context.Process(target=_work, args=(directory, say))
+    results, outlet = context.Pipe(duplex=False)
+    process = context.Process(target=_work, args=(directory, outlet))
     process.start()
-    say.close()
-    return process, said
+    outlet.close()
+    return process, results
 
 
-def _work(directory: Path, say: Connection) -> None:
-    say.send(0)
-    record_machine(machine(SAMPLES), directory, progress=lambda done, _: say.send(done))
+def _work(directory: Path, outlet: Connection) -> None:
+    outlet.send(0)
+    record_machine(machine(SAMPLES), directory, progress=lambda done, _: outlet.send(done))
 
 
 def run_s(directory: Path) -> float:
     """How long a process records that nobody kills, from its first word on."""
-    process, said = start(directory)
-    said.recv()
+    process, results = start(directory)
+    results.recv()
     began = time.perf_counter()
     process.join()
     check_whole(directory, SAMPLES)
@@ -52,12 +52,12 @@ def kill_often(directory: Path, whole_s: float, rng: np.random.Generator) -> int
     """
     tracked = kills = 0
     for _ in range(3):
-        process, said = start(directory)
-        said.recv()
+        process, results = start(directory)
+        results.recv()
         time.sleep(rng.uniform(0, whole_s))
         process.kill()
         process.join()
-        tracked = max([tracked, *_received(said)])
+        tracked = max([tracked, *_received(results)])
         if (directory / "run.json").exists():
             check_beginning(directory, SAMPLES, tracked - RATE_HZ)
         else:
@@ -72,9 +72,9 @@ def kill_often(directory: Path, whole_s: float, rng: np.random.Generator) -> int
     return kills
 
 
-def _received(said: Connection) -> list[int]:
+def _received(results: Connection) -> list[int]:
     found = []
-    with said, contextlib.suppress(EOFError):
+    with results, contextlib.suppress(EOFError):
         while True:
-            found.append(said.recv())
+            found.append(results.recv())
     return found

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from livebode.configuration.axis import Axis
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.grouped_events import each_event
 from livebode.runtime.destination import Destination
 from livebode.runtime.run import run
@@ -40,11 +40,11 @@ LIFE_S = 1.0
 """Longest life of a process from there on."""
 
 
-def _work(configuration: dict[str, Any], directory: Path, say: Connection, fifo: Path | None) -> None:
+def _work(configuration: dict[str, Any], directory: Path, outlet: Connection, fifo: Path | None) -> None:
     if fifo is not None:
         sys.stdin = os.fdopen(os.open(fifo, os.O_RDONLY))
     axis = Axis.model_validate(configuration)
-    say.send("begun")
+    outlet.send("begun")
     run(axis, Destination(directory, lambda *_: None))
 
 
@@ -52,14 +52,14 @@ def start(feed: Feed, directory: Path) -> ForkServerProcess:
     """A process that records this feed, once it has imported all."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["tests.support.killed_live"])
-    said, say = context.Pipe(duplex=False)
+    results, outlet = context.Pipe(duplex=False)
     process = context.Process(
-        target=_work, args=(REST | feed.rest | {"source": feed.source}, directory, say, feed.fifo)
+        target=_work, args=(REST | feed.rest | {"source": feed.source}, directory, outlet, feed.fifo)
     )
     process.start()
-    say.close()
-    assert said.poll(PATIENCE_S)
-    said.recv()
+    outlet.close()
+    assert results.poll(PATIENCE_S)
+    results.recv()
     return process
 
 
@@ -72,7 +72,7 @@ def recorded(directory: Path, channel: str) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of the samples in the record, and the numbers that the sender gave them."""
     if not (directory / "run.json").exists():
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    tables = list(Run.open(directory).tables("samples"))
+    tables = list(RunRecord.open(directory).tables("samples"))
     if not tables:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     return tuple(
@@ -127,7 +127,7 @@ def check_exact(directory: Path, channel: str, *, whole: bool) -> int:
     assert np.all(sample - number == sample[0] - number[0]), "a sample is at a wrong time"
     holes = np.flatnonzero(np.diff(sample) != 1)
     truth = {int(sample[at + 1]): int(sample[at + 1] - sample[at] - 1) for at in holes}
-    events = [one for event in Run.open(directory).events() for one in each_event(event)]
+    events = [one for event in RunRecord.open(directory).events() for one in each_event(event)]
     named = {event.sample: event.details["missing_samples"] for event in events if event.kind == "loss"}
     found = {at: missing for at, missing in named.items() if at <= sample[-1]}
     assert found == truth, sorted(found.items() ^ truth.items())

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from livebode.records import Run
+from livebode.records import RunRecord
 
 
 @contextmanager
@@ -27,5 +27,5 @@ def started(path: Path, out: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def table(out: Path, what: str = "responses") -> dict[str, np.ndarray]:
-    table = pa.concat_tables(Run.open(out).tables(what))
+    table = pa.concat_tables(RunRecord.open(out).tables(what))
     return {name: np.array(column) for name, column in table.to_pydict().items()}

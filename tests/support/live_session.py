@@ -8,12 +8,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from livebode.cli.notices import Notices
+from livebode.cli.notices import NoticePrinter
 from livebode.configuration import Axis
 from livebode.core import Event
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.runtime import Destination, Document, RunControl, Subscriber, run
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 from livebode.sources.live import Batch, SourceSettings
 from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer
 
@@ -37,7 +37,7 @@ class Stuck:
         self.held, self.released = threading.Event(), threading.Event()
 
     def __call__(self, document: Document) -> None:
-        if isinstance(document, Tracked):
+        if isinstance(document, TrackerResults):
             self.held.set()
             self.released.wait()
 
@@ -57,7 +57,7 @@ class LiveSession:
         }
         self.run, self.control = folder / "run", RunControl()
         self.shown: list[str] = []
-        subscribers = (*subscribers, Notices(self.shown.append))
+        subscribers = (*subscribers, NoticePrinter(self.shown.append))
         to = Destination(self.run, lambda *_: None, subscribers=subscribers)
         self._arguments = Axis.of(settings | sections, "test"), to, self.control
         self._error: BaseException | None = None
@@ -76,7 +76,7 @@ class LiveSession:
     def events(self) -> list[Event]:
         """What is in the record now."""
         begun = (self.run / "run.json").exists() and (self.run / "events.jsonl").exists()
-        return Run.open(self.run).events() if begun else []
+        return RunRecord.open(self.run).events() if begun else []
 
     def _work(self) -> None:
         try:

@@ -12,16 +12,16 @@ from livebode.core import Block, Event, Lines
 from livebode.monitoring import (
     DEFAULT_INTERVAL_S,
     Baseline,
-    Machine,
+    LearnedMachine,
     MachineMonitor,
     Rows,
     learn_machine,
     learn_table,
 )
-from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
-from livebode.motion import Curve, MovingModel
+from livebode.motion import MovingModel, PositionCurve
 from livebode.motion.model import basis
 from livebode.simulation import (
     BeltAxis,
@@ -42,7 +42,7 @@ THERE, BACK = (LOW_M, HIGH_M), (HIGH_M, LOW_M)
 
 
 @cache
-def machine() -> Machine:
+def machine() -> LearnedMachine:
     """From twelve strokes of random speed."""
     return learn_machine(healthy_runs(2, 6), LINES, input="u", output="velocity", schedule="x", radius_m=RADIUS_M)
 
@@ -103,7 +103,7 @@ def pieces(block: Block, sizes: Iterable[int]) -> Iterable[Block]:
             return
 
 
-def told(events: Iterable[Event]) -> list[tuple[str, str]]:
+def changes_of(events: Iterable[Event]) -> list[tuple[str, str]]:
     """Kind and what of each event."""
     return [(e.kind, str(e.details.get("what", e.details.get("reason")))) for e in events]
 
@@ -115,7 +115,7 @@ def changed(block: Block, edit: Callable[[np.ndarray], None]) -> Block:
     return Block(data, block.channels, block.rate_hz, block.start)
 
 
-def ideal() -> Machine:
+def ideal() -> LearnedMachine:
     """The study's axis as it is, learned from nothing: two masses along the way, white noise, no scatter."""
     mechanics, splines = Mechanics(), 12
     at = np.linspace(LOW_M, HIGH_M, 200)
@@ -129,16 +129,16 @@ def ideal() -> Machine:
         mechanics.inertia_kg_m2,
         mechanics.load_kg * mechanics.radius_m**2,
         1.0,
-        Curve(LOW_M, HIGH_M, weights + np.log(mechanics.stiffness_n_per_m) + arm),
-        Curve(LOW_M, HIGH_M, weights / 2 + np.log(mechanics.damping_n_s_per_m) + arm),
+        PositionCurve(LOW_M, HIGH_M, weights + np.log(mechanics.stiffness_n_per_m) + arm),
+        PositionCurve(LOW_M, HIGH_M, weights / 2 + np.log(mechanics.damping_n_s_per_m) + arm),
     )
     power = LINES.window * 0.1**2
     held, free = ([0.005, 0.005, 0.05, 0.01], [0.01, 0.01, 0.2, 0.04])
-    return Machine(
+    return LearnedMachine(
         model,
         np.full(len(LINES), power),
         np.full(len(LINES.quiet), power),
-        *(Accuracy(np.ones(4), np.zeros(4), np.array(smallest)) for smallest in (held, free)),
+        *(ChangeAccuracy(np.ones(4), np.zeros(4), np.array(smallest)) for smallest in (held, free)),
         0.1,
         0.4,
         np.full(28, 10),
@@ -154,8 +154,8 @@ def small_baseline() -> Baseline:
         0.1 * np.arange(40), 400 * np.arange(40) + 399, np.ones(40, dtype=bool),
     )  # fmt: skip
     table = learn_table("lines", [f"{f:g} Hz" for f in lines.frequency_hz], [rows])
-    curve, known = Curve(0.2, 1.6, np.zeros(12)), Accuracy(np.ones(4), np.zeros(4), np.full(4, 0.01))
-    machine = Machine(
+    curve, known = PositionCurve(0.2, 1.6, np.zeros(12)), ChangeAccuracy(np.ones(4), np.zeros(4), np.full(4, 0.01))
+    machine = LearnedMachine(
         MovingModel(0.003, 7.0, 1.0, curve, curve), np.ones(len(lines)), np.ones(len(lines.quiet)), known, known,
         0.1, 0.4, np.full(28, 9),
         covariates=Covariates(

@@ -12,10 +12,10 @@ import numpy as np
 from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Event, Responses
 from livebode.estimation import Settings, Tracker
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.grouped_events import each_event
 from livebode.runtime import Document, Outcome
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 from tests.support.command import LINES, RATE_HZ, signals
 from tests.support.found import with_events
 from tests.support.runs import record
@@ -68,16 +68,16 @@ def record_machine(
     *,
     kept: RecordSection = KEPT,
     progress: Callable[[int, int | None], None] = lambda *_: None,
-    tell: Callable[[Event], None] = lambda _: None,
+    report: Callable[[Event], None] = lambda _: None,
     again: bool = True,
 ) -> Outcome:
     """Record the machine until its end, from where its record ends."""
 
     def listen(document: Document) -> None:
-        if isinstance(document, Tracked):
+        if isinstance(document, TrackerResults):
             progress(document.samples, document.samples_total)
         elif isinstance(document, Event) and document.kind.startswith("record-"):
-            tell(document)
+            report(document)
 
     about = {"configuration": {"record": kept.model_dump()}}
     return record(source, Tracker(SETTINGS), directory, about=about, segments=kept, again=again, subscribers=[listen])
@@ -90,9 +90,9 @@ def expected(samples: int) -> tuple[Responses, tuple[Event, ...]]:
     return responses, tuple(events)
 
 
-def same(found: Responses, wanted: Responses) -> bool:
+def same(found: Responses, expected: Responses) -> bool:
     """Bit for bit."""
-    pairs = [(getattr(found, field.name), getattr(wanted, field.name)) for field in fields(found)]
+    pairs = [(getattr(found, field.name), getattr(expected, field.name)) for field in fields(found)]
     return all(_bits(a) == _bits(b) for a, b in pairs)
 
 
@@ -105,7 +105,7 @@ def check_beginning(directory: Path, samples: int, sample_min: int) -> int:
 
     Returns how many samples it holds.
     """
-    run, (responses, events) = Run.open(directory), expected(samples)
+    run, (responses, events) = RunRecord.open(directory), expected(samples)
     found = run.responses()
     assert same(found, responses[: len(found)])
     kept = [table["sample"].to_numpy() for table in run.tables("samples")]
@@ -114,17 +114,17 @@ def check_beginning(directory: Path, samples: int, sample_min: int) -> int:
     assert number.size >= sample_min
     due = int(np.count_nonzero(responses.sample < number.size))
     assert len(found) == due
-    said = [one for event in run.events() if not event.kind.startswith(OWN) for one in each_event(event)]
+    reported = [one for event in run.events() if not event.kind.startswith(OWN) for one in each_event(event)]
     # An event is written before the rows that belong to it are committed.
-    assert said == list(events[: len(said)])
-    assert len(said) >= sum(event.sample < number.size for event in events)
+    assert reported == list(events[: len(reported)])
+    assert len(reported) >= sum(event.sample < number.size for event in events)
     return number.size
 
 
 def check_whole(directory: Path, samples: int) -> None:
     """That a finished record equals that of an uninterrupted run."""
     assert check_beginning(directory, samples, samples) == samples
-    run = Run.open(directory)
+    run = RunRecord.open(directory)
     assert run.finished
     columns = [table.to_pydict() for table in run.tables("samples")]
     for name, values in zip(NAMES, data(samples)):
@@ -136,4 +136,4 @@ def check_whole(directory: Path, samples: int) -> None:
 
 
 def unfinished(directory: Path) -> bool:
-    return not (directory / "run.json").exists() or not Run.open(directory).finished
+    return not (directory / "run.json").exists() or not RunRecord.open(directory).finished

@@ -11,7 +11,7 @@ import numpy as np
 from livebode.configuration import Axis
 from livebode.configuration.axis import RecordSection
 from livebode.preparation.follower import Follower
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.piece import parts_of
 from livebode.records.summary_file import RUN, to_document
 from livebode.runtime import Destination, Outcome, RunLoop, Subscriber, run
@@ -34,7 +34,7 @@ def small_run(folder: Path, columns: Mapping[str, np.ndarray], **sections: dict[
 def describe(folder: Path, like: Path) -> None:
     """Write the run.json of a run for the tables in a directory."""
     files = {path.name: parts_of(path) for path in sorted(folder.glob("*.parquet"))}
-    (folder / RUN).write_bytes(to_document(Run.open(like).summary | {"files": files}))
+    (folder / RUN).write_bytes(to_document(RunRecord.open(like).summary | {"files": files}))
 
 
 def record(

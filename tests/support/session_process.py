@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Event
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support.command import RATE_HZ
 from tests.support.peers.machine import CHANNELS, Machine, data
 from tests.support.peers.peer import PATIENCE_S, until
@@ -58,7 +58,7 @@ class Running:
         until(lambda: self.process.poll() is not None or numbers(self.out / name).size >= samples, f"{samples} samples")
         assert self.process.poll() is None, self.process.communicate()
 
-    def told(self, name: str, kind: str) -> Event:
+    def reported_event(self, name: str, kind: str) -> Event:
         """The first event of this kind in this run, once it is there."""
         return until(lambda: next((e for e in events(self.out / name) if e.kind == kind), None), kind)
 
@@ -70,24 +70,24 @@ class Running:
 
 
 def events(run: Path) -> list[Event]:
-    return Run.open(run).events() if (run / "run.json").exists() and (run / "events.jsonl").exists() else []
+    return RunRecord.open(run).events() if (run / "run.json").exists() and (run / "events.jsonl").exists() else []
 
 
 def numbers(run: Path) -> np.ndarray:
     """Numbers of the samples in a record, as they stand in it."""
     if not (run / "manifest.jsonl").exists() or not (run / "run.json").exists():
         return np.zeros(0, dtype=np.int64)
-    parts = [table["sample"].to_numpy() for table in Run.open(run).tables("samples")]
+    parts = [table["sample"].to_numpy() for table in RunRecord.open(run).tables("samples")]
     return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
 
 
-def said(run: Path) -> dict[str, Any]:
+def summary_of(run: Path) -> dict[str, Any]:
     return json.loads((run / "run.json").read_text())
 
 
 def check_samples(runs: list[Path], sent: int) -> None:
     """That every sample that was sent is in exactly one of these records, as it was sent."""
-    tables = [table for run in runs for table in Run.open(run).tables("samples")]
+    tables = [table for run in runs for table in RunRecord.open(run).tables("samples")]
     number = np.concatenate([table["sample"].to_numpy() for table in tables])
     assert np.array_equal(number, np.arange(sent))
     for row, name in enumerate(("w", "u", "y", "n")):

@@ -16,7 +16,7 @@ SAMPLES, FROM, UNTIL = 8000, 2550, 6120
 
 def record_starved(run: Path, starve: Callable[[], None], feed: Callable[[], None]) -> list[Event]:
     """Record while `starve` leaves no room and until `feed` makes some; what the record said of itself."""
-    said: list[Event] = []
+    reported: list[Event] = []
 
     def each(start: int) -> None:
         if start == FROM:
@@ -26,10 +26,10 @@ def record_starved(run: Path, starve: Callable[[], None], feed: Callable[[], Non
             check_beginning(run, SAMPLES, FROM - 1000)
             feed()
 
-    outcome = record_machine(machine(SAMPLES, each), run, tell=said.append)
+    outcome = record_machine(machine(SAMPLES, each), run, report=reported.append)
     assert outcome.summary["counts"]["samples"] == SAMPLES
     check_whole(run, SAMPLES)
-    return said
+    return reported
 
 
 def on_a_limited_file(run: Path) -> list[Event]:

@@ -14,7 +14,7 @@ from livebode.configuration.axis import FitSection
 from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
-from livebode.fitting import Fitter, Grid, TwoMass
+from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_table, places, signals_of
 from livebode.motion import MotionCorrection
 from livebode.preparation.checks import ChannelCheck
@@ -126,7 +126,7 @@ def responses() -> Responses:
     """Fifty of a belt axis with a wandering stiffness, four of them of nothing."""
     values = np.repeat(TRUTH[np.newaxis], 50, axis=0)
     values[:, 2] *= np.linspace(1.0, 1.2, 50)
-    found = noisy(BELT.at(values, Grid.of(FITTED)), FITTED, 0.01, 50)
+    found = noisy(BELT.at(values, EvaluationGrid.of(FITTED)), FITTED, 0.01, 50)
     value = found.value.copy()
     value[30:34] = np.nan
     return replace(found, value=value, valid=np.isfinite(value), unit="rad/s/(N m)")

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from livebode.core import Block, Channel, Event
-from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor
+from livebode.monitoring import DEFAULT_INTERVAL_S, LearnedMachine, MachineMonitor
 from livebode.simulation import Fault, Friction, Mechanics, StrokeSequence, TensionLoss
 from tests.support.axes import LINES, RATE_HZ
 from tests.support.monitored import HIGH_M, LOW_M, NAMES, SPEED_M_PER_S, axis, blocks
@@ -61,6 +61,6 @@ def _with_sensor(run: Run, kelvin: float, seconds: float, seed: int) -> Iterator
         yield Block(np.vstack([block.data, sensor]), channels, block.rate_hz, start=block.start)
 
 
-def judged(machine: Machine, run: Iterable[Block]) -> list[Event]:
+def judged(machine: LearnedMachine, run: Iterable[Block]) -> list[Event]:
     monitor = MachineMonitor(machine, LINES, NAMES, DEFAULT_INTERVAL_S)
     return [event for block in run for event in monitor.process(block)] + monitor.finish()

@@ -11,7 +11,7 @@ from livebode.analysis.overview import Overview
 from livebode.core import Response, Responses
 from livebode.estimation import Movement
 from livebode.fitting import RunningMean
-from livebode.records import Run
+from livebode.records import RunRecord
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Averaged:
     moved: bool
 
 
-def averaged(run: Run) -> Averaged:
+def averaged(run: RunRecord) -> Averaged:
     """Read the run.
 
     Raises
@@ -83,7 +83,7 @@ def averaged(run: Run) -> Averaged:
 class _Counted:
     """Further properties of a run's responses."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: RunRecord) -> None:
         self._window, self._hop = run.lines.window, int(run.found.get("hop", run.lines.window))
         self._movement, self.moved = Movement(max(1, self._window // self._hop)), False
         self.rows, self.incomplete = 0, 0

@@ -17,7 +17,7 @@ from livebode.margins import Margins, OpenLoop, against_lines, margins
 
 
 @dataclass(frozen=True)
-class Change:
+class QuantityChange:
     """A number before and after, each with its 95 % bound.
 
     Attributes
@@ -56,9 +56,9 @@ class Change:
 class Changes:
     """Changes of parameters and margins; empty with a reason if there are none."""
 
-    parameters: tuple[Change, ...]
+    parameters: tuple[QuantityChange, ...]
     parameter_words: str
-    margins: tuple[Change, ...]
+    margins: tuple[QuantityChange, ...]
     margin_words: str
 
 
@@ -113,7 +113,7 @@ def _rows(found: Margins) -> dict[str, tuple[float, float, str]]:
     return {name.replace("_", " "): (float(v), float(b), unit) for name, v, b, unit in values if isfinite(v)}
 
 
-def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[Change, ...]:
+def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[QuantityChange, ...]:
     from scipy.special import ndtri
 
     before, after = rows
@@ -123,7 +123,7 @@ def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[Change, ...
     wider = float(ndtri(1 - ALPHA / (2 * max(len(names), 1)))) / usual
     surer = wider + float(ndtri(0.95)) / usual
     return tuple(
-        Change(
+        QuantityChange(
             name,
             before[name][2],
             before[name][:2],
@@ -135,6 +135,6 @@ def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[Change, ...
     )
 
 
-def percent(change: Change, amount: float) -> float:
+def percent(change: QuantityChange, amount: float) -> float:
     """An amount in percent of the value before; NaN if that is zero."""
     return 100 * amount / abs(change.before[0]) if change.before[0] else float(np.nan)

@@ -13,7 +13,7 @@ from livebode.configuration.axis import TrackingSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import PER_LINE, GridError, Lines, Response, Responses, widened
 from livebode.fitting import RunningMean
-from livebode.records import Run
+from livebode.records import RunRecord
 
 Floats = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class Difference:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class ComparedPlace:
     """The difference at a place of both runs: an interval of the schedule, forward (rising) or return."""
 
     low: float
@@ -104,14 +104,14 @@ class Compared:
         Reasons why the comparison is weaker than it seems, in sentences.
     """
 
-    runs: tuple[Run, Run]
+    runs: tuple[RunRecord, RunRecord]
     averages: tuple[Averaged, Averaged]
     overall: Difference
-    places: tuple[Place, ...]
+    places: tuple[ComparedPlace, ...]
     warnings: tuple[str, ...]
 
 
-def compare(before: Run, after: Run) -> Compared:
+def compare(before: RunRecord, after: RunRecord) -> Compared:
     """Compare two runs.
 
     Raises
@@ -144,14 +144,14 @@ def compare(before: Run, after: Run) -> Compared:
     m = max(int(np.sum(known)), 1)
     edges = np.linspace(*span, _PLACES + 1)
     places = tuple(
-        Place(float(edges[i]), float(edges[i + 1]), back, Difference.of(a, b, m))
+        ComparedPlace(float(edges[i]), float(edges[i + 1]), back, Difference.of(a, b, m))
         for (i, back), (a, b) in zip(shared, pairs)
     )
     together = [_together([pair[i] for pair in pairs], np.array(known)) for i in (0, 1)]
     return Compared((before, after), both, Difference.of(together[0], together[1]), places, tuple(warnings))
 
 
-def _refuse(before: Run, after: Run) -> None:
+def _refuse(before: RunRecord, after: RunRecord) -> None:
     for what in ("quantity", "unit"):
         one, other = (run.found.get(what, "") for run in (before, after))
         if one != other:
@@ -182,7 +182,7 @@ def _common(before: Lines, after: Lines) -> tuple[Lines, tuple[NDArray[np.intp],
     return Lines(bins, before.window, before.rate_hz), (first, nearest[first])
 
 
-def _about(before: Run, after: Run, common: int) -> list[str]:
+def _about(before: RunRecord, after: RunRecord, common: int) -> list[str]:
     """Warnings about settings that make the responses of an unchanged machine differ."""
     words = []
     if common < max(len(before.lines), len(after.lines)):
@@ -204,7 +204,7 @@ def _about(before: Run, after: Run, common: int) -> list[str]:
     return words
 
 
-def _averages(run: Run) -> bool:
+def _averages(run: RunRecord) -> bool:
     return bool(run.summary.get("configuration", {}).get("tracking", {}).get("average"))
 
 
@@ -232,7 +232,7 @@ def _speeds(of: Responses) -> Floats:
     return np.asarray(speed[speed > 0.1 * np.max(speed, initial=0.0)])
 
 
-def _by_place(run: Run, span: tuple[float, float]) -> dict[tuple[int, bool], Responses]:
+def _by_place(run: RunRecord, span: tuple[float, float]) -> dict[tuple[int, bool], Responses]:
     """The mean at each place of the span, forward and return, without those that have too few windows."""
     edges = np.linspace(*span, _PLACES + 1)
     means: dict[tuple[int, bool], RunningMean] = {}

@@ -11,7 +11,7 @@ from livebode.analysis.averaged import Averaged, averaged
 from livebode.configuration.axis import FitSection
 from livebode.configuration.fit_settings import chosen_model, fit_settings
 from livebode.fitting import Fit, fit
-from livebode.records import Run
+from livebode.records import RunRecord
 
 
 def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
@@ -20,7 +20,7 @@ def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
     For a run that averages, the newest valid response; else the mean of all. If neither configuration nor unit
     determine whether the output is a velocity or a position, the one with the smaller misfit is used.
     """
-    return fit_averaged(averaged(Run.open(directory)), section)
+    return fit_averaged(averaged(RunRecord.open(directory)), section)
 
 
 def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:

@@ -13,15 +13,15 @@ from livebode.configuration.recorded import recorded_configuration
 from livebode.core import BaselineError, Block, LivebodeError
 from livebode.monitoring import (
     Baseline,
-    Machine,
+    LearnedMachine,
     NonOverlappingWindows,
     Rows,
-    Table,
+    ScheduleTable,
     learn_machine,
     learn_table,
     places,
 )
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.sources import open_log
 
 _ROLES = ("output", "input", "excitation", "schedule")
@@ -29,11 +29,11 @@ _ROLES = ("output", "input", "excitation", "schedule")
 _RADIUS_M = 1.0
 
 
-def learn(paths: Sequence[str | PathLike[str]], say: Callable[[str], None] = lambda _: None) -> Baseline:
+def learn(paths: Sequence[str | PathLike[str]], report: Callable[[str], None] = lambda _: None) -> Baseline:
     """The Baseline of runs of the healthy machine, all with the same lines and signals; as `livebode learn`.
 
     Tables are learned from the runs' responses. With a torque and a scheduling position, a model of the moving machine
-    is also learned, from the recordings of the runs; `say` receives the progress.
+    is also learned, from the recordings of the runs; `report` receives the progress.
 
     Raises
     ------
@@ -52,20 +52,20 @@ def learn(paths: Sequence[str | PathLike[str]], say: Callable[[str], None] = lam
     """
     if not paths:
         raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
-    runs = [Run.open(Path(path)) for path in paths]
+    runs = [RunRecord.open(Path(path)) for path in paths]
     axes = [_axis(run) for run in runs]
     _check_once(runs, axes)
     for run, axis in zip(runs, axes):
         _check_same(runs[0], axes[0], run, axis)
-    say("learning the lines over the schedule")
+    report("learning the lines over the schedule")
     lines, signals = runs[0].lines, axes[0].signals
     names = [f"{f:g} Hz" for f in lines.frequency_hz]
     overlap = len(_apart(runs[0]))
     tables = [learn_table("lines", names, [rows for run in runs for rows in _rows(run)], overlap)]
     if axes[0].fit is not None:
-        say("learning the fitted parameters over the schedule")
+        report("learning the fitted parameters over the schedule")
         tables.append(_parameters(runs, axes[0].fit))
-    machine, remark = _machine(runs, axes, say)
+    machine, remark = _machine(runs, axes, report)
     if machine is None and (covariates := axes[0].monitoring.covariates):
         raise BaselineError(
             "covariates-without-machine",
@@ -88,7 +88,7 @@ def learn(paths: Sequence[str | PathLike[str]], say: Callable[[str], None] = lam
     )
 
 
-def _axis(run: Run) -> Axis:
+def _axis(run: RunRecord) -> Axis:
     configuration = recorded_configuration(run.summary)
     if "source" not in configuration:
         raise BaselineError(
@@ -108,9 +108,9 @@ def _axis(run: Run) -> Axis:
     return axis
 
 
-def _check_once(runs: list[Run], axes: list[Axis]) -> None:
+def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
     """Duplicated data would count as twice as much evidence."""
-    seen: dict[Path, Run] = {}
+    seen: dict[Path, RunRecord] = {}
     for run, axis in zip(runs, axes):
         for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()):
             if thing is not None and thing in seen:
@@ -124,7 +124,7 @@ def _check_once(runs: list[Run], axes: list[Axis]) -> None:
         seen |= {thing: run for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()) if thing}
 
 
-def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
+def _check_same(first: RunRecord, mine: Axis, run: RunRecord, axis: Axis) -> None:
     for name, one, other in (
         ("lines", first.lines, run.lines),
         ("hop", first.found["hop"], run.found["hop"]),
@@ -145,12 +145,12 @@ def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
             )
 
 
-def _apart(run: Run) -> list[NonOverlappingWindows]:
+def _apart(run: RunRecord) -> list[NonOverlappingWindows]:
     window, hop = run.lines.window, run.found["hop"]
     return [NonOverlappingWindows(max(window, hop), place) for place in places(window, hop)]
 
 
-def _rows(run: Run) -> list[Rows]:
+def _rows(run: RunRecord) -> list[Rows]:
     """Rows at each place of the period."""
     each = _apart(run)
     return _joined([[apart.of_responses(batch) for apart in each] for batch in run.steady_batches()])
@@ -160,7 +160,7 @@ def _joined(batches: list[list[Rows]]) -> list[Rows]:
     return [Rows.join(parts) for parts in zip(*batches)]
 
 
-def _parameters(runs: list[Run], section: FitSection) -> Table:
+def _parameters(runs: list[RunRecord], section: FitSection) -> ScheduleTable:
     """The table of the fits; they are repeated, because a run's parameters.parquet has no covariance."""
     model = fitter_of(section, runs[0].found["unit"])
     names = [name for name in model.model.names if name not in model.held]
@@ -172,7 +172,9 @@ def _parameters(runs: list[Run], section: FitSection) -> Table:
     return learn_table("parameters", names, rows, len(_apart(runs[0])))
 
 
-def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> tuple[Machine | None, str]:
+def _machine(
+    runs: list[RunRecord], axes: list[Axis], report: Callable[[str], None]
+) -> tuple[LearnedMachine | None, str]:
     """A model of the moving machine, or the reason why there is none."""
     signals = axes[0].signals
     covariates = axes[0].monitoring.covariates
@@ -182,7 +184,7 @@ def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> t
         return None, f"a model describes the plant, but the runs contain the {axes[0].tracking.quantity}"
     if any(axis.source.log is None for axis in axes):
         return None, "a model is learned from recordings, but not all of these runs are from one"
-    say("learning a model of the moving machine from the recordings")
+    report("learning a model of the moving machine from the recordings")
     try:
         return (
             learn_machine(

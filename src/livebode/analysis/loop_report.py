@@ -24,7 +24,7 @@ from livebode.margins import (
     worst,
 )
 from livebode.margins.margins import CONTRADICTED
-from livebode.records import Run
+from livebode.records import RunRecord
 
 _PLACES = 12
 
@@ -112,7 +112,7 @@ def loop_of_run(
     FitError
         If no model could be fitted.
     """
-    run = Run.open(directory)
+    run = RunRecord.open(directory)
     own_words = recorded_configuration(run.summary)
     loop = axis.loop if axis is not None else LoopSection.model_validate(own_words.get("loop", {}))
     if section is None:

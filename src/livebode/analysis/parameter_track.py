@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core.parameters import OK
-from livebode.records import Run
+from livebode.records import RunRecord
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Track:
     model: str = ""
 
 
-def tracks(run: Run, kept: NDArray[np.int64], time_s: Floats) -> dict[str, Track]:
+def tracks(run: RunRecord, kept: NDArray[np.int64], time_s: Floats) -> dict[str, Track]:
     """Tracks by model, at the responses whose newest samples are `kept`; empty if nothing was fitted."""
     found: dict[str, Track] = {}
     for table in run.tables("parameters"):

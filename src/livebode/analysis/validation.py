@@ -10,7 +10,7 @@ from livebode.analysis.fits import fit_run
 from livebode.configuration.axis import Axis, FitSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Block, FitError, RecordError, SignalError, UsageError
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.sources import Log, open_log
 from livebode.validation import Validation, validate
 
@@ -40,7 +40,7 @@ def validate_run(
     FitError
         If no model could be fitted.
     """
-    own_words = recorded_configuration(Run.open(directory).summary)
+    own_words = recorded_configuration(RunRecord.open(directory).summary)
     if "signals" not in own_words:
         raise RecordError(
             "not-tracked",

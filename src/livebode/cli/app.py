@@ -22,7 +22,7 @@ from livebode.cli.demo_command import demo_command
 from livebode.cli.design_command import design_command
 from livebode.cli.doctor_command import doctor_command
 from livebode.cli.export_command import export_command
-from livebode.cli.failures import disk_full, failure_of, json_wanted, name_options, unparsed
+from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.learn_command import learn_command
@@ -41,7 +41,7 @@ from livebode.records import to_json
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
-class _Group(TyperGroup):
+class _HelpGroup(TyperGroup):
     """The group of commands, with help in colour."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -65,7 +65,7 @@ class _Command(TyperCommand):
         except typer.Exit:
             raise
         except Exception as error:
-            if not json_wanted() or not hasattr(error, "format_message"):
+            if not json_requested() or not hasattr(error, "format_message"):
                 raise
             raise unparsed(error, info_name) from None
 
@@ -79,7 +79,7 @@ class _Command(TyperCommand):
 
 
 app = typer.Typer(
-    cls=_Group,
+    cls=_HelpGroup,
     help="The Bode plot of a machine while the machine works.",
     no_args_is_help=True,
     add_completion=True,
@@ -142,7 +142,7 @@ def _fail(error: Exception) -> None:
     if disk_full(error):
         _discard_output()
     failure = failure_of(error)
-    _stop(to_json({"error": failure.error}) if json_wanted() else failure.text, failure.exit_code)
+    _stop(to_json({"error": failure.error}) if json_requested() else failure.text, failure.exit_code)
 
 
 def _prepare_process() -> None:

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from livebode.cli.failures import failure_of
-from livebode.cli.notices import Notices
+from livebode.cli.notices import NoticePrinter
 from livebode.cli.terminal import console
 from livebode.core import Event, LivebodeError
 from livebode.runtime import Session, StoppedError, Subscriber
@@ -33,13 +33,15 @@ class AxesTerminal:
         self._shown: dict[AxisThread, str] = {}
         self._looks = 0
 
-    def tell(self, name: str, event: Event) -> None:
+    def print_event(self, name: str, event: Event) -> None:
         """Print an event of an axis."""
         self._print(f"livebode: {name}: {event.message}" if name else f"livebode: {event.message}")
 
     def subscriber(self, name: str) -> Subscriber:
         """Prints the events of an axis that a person must act on."""
-        return Notices(lambda message: self._print(f"livebode: {name}: {message}" if name else f"livebode: {message}"))
+        return NoticePrinter(
+            lambda message: self._print(f"livebode: {name}: {message}" if name else f"livebode: {message}")
+        )
 
     def run(self, session: Session) -> None:
         """Run the session and show its state."""
@@ -55,7 +57,7 @@ class AxesTerminal:
     def leave(self, number: int, left: Mapping[str, Event]) -> None:
         """End the process immediately: recorded data are safe, and nothing else is waited for."""
         for name, event in left.items():
-            self.tell(name, event)
+            self.print_event(name, event)
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(128 + number)
@@ -68,7 +70,7 @@ class AxesTerminal:
                 continue
             self._shown[thread] = state
             if state == "refused" and several and not thread.ended_early:
-                self._print(f"livebode: {thread.name}: {said(thread.error)}")
+                self._print(f"livebode: {thread.name}: {cause_of(thread.error)}")
             elif several and not self._quiet and not table:
                 self._print(f"livebode: {thread.name}: {state}{_at(thread)}")
         self._looks += 1
@@ -89,7 +91,7 @@ def table_of(threads: list[AxisThread]) -> Table:
     return table
 
 
-def said(error: Exception | None) -> str:
+def cause_of(error: Exception | None) -> str:
     """The message of an error, or the traceback of an internal error."""
     if isinstance(error, (LivebodeError, StoppedError)) or error is None:
         return str(error)

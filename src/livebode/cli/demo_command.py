@@ -18,7 +18,7 @@ from livebode.configuration.axis import ServeSection
 from livebode.core import Responses
 from livebode.records import to_json
 from livebode.runtime import Destination, Document
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 
 _SHOWN = 4
 
@@ -61,7 +61,7 @@ def demo_command(
             def show_numbers(document: Document) -> None:
                 if isinstance(document, Responses):
                     bar.update(task, description=_numbers(document))
-                elif isinstance(document, Tracked):
+                elif isinstance(document, TrackerResults):
                     total = document.samples_total or document.samples
                     bar.update(task, completed=seconds * document.samples / total)
 

@@ -10,7 +10,7 @@ import typer
 
 from livebode.cli.options import Json
 from livebode.core import Responses, UsageError
-from livebode.records import Run, to_json
+from livebode.records import RunRecord, to_json
 
 _IN_PYTHON = {
     "xarray": "livebode.Run(path).responses.to_xarray(); --to netcdf writes a file that xarray opens",
@@ -36,7 +36,7 @@ def export_command(
     from livebode import export
 
     _check(to, at, mean, parameters, tuple(export.TABLES if parameters else export.FORMATS))
-    record = Run.open(run)
+    record = RunRecord.open(run)
     name = record.path.resolve()
     path = out or name.with_name(name.name + "-parameters" * parameters + export.ENDINGS[to])
     if parameters:

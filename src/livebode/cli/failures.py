@@ -30,7 +30,7 @@ def disk_full(error: Exception) -> bool:
     return isinstance(error, OSError) and error.errno in _FULL_DISK
 
 
-def json_wanted() -> bool:
+def json_requested() -> bool:
     """Whether the command line contains --json, even if it cannot be parsed."""
     return "--json" in sys.argv[1:]
 

@@ -11,7 +11,7 @@ from livebode.cli.options import Json
 from livebode.cli.pictures import show_fit
 from livebode.configuration import Axis
 from livebode.core import UsageError
-from livebode.records import Run, to_json
+from livebode.records import RunRecord, to_json
 
 
 def fit_command(
@@ -62,7 +62,7 @@ def fit_command(
         "hold": hold,
     }
     data = {"source": {"log": str(directory)}, "signals": {"output": "y"}}
-    own = recorded_configuration(Run.open(directory).summary).get("fit", {})
+    own = recorded_configuration(RunRecord.open(directory).summary).get("fit", {})
     section = Axis.of(data | {"fit": own | {k: v for k, v in given.items() if v is not None}}, "the options").fit
     assert section is not None
     found, words = fit_run(directory, section)

@@ -13,7 +13,7 @@ from livebode.core import OutputError
 from livebode.records import to_json
 
 if TYPE_CHECKING:
-    from livebode.monitoring import Baseline, Machine
+    from livebode.monitoring import Baseline, LearnedMachine
 
 _LATE_SAMPLES = 0.05  # less is not reported
 _MACHINE = ("stiffness", "load", "damping", "inertia")
@@ -35,7 +35,7 @@ def learn_command(
         )
     console = terminal.console(stderr=True)
     with console.status("reading the runs", spinner="line") as status:
-        baseline = learn(runs, say=status.update)
+        baseline = learn(runs, report=status.update)
     baseline.save(out)
     found = _found(baseline)
     print(to_json({"baseline": str(out)} | found) if as_json else f"{_sentences(found)}\n{out}")
@@ -46,8 +46,8 @@ def _found(baseline: Baseline) -> dict[str, Any]:
     from livebode.monitoring.table import STILL
 
     table, machine = baseline.tables[0], baseline.machine
-    stands = baseline.signals["schedule"] is not None and table.count.sum() == table.count[:, STILL].sum()
-    coarse = len(baseline.places) < PLACES and not stands
+    at_standstill = baseline.signals["schedule"] is not None and table.count.sum() == table.count[:, STILL].sum()
+    coarse = len(baseline.places) < PLACES and not at_standstill
     cells = int((table.count > 0).sum())
     found: dict[str, Any] = {
         "runs": list(baseline.runs),
@@ -107,7 +107,7 @@ def _ripple(model: dict[str, Any]) -> str:
     return text
 
 
-def _covariates(machine: Machine) -> list[dict[str, Any]]:
+def _covariates(machine: LearnedMachine) -> list[dict[str, Any]]:
     """Range of each covariate, and its influence in percent per unit."""
     c = machine.covariates
     return [
@@ -116,7 +116,7 @@ def _covariates(machine: Machine) -> list[dict[str, Any]]:
     ]
 
 
-def _between_runs(machine: Machine) -> dict[str, float]:
+def _between_runs(machine: LearnedMachine) -> dict[str, float]:
     """Standard deviation between healthy runs, in percent; empty if they do not differ."""
     if (between := machine.between) is None:
         return {}

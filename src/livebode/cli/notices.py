@@ -14,7 +14,7 @@ _KINDS = {
 _ONCE = {"foreign"}
 
 
-class Notices:
+class NoticePrinter:
     """A subscriber that prints events on which a person must act: on the record, the signals, the sender.
 
     Of a kind that repeats with every batch only the first is shown.

@@ -12,7 +12,7 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.options import Json
 from livebode.core import UsageError
-from livebode.records import Run, to_json
+from livebode.records import RunRecord, to_json
 
 
 def query_command(
@@ -35,7 +35,7 @@ def query_command(
             "give one of them",
             options=["--csv", "--json"],
         )
-    found = query(Run.open(run), sql, rows)
+    found = query(RunRecord.open(run), sql, rows)
     if as_json:
         plain = [[_plain(value) for value in row] for row in found.rows]
         print(to_json({"columns": found.columns, "rows": plain, "more": found.more}))

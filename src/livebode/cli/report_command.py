@@ -33,7 +33,7 @@ def report_command(
     """
     from livebode.core.clock import RunClock, moments_by
     from livebode.language import in_language
-    from livebode.records import Run, to_json
+    from livebode.records import RunRecord, to_json
     from livebode.reporting.report_data import Judged
     from livebode.reporting.run_report import run_report
 
@@ -43,10 +43,10 @@ def report_command(
         from livebode.configuration.axis import FitSection
         from livebode.configuration.recorded import recorded_configuration
 
-        section = FitSection.model_validate(recorded_configuration(Run.open(directory).summary).get("fit", {}))
+        section = FitSection.model_validate(recorded_configuration(RunRecord.open(directory).summary).get("fit", {}))
         found, notes = validate_run(directory, on, [section])
         judged = Judged(on.name, tuple(found), tuple(notes))
-    with moments_by(RunClock.of(Run.open(directory, on_damage=lambda _: None).summary)), in_language(language):
+    with moments_by(RunClock.of(RunRecord.open(directory, on_damage=lambda _: None).summary)), in_language(language):
         document = run_report(directory, judged, made=datetime.now(UTC))
         files, remark = write_documents(document, out or directory / "report", force=force or out is None)
     if as_json:

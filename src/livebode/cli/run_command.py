@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from livebode.cli import terminal
-from livebode.cli.notices import Notices
+from livebode.cli.notices import NoticePrinter
 from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import counted, drawing, show
 from livebode.cli.serving import SubscribersOf, served
@@ -18,7 +18,7 @@ from livebode.configuration.axis import ServeSection
 from livebode.core import ConfigError, LivebodeError, UsageError
 from livebode.records import to_json
 from livebode.runtime import Destination, Document, Draw, Outcome, Session, StoppedError, Subscriber, run
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 
 
 def run_command(
@@ -119,8 +119,8 @@ def run_command(
             "covariates": covariate or None,
         },
     }
-    said = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
-    over = {section: values for section, values in said.items() if values} | ({"record": {}} if go_on else {})
+    specified = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
+    over = {section: values for section, values in specified.items() if values} | ({"record": {}} if go_on else {})
     file = ConfigurationFile(target, over) if target.suffix.lower() == ".toml" else None
     axes = {"": _axis(target, over)} if file is None else file.read()
     directory = out or Path("runs") / target.stem
@@ -147,16 +147,16 @@ def _serving(axes: Axes) -> ServeSection:
     return first.serve
 
 
-def _axis(target: Path, said: dict[str, dict[str, Any]]) -> Axis:
+def _axis(target: Path, specified: dict[str, dict[str, Any]]) -> Axis:
     """The configuration of a recording from the options."""
-    if "output" not in said.get("signals", {}):
+    if "output" not in specified.get("signals", {}):
         raise UsageError(
             "missing",
             "the output channel is not named",
             "give --output CHANNEL (livebode inspect lists the channels)",
             argument="output",
         )
-    return Axis.of(said | {"source": said.get("source", {}) | {"log": target}}, "the options")
+    return Axis.of(specified | {"source": specified.get("source", {}) | {"log": target}}, "the options")
 
 
 def _window(text: str | None) -> int | str | None:
@@ -189,10 +189,12 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool, subscribers: tup
         task = bar.add_task("tracking", total=None)
 
         def show_progress(document: Document) -> None:
-            if isinstance(document, Tracked):
+            if isinstance(document, TrackerResults):
                 bar.update(task, completed=document.samples, total=document.samples_total)
 
-        notices = Notices(lambda message: bar.console.print(f"livebode: {message}", highlight=False, markup=False))
+        notices = NoticePrinter(
+            lambda message: bar.console.print(f"livebode: {message}", highlight=False, markup=False)
+        )
         return run(axis, Destination(directory, _drawing(axis), force, (*subscribers, show_progress, notices)))
 
 
@@ -212,7 +214,7 @@ def _run_axes(
         return Destination(directory / name, _drawing(axis), force, subscribers)
 
     shown = AxesTerminal(quiet=as_json)
-    session = Session(axes, to, tell=shown.tell, leave=shown.leave, file=file)
+    session = Session(axes, to, report=shown.print_event, leave=shown.leave, file=file)
     shown.run(session)
     if session.ended_by and all(thread.ended_early for thread in session.all):
         raise KeyboardInterrupt if session.ended_by == signal.SIGINT else SystemExit(128 + session.ended_by)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SubscribersOf = Callable[[str], tuple[Subscriber, ...]]
 
 
-def tell(sentence: str) -> None:
+def print_line(sentence: str) -> None:
     """Print a message on standard error."""
     print(f"livebode: {sentence}", file=sys.stderr, flush=True)
 
@@ -29,28 +29,28 @@ def dashboard_of(section: ServeSection, port: int | None) -> Dashboard:
 
     if port is not None:
         section = section.model_copy(update={"port": port})
-    return Dashboard(Serving.of(section), tell)
+    return Dashboard(Serving.of(section), print_line)
 
 
 @contextmanager
 def served(
-    wanted: bool, section: ServeSection, port: int | None, names: Sequence[str], stays: bool
+    required: bool, section: ServeSection, port: int | None, names: Sequence[str], stays: bool
 ) -> Iterator[SubscribersOf]:
     """A function that returns the subscribers of an axis by its name: the dashboard, or nobody.
 
     `names` are the axes that exist from the beginning; `stays` serves the page after the run until Ctrl-C.
     """
-    if not wanted:
+    if not required:
         yield lambda _: ()
         return
     dashboard = dashboard_of(section, port)
     for name in names:
         dashboard.hub(name)
     with dashboard:
-        tell(f"the dashboard is at {dashboard.url}")
+        print_line(f"the dashboard is at {dashboard.url}")
         yield lambda name: (dashboard.hub(name),)
         if stays:
-            tell(f"the run is finished; {dashboard.url} shows it until Ctrl-C")
+            print_line(f"the run is finished; {dashboard.url} shows it until Ctrl-C")
             wait_for_the_end()
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from livebode.cli.options import Excitation, Json, Output
-from livebode.records import Run, to_json
+from livebode.records import RunRecord, to_json
 
 if TYPE_CHECKING:
     from livebode.validation import Validation
@@ -40,7 +40,7 @@ def validate_command(
     from livebode.configuration.recorded import recorded_configuration
     from livebode.report import save_validation_picture
 
-    base = recorded_configuration(Run.open(directory).summary).get("fit", {}) | (
+    base = recorded_configuration(RunRecord.open(directory).summary).get("fit", {}) | (
         {} if radius is None else {"radius_m": radius}
     )
     named = [{"model": name} for name in model or []] or [{}]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from livebode.cli.options import Port
-from livebode.cli.serving import dashboard_of, tell, wait_for_the_end
+from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
 from livebode.configuration import Axis
 from livebode.configuration.axis import ServeSection
 
@@ -27,5 +27,5 @@ def view_command(
     for run in runs:
         dashboard.view(run)
     with dashboard:
-        tell(f"the dashboard is at {dashboard.url}")
+        print_line(f"the dashboard is at {dashboard.url}")
         wait_for_the_end()

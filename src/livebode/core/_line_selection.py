@@ -13,13 +13,13 @@ _NAMED = 2  # nearest lines in a message
 
 def position(lines: Lines, frequency_hz: ArrayLike) -> NDArray[np.intp]:
     """Positions of these frequencies among the lines, in the shape of `frequency_hz`; GridError for another one."""
-    wanted = np.asarray(frequency_hz, dtype=np.float64)
-    bins = wanted / lines.resolution_hz
+    required = np.asarray(frequency_hz, dtype=np.float64)
+    bins = required / lines.resolution_hz
     known = np.asarray(lines.bins)
     at = np.searchsorted(known, np.rint(bins)).clip(0, len(lines) - 1)
     off = ~(np.abs(known[at] - bins) < ON_GRID_BINS)
     if off.any():
-        raise _not_measured(lines, float(wanted[off].flat[0]))
+        raise _not_measured(lines, float(required[off].flat[0]))
     return np.asarray(at)
 
 

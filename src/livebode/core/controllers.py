@@ -37,7 +37,7 @@ def integral(frequency_hz: ArrayLike, rate_hz: float, rule: Rule) -> NDArray[np.
 
 
 @dataclass(frozen=True, kw_only=True)
-class Timing(Algebra):
+class DriveTiming(Algebra):
     """The parameters that all controllers in a drive have: a rate, a hold towards the faster inner loop, and a delay.
 
     Parameters
@@ -101,7 +101,7 @@ class Timing(Algebra):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PID(Timing):
+class PID(DriveTiming):
     """gain·(1 + I/Ti + Td·D/(1 + Tf·D)), the ideal form; P and PI are the same with fewer terms.
 
     I is the integrator by `integrator`, D the backward difference (1 − z⁻¹)·rate. Without `derivative_time_s` and
@@ -156,7 +156,7 @@ class PID(Timing):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PositionPD(Timing):
+class PositionPD(DriveTiming):
     """Gains on position and on differenced velocity, kv·(kp + D), for a loop that measures position.
 
     D is the backward difference of the mean of two neighbouring positions when `smoothed` (as in the EMPS
@@ -198,7 +198,7 @@ class Cascade(Algebra):
     """
 
     velocity: PID
-    position: Timing
+    position: DriveTiming
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)

@@ -110,10 +110,10 @@ class Lines:
 nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
         """
         check_window(window, rate_hz)
-        wanted = [f for item in text.split(",") for f in _frequencies(item.strip(), text, rate_hz, window)]
+        required = [f for item in text.split(",") for f in _frequencies(item.strip(), text, rate_hz, window)]
         resolution_hz = Fraction(rate_hz) / window
-        bins = [round(f / resolution_hz) for f in wanted]
-        for f, k in zip(wanted, bins):
+        bins = [round(f / resolution_hz) for f in required]
+        for f, k in zip(required, bins):
             if not 0 < f < Fraction(rate_hz) / 2:
                 raise GridError(
                     "above-nyquist",
@@ -123,7 +123,7 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
                     nyquist_hz=rate_hz / 2,
                 )
             if abs(f / resolution_hz - k) > ON_GRID_BINS:
-                raise _off_grid(f, wanted, rate_hz, window)
+                raise _off_grid(f, required, rate_hz, window)
         return cls.of_bins(bins, window, rate_hz)
 
     @classmethod
@@ -231,7 +231,7 @@ def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Frac
     return [(start + i * step) * unit for i in range(count)]
 
 
-def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: int) -> GridError:
+def _off_grid(line: Fraction, required: list[Fraction], rate_hz: float, window: int) -> GridError:
     resolution = Fraction(rate_hz) / window
     position = line / resolution
     near = [k * resolution for k in (floor(position), ceil(position)) if 0 < 2 * k < window]
@@ -239,7 +239,7 @@ def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: in
         f"the nearest {'lines are' if len(near) > 1 else 'line is'} {' and '.join(f'{float(f):.6g}' for f in near)} Hz"
     )
     # A rate of many digits must not hide the window; a line near 0 must not become 0, which every window fits.
-    shares = [(f / Fraction(rate_hz)).limit_denominator(10**6) or f / Fraction(rate_hz) for f in wanted]
+    shares = [(f / Fraction(rate_hz)).limit_denominator(10**6) or f / Fraction(rate_hz) for f in required]
     unit = lcm(*(share.denominator for share in shares))
     fitting: list[int] = []
     if unit <= 100 * window:  # a longer one is of no use

@@ -33,24 +33,24 @@ class Access:
     ----------
     serving
         Tokens, and whether the dashboard is read-only.
-    tell
+    report
         Called with a message once for each address that sends a wrong token.
     clock
         Monotonic time in seconds.
     """
 
     def __init__(
-        self, serving: Serving, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+        self, serving: Serving, report: Callable[[str], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._hashes: list[tuple[Role, bytes]] = []
         if serving.token is not None:
             self._hashes.append(("operator", _hash(serving.token)))
         if serving.viewer_token is not None:
             self._hashes.append(("viewer", _hash(serving.viewer_token)))
-        self._read_only, self._tell, self._clock = serving.read_only, tell, clock
+        self._read_only, self._report, self._clock = serving.read_only, report, clock
         self._sessions: OrderedDict[bytes, tuple[Role, float]] = OrderedDict()
         self._wrong: OrderedDict[str, tuple[int, float]] = OrderedDict()
-        self._told: OrderedDict[str, None] = OrderedDict()
+        self._reported: OrderedDict[str, None] = OrderedDict()
         self.refused = 0
 
     @property
@@ -116,15 +116,15 @@ class Access:
         self._wrong.move_to_end(address)
         if len(self._wrong) > _ADDRESSES_MAX:
             self._wrong.popitem(last=False)
-        self._tell_once(address)
+        self._report_once(address)
         return None
 
-    def _tell_once(self, address: str) -> None:
-        if address not in self._told:
-            self._tell(f"the dashboard rejected a wrong token from {address}")
-            self._told[address] = None
-            if len(self._told) > _ADDRESSES_MAX:
-                self._told.popitem(last=False)
+    def _report_once(self, address: str) -> None:
+        if address not in self._reported:
+            self._report(f"the dashboard rejected a wrong token from {address}")
+            self._reported[address] = None
+            if len(self._reported) > _ADDRESSES_MAX:
+                self._reported.popitem(last=False)
 
     def _limited(self, role: Role) -> Role:
         return "viewer" if self._read_only else role

@@ -21,7 +21,7 @@ from livebode.dashboard.client import Client
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
 from livebode.dashboard.past import Past
-from livebode.dashboard.places import Place
+from livebode.dashboard.places import ClientPlace
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.state import State
 from livebode.language import for_page, negotiated
@@ -163,7 +163,7 @@ class _Pages:
             await socket.close(1008)
             return
         client = Client(self._board, socket, role)
-        place = Place(role, address, client.displace)
+        place = ClientPlace(role, address, client.displace)
         if not self._board.places.take(place):
             await socket.close(1013)
             return

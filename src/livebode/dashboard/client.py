@@ -26,7 +26,7 @@ SLOW_S = 20.0
 DISPLACED = 4000
 """Code of a web socket that is closed for another browser; the page reconnects later."""
 _ROWS_AT_ONCE = 400
-_WISHES_PER_S = 20
+_REQUESTS_PER_S = 20
 
 
 class Client:
@@ -35,7 +35,7 @@ class Client:
     def __init__(self, board: Board, socket: WebSocket, role: str) -> None:
         self._board, self._socket, self._role = board, socket, role
         self._watched = ClientMessage("watch")
-        self._anew = True
+        self._restart = True
         self._paused = False
         self._displaced = asyncio.Event()
         self._reference: Responses | None = None
@@ -45,7 +45,7 @@ class Client:
         """Serve until the browser disconnects or exceeds a limit."""
         await self._socket.accept()
         hearing = asyncio.create_task(self._hear())
-        saying = asyncio.create_task(self._say())
+        saying = asyncio.create_task(self._send_news())
         displaced = asyncio.create_task(self._displaced.wait())
         tasks = {hearing, saying, displaced}
         try:
@@ -76,7 +76,7 @@ class Client:
             if now - since > 1:
                 count, since = 0, now
             count += 1
-            if count > _WISHES_PER_S:
+            if count > _REQUESTS_PER_S:
                 await self._socket.close(1008, "too many messages")
                 return
             try:
@@ -84,7 +84,7 @@ class Client:
                     raise ServerError("request-malformed", "a message is text, not bytes", "send text")
                 await self._heed(client_message(text, len(self._board.states)))
             except (LivebodeError, KeyError) as error:
-                await self._tell({"error": str(error)})
+                await self._send({"error": str(error)})
 
     async def _heed(self, asked: ClientMessage) -> None:
         if asked.kind == "watch":
@@ -93,7 +93,7 @@ class Client:
                 state.quantities.check(asked.quantity)
             if asked.axis != self._watched.axis:
                 self._reference = None
-            self._watched, self._anew = asked, True
+            self._watched, self._restart = asked, True
         elif asked.kind in ("pause", "resume"):
             self._paused = asked.kind == "pause"
             self._sent.pop("newest", None)
@@ -114,18 +114,18 @@ class Client:
     def _state(self) -> State:
         return self._board.states[self._watched.axis]
 
-    async def _say(self) -> None:
+    async def _send_news(self) -> None:
         while True:
             state = self._state
-            if self._anew:
-                self._anew = False
+            if self._restart:
+                self._restart = False
                 self._sent = {"notices": 0, "trends": state.trends.version, "rows": state.recent.count}
                 self._sent |= {"runs": state.runs, "finished": state.finished}
                 facts = state.facts() | {"role": self._role, "watched": state.shown(self._watched.quantity)}
                 trends = state.trends.plain(whole=True)
-                await self._tell({"facts": facts, "axes": self._board.names, "span": state.span(), "trends": trends})
+                await self._send({"facts": facts, "axes": self._board.names, "span": state.span(), "trends": trends})
             elif (self._sent["runs"], self._sent["finished"]) != (state.runs, state.finished):
-                self._anew = True
+                self._restart = True
                 continue
             await self._update(state)
             await self._board.pulse.wait_next()
@@ -142,7 +142,7 @@ class Client:
             news["newest"] = state.trends.plain(whole=False)
             self._sent["trends"] = state.trends.version
         if news:
-            await self._tell(news)
+            await self._send(news)
         if data := self._frames(state):
             await asyncio.wait_for(self._socket.send_bytes(data), SLOW_S)
 
@@ -172,5 +172,5 @@ class Client:
         self._sent[f"{what}_at"] = now
         return True
 
-    async def _tell(self, news: dict[str, Any]) -> None:
+    async def _send(self, news: dict[str, Any]) -> None:
         await asyncio.wait_for(self._socket.send_text(to_json(news)), SLOW_S)

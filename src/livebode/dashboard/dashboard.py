@@ -37,7 +37,7 @@ class Dashboard:
     ----------
     serving
         Address, tokens and TLS.
-    tell
+    report
         Called with messages about the server, such as a wrong token.
 
     Raises
@@ -48,8 +48,8 @@ class Dashboard:
         On entering, if the packages of the extra `dashboard` are missing.
     """
 
-    def __init__(self, serving: Serving, tell: Callable[[str], None] = lambda _: None) -> None:
-        self._serving, self._hears = serving, tell
+    def __init__(self, serving: Serving, report: Callable[[str], None] = lambda _: None) -> None:
+        self._serving, self._hears = serving, report
         self._states: list[State] = []
         self._viewed: dict[int, Viewed] = {}
         self._server: Any = None
@@ -129,7 +129,7 @@ class Dashboard:
         # Requests of strangers are not logged; Faults reports internal errors without a traceback for each.
         logging.getLogger("uvicorn").setLevel(logging.CRITICAL)
         logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
-        self._server = Server(config, self._socket, self._tell)
+        self._server = Server(config, self._socket, self._report)
         self._thread = threading.Thread(target=self._run, name="livebode dashboard", daemon=True)
         self._thread.start()
         until = time.monotonic() + _START_S
@@ -153,7 +153,7 @@ class Dashboard:
         self._socket.close()
         _logger.info("stopped")
 
-    def _tell(self, sentence: str) -> None:
+    def _report(self, sentence: str) -> None:
         """Log what a person should know, and tell it; what comes here is limited in its rate."""
         _logger.warning("%s", sentence)
         self._hears(sentence)
@@ -166,9 +166,9 @@ class Dashboard:
         from livebode.dashboard.board import Board
         from livebode.dashboard.server import Faults
 
-        self._faults = Faults(self._tell)
+        self._faults = Faults(self._report)
         asyncio.get_running_loop().set_exception_handler(self._faults.handler)
-        board = Board(self._states, self._viewed, Access(self._serving, self._tell))
+        board = Board(self._states, self._viewed, Access(self._serving, self._report))
         self._application = application(board, self._serving)
         beating = asyncio.create_task(board.run())
         beating.add_done_callback(self._stopped)
@@ -180,7 +180,7 @@ class Dashboard:
 
     def _stopped(self, task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (error := task.exception()) is not None:
-            self._tell(f"the dashboard stopped: internal error ({error!r}); the run continues")
+            self._report(f"the dashboard stopped: internal error ({error!r}); the run continues")
 
     async def _serve(self, scope: Any, receive: Any, send: Any) -> None:
         try:

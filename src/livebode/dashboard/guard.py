@@ -18,7 +18,7 @@ _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-_SAID = {
+_HEADERS = {
     "content-security-policy": _POLICY,
     "x-content-type-options": "nosniff",
     "x-frame-options": "DENY",
@@ -47,9 +47,9 @@ class Guard:
             return
         why = self._wrong(scope)
         if why:
-            await _refuse(scope, receive, _speaking(send, self._scheme == "https"), *why)
+            await _refuse(scope, receive, _with_headers(send, self._scheme == "https"), *why)
             return
-        await self._app(scope, receive, _speaking(send, self._scheme == "https"))
+        await self._app(scope, receive, _with_headers(send, self._scheme == "https"))
 
     def _wrong(self, scope: Scope) -> tuple[int, str] | None:
         headers = Headers(scope=scope)
@@ -89,18 +89,18 @@ class Guard:
         return True
 
 
-def _speaking(send: Send, tls: bool) -> Send:
-    async def say(message: Message) -> None:
+def _with_headers(send: Send, tls: bool) -> Send:
+    async def send_with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
-            for name, value in _SAID.items():
+            for name, value in _HEADERS.items():
                 headers[name] = value
             if tls:
                 headers["strict-transport-security"] = f"max-age={_YEAR_S}"
             headers.setdefault("cache-control", "no-store")
         await send(message)
 
-    return say
+    return send_with_headers
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: str) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from livebode.analysis.overview import Overview
 from livebode.core import Block, Event, Parameters, Responses
-from livebode.runtime.documents import ClockSet, Document, Fitted, RunEnded, RunStarted, Tracked
+from livebode.runtime.documents import ClockSet, Document, FitResults, RunEnded, RunStarted, TrackerResults
 from livebode.runtime.run_control import RunControl
 from livebode.sources.live import Health, LiveBlock
 
@@ -59,12 +59,12 @@ class Hub:
         match document:
             case Responses():
                 self._append(document, document.value.size)
-            case Fitted(parts):
+            case FitResults(parts):
                 self._append(parts, sum(part.value.size for part in parts))
             case Event():
                 with self._lock:
                     self._events.append(document)
-            case Tracked(block):
+            case TrackerResults(block):
                 self._count(block)
             case RunStarted():
                 self._begin(document)

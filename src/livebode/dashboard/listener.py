@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable
 
 from livebode.dashboard.access import network
-from livebode.dashboard.patience import PatientProtocol, Waiting
+from livebode.dashboard.patience import ClientWait, PatientProtocol
 
 CONNECTIONS_MAX = 128
 HANDSHAKE_S = 10.0
@@ -47,8 +47,8 @@ class _Connection:
         return self.socket.fileno() >= 0
 
     @property
-    def waits(self) -> Waiting:
-        return Waiting(self._since_s, HANDSHAKE_S) if self.protocol is None else self.protocol.waits
+    def waits(self) -> ClientWait:
+        return ClientWait(self._since_s, HANDSHAKE_S) if self.protocol is None else self.protocol.waits
 
     def drop(self) -> None:
         if self.protocol is not None:
@@ -72,7 +72,7 @@ class Listener:
         None for plain HTTP.
     protocol
         Creates the protocol of a connection.
-    tell
+    report
         Called at most once a minute with the number of connections that were closed for others.
     """
 
@@ -81,13 +81,13 @@ class Listener:
         listening: socket.socket,
         tls: ssl.SSLContext | None,
         protocol: Callable[[], PatientProtocol],
-        tell: Callable[[str], None],
+        report: Callable[[str], None],
     ) -> None:
-        self._socket, self._tls, self._protocol, self._tell = listening, tls, protocol, tell
+        self._socket, self._tls, self._protocol, self._report = listening, tls, protocol, report
         self._most = connections_max()
         self._connections: list[_Connection] = []
         self._closed: Counter[str] = Counter()
-        self._told_s = float("-inf")
+        self._reported_s = float("-inf")
 
     async def run(self) -> None:
         """Accept connections until it is cancelled."""
@@ -104,7 +104,7 @@ class Listener:
                 await asyncio.sleep(0)  # one at a time: with more, a request would be closed before it is read
         finally:
             sweeping.cancel()
-            self._say(float("inf"))
+            self._report_closed(float("inf"))
 
     def _take(self, taken: socket.socket, address: str, now_s: float) -> None:
         if not self._room(address):
@@ -161,15 +161,15 @@ class Listener:
             for connection in self._connections:
                 if connection.open and connection.waits.over(now_s):
                     connection.drop()
-            self._say(now_s)
+            self._report_closed(now_s)
 
-    def _say(self, now_s: float) -> None:
-        if not self._closed or now_s - self._told_s < _SENTENCE_S:
+    def _report_closed(self, now_s: float) -> None:
+        if not self._closed or now_s - self._reported_s < _SENTENCE_S:
             return
         (address, _), count = self._closed.most_common(1)[0], self._closed.total()
-        self._told_s, self._closed = now_s, Counter()
+        self._reported_s, self._closed = now_s, Counter()
         with contextlib.suppress(OSError):  # the terminal is closed
-            self._tell(
+            self._report(
                 f"the dashboard closed {count} connections, most of them from {address}: the limit is "
                 f"{self._most}, or {self._most // 2} from one address; the run continues"
             )

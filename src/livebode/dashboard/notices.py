@@ -68,7 +68,7 @@ class Notice:
         return {name: getattr(self, name) for name in names} | {"kinds": sorted(self.kinds)}
 
 
-class Notices:
+class EventCauses:
     """The causes of a run's events, the newest last."""
 
     def __init__(self) -> None:

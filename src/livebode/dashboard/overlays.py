@@ -17,10 +17,10 @@ from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Lines, LivebodeError, Quantity, Responses
 from livebode.dashboard.quantities import Quantities
 from livebode.dashboard.trends import Trends
-from livebode.fitting import Grid, PhysicalModel
+from livebode.fitting import EvaluationGrid, PhysicalModel
 
 if TYPE_CHECKING:
-    from livebode.monitoring import Table
+    from livebode.monitoring import ScheduleTable
 
 Floats = NDArray[np.float64]
 _GRID_POINTS = 240
@@ -32,17 +32,17 @@ def grid_hz(lines: Lines) -> Floats:
     return np.asarray(np.union1d(np.geomspace(f[0], f[-1], _GRID_POINTS), f))
 
 
-class Fitted:
+class FittedCurve:
     """The fitted model of a run as a curve, from its published parameters."""
 
     def __init__(self, quantities: Quantities, section: FitSection) -> None:
         self._quantities = quantities
         self.model: PhysicalModel = chosen_model(section, quantities.unit)
         self._newest: tuple[float, Floats] | None = None
-        self._grid = Grid(grid_hz(quantities.lines), quantities.lines.rate_hz, section.hold)
+        self._grid = EvaluationGrid(grid_hz(quantities.lines), quantities.lines.rate_hz, section.hold)
 
     @classmethod
-    def of(cls, summary: Mapping[str, Any], quantities: Quantities) -> Fitted | None:
+    def of(cls, summary: Mapping[str, Any], quantities: Quantities) -> FittedCurve | None:
         """Build it from the configuration; None without [fit], or if no plant is available."""
         words = recorded_configuration(dict(summary)).get("fit")
         if words is None or quantities.own != "plant":
@@ -85,7 +85,7 @@ class Fitted:
 class Healthy:
     """The baseline of a run, at the current position of the machine."""
 
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: ScheduleTable) -> None:
         self._table = table
 
     @classmethod
@@ -132,13 +132,13 @@ def _way(step: float, still: float) -> int:
     return FORTH if step > still else BACK if step < -still else STILL
 
 
-def overlays_of(summary: Mapping[str, Any], quantities: Quantities) -> tuple[Fitted | None, Healthy | None, str]:
+def overlays_of(summary: Mapping[str, Any], quantities: Quantities) -> tuple[FittedCurve | None, Healthy | None, str]:
     """Both overlays, and the reasons why a requested one is missing."""
     remarks = []
-    fitted: Fitted | None = None
+    fitted: FittedCurve | None = None
     healthy: Healthy | None = None
     try:
-        fitted = Fitted.of(summary, quantities)
+        fitted = FittedCurve.of(summary, quantities)
     except ValueError as error:
         remarks.append(f"the fitted model cannot be drawn: {error}")
     try:

@@ -11,7 +11,7 @@ import numpy as np
 from livebode.analysis.overview import Overview
 from livebode.core import Responses, ServerError
 from livebode.dashboard.state import State
-from livebode.records import Run
+from livebode.records import RunRecord
 
 ROWS_MAX = 2000
 _WHOLE = 0.95  # of the run: for longer spans the thinned copy in memory is equivalent
@@ -72,7 +72,7 @@ class Past:
             return _thinned(within, rows)
         found = Overview()
         found.add(within[0:0])
-        for part in Run.open(self.directory).between(from_s, to_s):
+        for part in RunRecord.open(self.directory).between(from_s, to_s):
             found.add(part)
         recorded = found.responses()
         return _thinned(recorded if len(recorded) else within, rows)
@@ -80,7 +80,7 @@ class Past:
     def all_between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """All responses of a span, in parts: from the record if it can be read, otherwise those in memory."""
         if self.readable:
-            yield from Run.open(self.directory).between(from_s, to_s)
+            yield from RunRecord.open(self.directory).between(from_s, to_s)
         elif self.recent is None or self.overview is None:
             raise ServerError("not-begun", "there is no response yet", "wait for the first window")
         else:
@@ -91,7 +91,7 @@ class Past:
         found = [part for part in (*self.shown, self.recent, self.overview) if part is not None]
         if self.readable and self.overview is not None:
             reach_s = 2 * self.overview.lines.window / self.overview.lines.rate_hz
-            found += Run.open(self.directory).between(time_s - reach_s, time_s + reach_s)
+            found += RunRecord.open(self.directory).between(time_s - reach_s, time_s + reach_s)
         best = _nearest(found, time_s)
         if best is None:
             raise ServerError("not-begun", "no response has a valid line yet", "wait for the first window")

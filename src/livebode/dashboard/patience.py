@@ -17,7 +17,7 @@ UNREAD_S = 20.0
 
 
 @dataclass(frozen=True)
-class Waiting:
+class ClientWait:
     """How long a connection waits for the client.
 
     Attributes
@@ -65,12 +65,12 @@ class PatientProtocol(H11Protocol):
         super().handle_websocket_upgrade(event)
 
     @property
-    def waits(self) -> Waiting:
+    def waits(self) -> ClientWait:
         if self._upgraded:  # the web socket has its own limits
-            return Waiting(self._since_s, None)
+            return ClientWait(self._since_s, None)
         if self.flow.write_paused:
-            return Waiting(self._unread_s, UNREAD_S)
+            return ClientWait(self._unread_s, UNREAD_S)
         asked: object = self.cycle  # None before the first request, which uvicorn's type omits
         if asked is not None and not self.cycle.response_complete and not self.cycle.more_body:
-            return Waiting(self._since_s, None)
-        return Waiting(self._since_s, IDLE_S if self._idle else REQUEST_S)
+            return ClientWait(self._since_s, None)
+        return ClientWait(self._since_s, IDLE_S if self._idle else REQUEST_S)

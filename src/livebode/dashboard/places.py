@@ -13,7 +13,7 @@ PLACES = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class ClientPlace:
     """The place of a browser: its role, its address, and the function that ends it."""
 
     role: Role
@@ -35,12 +35,12 @@ class Places:
 
     def __init__(self, open: bool) -> None:
         self._open = open
-        self._taken: list[Place] = []
+        self._taken: list[ClientPlace] = []
 
     def __len__(self) -> int:
         return len(self._taken)
 
-    def take(self, place: Place) -> bool:
+    def take(self, place: ClientPlace) -> bool:
         """Whether there is a place, which `leave` must return; another browser may be displaced."""
         if len(self._taken) >= PLACES:
             oldest = self._displaceable(place)
@@ -51,12 +51,12 @@ class Places:
         self._taken.append(place)
         return True
 
-    def leave(self, place: Place) -> None:
+    def leave(self, place: ClientPlace) -> None:
         """Return a place."""
         if place in self._taken:
             self._taken.remove(place)
 
-    def _displaceable(self, newcomer: Place) -> Place | None:
+    def _displaceable(self, newcomer: ClientPlace) -> ClientPlace | None:
         if not self._open:
             viewers = [place for place in self._taken if place.role == "viewer"]
             return viewers[0] if viewers and newcomer.role == "operator" else None

@@ -87,19 +87,19 @@ def client_message(text: str, axes: int) -> ClientMessage:
             "send a shorter one",
             limit_bytes=MESSAGE_BYTES_MAX,
         )
-    said = plain(text, "message")
-    kind = said.get("kind")
+    message = plain(text, "message")
+    kind = message.get("kind")
     if kind == "watch":
-        axis = said.get("axis", 0)
+        axis = message.get("axis", 0)
         if isinstance(axis, bool) or not isinstance(axis, int):
             raise UsageError("unreadable", "axis is not a whole number", "give the number of an axis", argument="axis")
-        quantity = said.get("quantity")
+        quantity = message.get("quantity")
         asked_for = None if quantity is None else _quantity(quantity)
         return ClientMessage(kind, _whole(str(axis)[:10], 0, axes - 1, "axis"), asked_for)
     if kind in ("pause", "resume", "unfreeze"):
         return ClientMessage(kind)
     if kind == "freeze":
-        time_s = said.get("time_s")
+        time_s = message.get("time_s")
         if time_s is not None:
             if isinstance(time_s, bool) or not isinstance(time_s, int | float):
                 raise UsageError("unreadable", "time_s is not a number", "give seconds", argument="time_s")
@@ -117,8 +117,8 @@ def client_message(text: str, axes: int) -> ClientMessage:
 
 def acknowledged(data: bytes, axes: int) -> tuple[int, str]:
     """Axis and event of an acknowledgement; LivebodeError if it is invalid."""
-    said = plain(data)
-    axis, event = said.get("axis"), said.get("event")
+    message = plain(data)
+    axis, event = message.get("axis"), message.get("event")
     if isinstance(axis, bool) or not isinstance(axis, int) or not isinstance(event, str) or len(event) > 64:
         raise ServerError("request-malformed", "the acknowledgement does not have an axis and an event", "send both")
     return _whole(str(axis)[:10], 0, axes - 1, "axis"), event
@@ -127,12 +127,12 @@ def acknowledged(data: bytes, axes: int) -> tuple[int, str]:
 def plain(data: bytes | str, what: str = "body") -> dict[str, Any]:
     """Parse a JSON object; ServerError if it is invalid."""
     try:
-        said = json.loads(data)
+        message = json.loads(data)
     except (ValueError, RecursionError):
         raise ServerError("request-malformed", f"the {what} is not JSON", "send an object of JSON") from None
-    if not isinstance(said, dict):
+    if not isinstance(message, dict):
         raise ServerError("request-malformed", f"the {what} is not an object of JSON", "send one")
-    return said
+    return message
 
 
 def _quantity(word: object) -> Quantity:

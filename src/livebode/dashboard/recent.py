@@ -13,7 +13,7 @@ _VALUES_MAX = 1 << 21
 _PARTS_MAX = 64
 
 
-class Recent:
+class RecentResponses:
     """The newest responses of a stream, one per `EVERY_S` of the machine's time."""
 
     def __init__(self) -> None:

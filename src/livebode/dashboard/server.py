@@ -26,18 +26,18 @@ class Server(uvicorn.Server):
         Configuration of uvicorn.
     listening
         Non-blocking socket.
-    tell
+    report
         Called with messages about closed connections.
     """
 
-    def __init__(self, config: uvicorn.Config, listening: socket.socket, tell: Callable[[str], None]) -> None:
+    def __init__(self, config: uvicorn.Config, listening: socket.socket, report: Callable[[str], None]) -> None:
         super().__init__(config)
-        self._listening, self._tell = listening, tell
+        self._listening, self._report = listening, report
         self._accepting: asyncio.Task[None] | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets=sockets or [])
-        listener = Listener(self._listening, self.config.ssl, self._protocol, self._tell)
+        listener = Listener(self._listening, self.config.ssl, self._protocol, self._report)
         self._accepting = asyncio.create_task(listener.run())
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
@@ -55,21 +55,21 @@ class Faults:
     A traceback for each would let an attacker fill the disk.
     """
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        self._tell = tell
-        self._count, self._told_s = 0, float("-inf")
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
+        self._count, self._reported_s = 0, float("-inf")
 
     def take(self, error: BaseException | None, what: str = "") -> None:
         """Report an error."""
         self._count += 1
         now_s = time.monotonic()
-        if now_s - self._told_s < _FAULT_EVERY_S:
+        if now_s - self._reported_s < _FAULT_EVERY_S:
             return
-        self._told_s = now_s
+        self._reported_s = now_s
         frames = traceback.extract_tb(error.__traceback__) if error is not None else []
         place = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""
         often = f", the {self._count}th" if self._count > 1 else ""
-        self._tell(f"internal error in the dashboard{often}: {what or repr(error)}{place}; the run continues")
+        self._report(f"internal error in the dashboard{often}: {what or repr(error)}{place}; the run continues")
 
     def handler(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """Handler for `loop.set_exception_handler`."""

@@ -20,13 +20,13 @@ from livebode.core import Event, LivebodeError, Quantity, Responses
 from livebode.core.clock import RunClock
 from livebode.dashboard.frames import curve, frame
 from livebode.dashboard.hub import Hub, Item
-from livebode.dashboard.notices import Notices
-from livebode.dashboard.overlays import Fitted, Healthy, grid_hz, overlays_of
+from livebode.dashboard.notices import EventCauses
+from livebode.dashboard.overlays import FittedCurve, Healthy, grid_hz, overlays_of
 from livebode.dashboard.quantities import QUANTITIES, Quantities
-from livebode.dashboard.recent import Recent
+from livebode.dashboard.recent import RecentResponses
 from livebode.dashboard.trends import Trends
 from livebode.margins import peak_sensitivity_at_lines
-from livebode.records import Run, to_json
+from livebode.records import RunRecord, to_json
 
 _SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _PACE_S = 3.0
@@ -50,7 +50,7 @@ class State:
         self._begun: Mapping[str, Any] | None = None
         self._empty()
         self._summary: Mapping[str, Any] = {}
-        self._fitted: Fitted | None = None
+        self._fitted: FittedCurve | None = None
         self._healthy: Healthy | None = None
         self._remark = ""
         self._grew = float("-inf")
@@ -58,10 +58,10 @@ class State:
 
     def _empty(self) -> None:
         self.newest: Responses | None = None
-        self.recent = Recent()
+        self.recent = RecentResponses()
         self._shared = None if self.hub is None else self.hub.overview
         self.overview = self._shared or Overview()
-        self.trends, self.notices = Trends(), Notices()
+        self.trends, self.notices = Trends(), EventCauses()
         self.first_s = self.last_s = float("nan")
         self.finished = False
         self._seen = 0
@@ -114,7 +114,7 @@ class State:
         if "record" not in self._summary or self.directory is None:
             return
         with suppress(LivebodeError):  # it has just started
-            self.take(list(Run.open(self.directory).events()))
+            self.take(list(RunRecord.open(self.directory).events()))
 
     def renewed(self, summary: Mapping[str, Any], finished: bool) -> None:
         """Take the current run.json."""

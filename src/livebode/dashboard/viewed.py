@@ -14,7 +14,7 @@ from livebode.core import Event, Responses
 from livebode.dashboard.hub import Item
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import Rows
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.grouped_events import still_waiting
 
 
@@ -23,7 +23,7 @@ class Viewed:
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
-        self._run = Run.open(directory)
+        self._run = RunRecord.open(directory)
         self._sample = self._parameter_sample = -1
         self._last_s = -inf
         self._events = 0
@@ -43,7 +43,7 @@ class Viewed:
 
     def more(self) -> tuple[list[Item], list[tuple[str, str, str, Rows]], dict[str, Any], bool]:
         """Pass new data: responses and events, rows of parameters, run.json, and whether the run has ended."""
-        self._run = Run.open(self.directory)
+        self._run = RunRecord.open(self.directory)
         behind_s = self._last_s, inf  # earlier segments are not read again
         items: list[Item] = [new for part in self._run.between(*behind_s) if (new := self._new(part)) is not None]
         rows = list(self._parameters(behind_s))

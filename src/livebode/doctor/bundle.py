@@ -16,7 +16,7 @@ from livebode.doctor.secrets import Secrets
 from livebode.doctor.subject import Subject
 from livebode.doctor.versions import versions
 from livebode.export import save
-from livebode.records import Run, to_json
+from livebode.records import RunRecord, to_json
 
 PART_BYTES_MAX = 2 << 20
 """Of each file in the bundle, before it is compressed."""
@@ -81,12 +81,12 @@ def _parts(subject: Subject, checks: Sequence[Check]) -> Iterator[tuple[str, str
         yield f"logs/{log.name}", secrets.text(_end_of(log))
 
 
-def _summary(run: Run, secrets: Secrets) -> str:
+def _summary(run: RunRecord, secrets: Secrets) -> str:
     configuration = secrets.configuration(run.summary.get("configuration", {}))
     return _json(secrets.plain({**run.summary, "configuration": {}}) | {"configuration": configuration})
 
 
-def _newest_events(run: Run, secrets: Secrets) -> str:
+def _newest_events(run: RunRecord, secrets: Secrets) -> str:
     lines: deque[str] = deque(maxlen=EVENTS_MAX)
     try:
         for event in run.each_event():

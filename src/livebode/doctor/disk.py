@@ -10,12 +10,12 @@ from pathlib import Path
 
 from livebode.doctor.check import Check
 from livebode.records.segments.disk import why
-from livebode.records.segments.limits import Limits
+from livebode.records.segments.limits import SegmentLimits
 
 NAME = "disk"
 FREE_BYTES_MIN = 10**9
 """Below this much a warning is due."""
-SYNC_S_MAX = Limits.interval_s
+SYNC_S_MAX = SegmentLimits.interval_s
 """A record is synced this often; a slower disk loses more at a power cut."""
 _PIECE_BYTES, _SYNCS = 64 << 10, 5
 

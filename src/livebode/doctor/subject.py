@@ -14,7 +14,7 @@ from livebode.configuration.toml_file import parse_table, read_bytes
 from livebode.core import LivebodeError, UsageError
 from livebode.doctor.problem import problem_of
 from livebode.experiments.experiment import Experiment
-from livebode.records import Run
+from livebode.records import RunRecord
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Subject:
     table: Mapping[str, Any] | None = None
     experiment: bool = False
     axes: Mapping[str, Axis] = field(default_factory=dict)
-    run: Run | None = None
+    run: RunRecord | None = None
     run_path: Path | None = None
     problems: Mapping[str, LivebodeError] = field(default_factory=dict)
 
@@ -74,11 +74,11 @@ def _read(configuration: Path | None, run_path: Path | None) -> Subject:
     problems: dict[str, LivebodeError] = {}
     table: Mapping[str, Any] | None = None
     axes: Mapping[str, Axis] = {}
-    run: Run | None = None
+    run: RunRecord | None = None
     experiment = False
     if run_path is not None:
         try:
-            run = Run.open(run_path, on_damage=lambda _: None)
+            run = RunRecord.open(run_path, on_damage=lambda _: None)
             if configuration is None:
                 axes = {"": Axis.of(recorded_configuration(run.summary), str(run_path))}
         except LivebodeError as error:

@@ -11,7 +11,7 @@ from scipy.signal import detrend
 from scipy.signal.windows import hann
 
 from livebode.core import SignalError
-from livebode.estimation.mains import HARMONICS, MAINS_HZ, stands_out_by
+from livebode.estimation.mains import HARMONICS, MAINS_HZ, prominence
 from livebode.estimation.silence import STEADY
 
 Floats = NDArray[np.float64]
@@ -110,7 +110,7 @@ def _tone(power: Floats, expected: float, multiples: NDArray[np.int64]) -> tuple
     beside = beside[(beside > 0) & (beside < mean.size)]
     others = multiples[np.abs(multiples - at) > _LOBE + reach]
     beside = beside[np.abs(beside[:, np.newaxis] - others).min(axis=1, initial=mean.size) > _LOBE]
-    if beside.size < _BESIDE.size // 2 or mean[at] <= stands_out_by(beside.size // 2) * mean[beside].mean():
+    if beside.size < _BESIDE.size // 2 or mean[at] <= prominence(beside.size // 2) * mean[beside].mean():
         return None
     of_part = power[:, lobe].sum(axis=1)
     by_noise = _NOISE * np.sqrt(mean[beside].mean() / of_part.mean())

@@ -91,7 +91,7 @@ class _Neighbours:
         count = self._usable.sum(axis=1)
         self._count = np.maximum(count, 1)
         self._enough = count >= distances.size // 2
-        self._times = np.array([stands_out_by(n) for n in count])
+        self._times = np.array([prominence(n) for n in count])
 
     @property
     def bins(self) -> NDArray[np.int64]:
@@ -107,7 +107,7 @@ class _Neighbours:
         return np.asarray(self._enough & (power[self.tones] > self._times * level))
 
 
-def stands_out_by(neighbours: int) -> float:
+def prominence(neighbours: int) -> float:
     """Ratio to the mean power of its neighbours that a bin of noise exceeds with a probability of 1e-8."""
     return float(neighbours * (_CHANCE ** (-1 / max(neighbours, 1)) - 1))
 

@@ -235,15 +235,15 @@ def default_hop(window: int) -> int:
     return nearest_hop(window, window / 20)
 
 
-def nearest_hop(window: int, wanted: float) -> int:
-    """The divisor of the window nearest to a hop of `wanted` samples (by ratio), so that all hops are equal.
+def nearest_hop(window: int, required: float) -> int:
+    """The divisor of the window nearest to a hop of `required` samples (by ratio), so that all hops are equal.
 
     >>> nearest_hop(400, 200.0), nearest_hop(250, 100.0), nearest_hop(100, 200.0)
     (200, 125, 100)
     """
-    wanted = min(max(1.0, wanted), float(window))
+    required = min(max(1.0, required), float(window))
     small = [d for d in range(1, isqrt(window) + 1) if window % d == 0]
     divisors = small + [window // d for d in small]
-    nearest = min(divisors, key=lambda d: max(d / wanted, wanted / d))
+    nearest = min(divisors, key=lambda d: max(d / required, required / d))
     # A prime window has no divisor nearby; a longer last step in each period is then better.
-    return nearest if max(nearest / wanted, wanted / nearest) <= 4 else round(wanted)
+    return nearest if max(nearest / required, required / nearest) <= 4 else round(required)

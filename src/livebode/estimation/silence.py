@@ -48,17 +48,17 @@ class SilentHum(StatefulBase):
         """Which lines have hum, shape (lines,)."""
         return np.asarray(self._found > 0)
 
-    def take(self, power: Floats, stands_out: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def take(self, power: Floats, is_prominent: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """A period without excitation: the power at each line, and whether it is that of a tone.
 
         Returns the lines whose hum is withdrawn, shape (lines,).
         """
         self._power[:-1] = self._power[1:]
-        self._power[-1] = np.where(stands_out, power, np.nan)
+        self._power[-1] = np.where(is_prominent, power, np.nan)
         self._counts[0] += 1
         if self._counts[0] >= _PERIODS:
             self._find(_PERIODS)
-        self._low = np.where((power < _GONE * self._found) & ~stands_out, self._low + 1, 0.0)
+        self._low = np.where((power < _GONE * self._found) & ~is_prominent, self._low + 1, 0.0)
         gone = self._low >= _GONE_PERIODS
         self._found[gone] = 0.0
         return np.asarray(gone)

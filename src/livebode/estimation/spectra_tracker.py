@@ -28,7 +28,7 @@ from livebode.estimation.line_stage import LineStage
 from livebode.estimation.ripple import HopSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import Rows, after
-from livebode.estimation.spectra_watch import SpectraWatch
+from livebode.estimation.spectra_watch import SpectraInputStatistics
 from livebode.estimation.stream_estimator import StreamEstimator
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 _NONE = np.zeros(0, dtype=np.intp)
 
 
-class SpectraTracker(StreamEstimator[SpectraWatch]):
+class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
     """Frequency responses of a machine whose drive runs the kernel and sends the spectra: a Tracker without its kernel.
 
     With a kernel of the same precision the Responses equal those of a Tracker from the samples. The effective time of
@@ -78,7 +78,7 @@ class SpectraTracker(StreamEstimator[SpectraWatch]):
         advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
         differenced = np.array(layout.differenced)[self._signals]
         self._after = after(bins, layout.window, differenced, advanced)[:, np.newaxis]
-        self._watch = SpectraWatch(self._events, layout.window)
+        self._watch = SpectraInputStatistics(self._events, layout.window)
         self._range = PlausibleRange(len(self._signals), max(1, layout.window // layout.hop))
         self._speed = HopSpeed(settings.lines.rate_hz) if settings.ripple else None
         self._parts = {

@@ -15,7 +15,7 @@ _KINDS = {
 }
 
 
-class SpectraWatch(StreamCounters):
+class SpectraInputStatistics(StreamCounters):
     """Counts and Events of a stream of Spectra. One Event for marked windows that overlap or follow each other."""
 
     _stage = Stage("spectra-counts", 1)

@@ -16,10 +16,10 @@ from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
 from livebode.estimation.stream_estimator import StreamEstimator
-from livebode.estimation.watch import Watch
+from livebode.estimation.watch import InputStatistics
 
 
-class Tracker(StreamEstimator[Watch]):
+class Tracker(StreamEstimator[InputStatistics]):
     """Frequency responses of a machine in closed loop, sample by sample, from a sliding DFT at excited lines.
 
     The Responses do not depend on how the samples are cut into Blocks, and a restored Tracker continues as if it had
@@ -68,7 +68,7 @@ class Tracker(StreamEstimator[Watch]):
         self._centre = Centre(window)
         self._speed = RippleSpeed(settings.lines) if settings.ripple else None
         self._repeating = RepeatingErrors(settings, self._events) if repeating else None
-        self._watch = Watch(self._events, window)
+        self._watch = InputStatistics(self._events, window)
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,

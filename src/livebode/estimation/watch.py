@@ -15,7 +15,7 @@ _KINDS = {
 }
 
 
-class Watch(StreamCounters):
+class InputStatistics(StreamCounters):
     """Counts and Events of a stream of Blocks."""
 
     _stage = Stage("sample-counts", 1)

@@ -75,8 +75,8 @@ def _fundamental_of(calm: Floats) -> int:
             pass
     flat, peaks = whitened(calm)
     d = difference(calm)
-    standing_out = difference(peaks)
-    views = [_judged(calm, d), _judged(flat, standing_out)]
+    prominent = difference(peaks)
+    views = [_judged(calm, d), _judged(flat, prominent)]
     needed = np.log(FALSE_ALARM) - np.log(calm.size)  # two views of half as many lags
     evidence, period, view = min(views, key=lambda v: v[0])
     # A shorter lag has more periods as evidence; the other is used where the recording repeats twice as well.
@@ -85,10 +85,10 @@ def _fundamental_of(calm: Floats) -> int:
     fundamental = 0
     if evidence <= needed:
         start, stop = extent(view, period)
-        fundamental = _fundamental(view[start:stop], period, (d, standing_out))
+        fundamental = _fundamental(view[start:stop], period, (d, prominent))
     if short := _too_short(flat, d, fundamental):
         raise short
-    repeats = min(d[fundamental], standing_out[fundamental]) <= _DIFFERENT_MAX
+    repeats = min(d[fundamental], prominent[fundamental]) <= _DIFFERENT_MAX
     if fundamental and repeats and _steady_at_lines(view[start:stop], fundamental):
         return fundamental
     half = calm.size // 2

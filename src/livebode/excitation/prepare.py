@@ -21,7 +21,7 @@ _BAND_RATIO, _BAND_BINS = 2 ** (1 / 6), 4
 # dominate the result. In power.
 _WHITEN_FLOOR = 1e-6
 # Noise passes ten times its median power in one bin of a thousand (exponential distribution: 2^-10).
-_STANDS_OUT = 10.0
+_PROMINENT = 10.0
 _STRAIGHT = 1e-12  # of the largest sample: the rounding of a ramp in double precision
 
 
@@ -114,7 +114,7 @@ def whitened(x: Floats) -> tuple[Floats, Floats]:
     spectrum[0] = 0
     spectrum[1:] /= np.sqrt(background[1:])
     flat = scipy.fft.irfft(spectrum, size)[: x.size]
-    spectrum[power < _STANDS_OUT * background] = 0
+    spectrum[power < _PROMINENT * background] = 0
     return flat, scipy.fft.irfft(spectrum, size)[: x.size]
 
 

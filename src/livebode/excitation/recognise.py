@@ -12,7 +12,7 @@ from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.crest import peak_and_rms
 from livebode.excitation.period import find_period
 from livebode.excitation.prepare import checked, clipped, filled
-from livebode.excitation.significance import FLOOR_DB, GAP_DB, Found, find_lines
+from livebode.excitation.significance import FLOOR_DB, GAP_DB, BinClasses, find_lines
 from livebode.excitation.slips import Slip, find_slips, realigned
 from livebode.excitation.snr import snr_db
 from livebode.excitation.transient import leading, unlike
@@ -210,7 +210,7 @@ def _periods(samples: Floats, period: int, lines: Flags) -> tuple[Floats, Flags]
     return blocks, strange
 
 
-def _lines(found: Found, period: int, rate_hz: float) -> Lines:
+def _lines(found: BinClasses, period: int, rate_hz: float) -> Lines:
     bins = _numbers(found.excited)
     taken = found.excited | found.distortion
     quiet = tuple(k for k in range(bins[0], bins[-1]) if not taken[k])

@@ -43,5 +43,5 @@ def equal_snr(response: ArrayLike, noise: ArrayLike = 1.0) -> Floats:
             argument="response",
             line=line,
         )
-    wanted = np.asarray(noise, dtype=np.float64) / size
-    return np.asarray(wanted / np.sqrt(np.mean(wanted**2)))
+    required = np.asarray(noise, dtype=np.float64) / size
+    return np.asarray(required / np.sqrt(np.mean(required**2)))

@@ -28,7 +28,7 @@ _NOISE_DOF = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class BinClasses:
     """Classification of the bins; the shape of each is (bins,), bin 0 first.
 
     Attributes
@@ -81,7 +81,7 @@ def _averaged(power: Floats, reach: int) -> tuple[Floats, NDArray[np.int64]]:
     return (sums[last] - sums[np.minimum(first, last)]) / width, width
 
 
-def find_lines(periods: Complex, floor_db: float = FLOOR_DB, gap_db: float = GAP_DB) -> Found:
+def find_lines(periods: Complex, floor_db: float = FLOOR_DB, gap_db: float = GAP_DB) -> BinClasses:
     """The bins of the excitation among those with significant power.
 
     Parameters
@@ -106,7 +106,7 @@ def find_lines(periods: Complex, floor_db: float = FLOOR_DB, gap_db: float = GAP
     excited = power.copy()
     if excited.any() and _measured(periods, mean):
         excited &= mean >= _step(mean[excited], gap_db)
-    return Found(mean, excited, power & ~excited)
+    return BinClasses(mean, excited, power & ~excited)
 
 
 def _measured(periods: Complex, mean: Floats) -> bool:

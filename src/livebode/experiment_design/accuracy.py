@@ -19,7 +19,7 @@ HOLDING_95 = sqrt(log(20))
 
 
 @dataclass(frozen=True, eq=False)
-class Accuracy:
+class LineAccuracy:
     """Standard deviation due to noise at each line of one window; shapes (lines,).
 
     Attributes
@@ -54,7 +54,7 @@ class Accuracy:
         return HOLDING_95 * float(self.relative.max()) / accuracy
 
 
-def accuracy_of(waveform: Waveform, machine: Machine) -> Accuracy:
+def accuracy_of(waveform: Waveform, machine: Machine) -> LineAccuracy:
     """Sigma of one window of the joint or indirect estimate, sigma² = N·σ²/|U_k|², worst over the places.
 
     For white noise of standard deviation σ on the output, to first order in noise over signal, in the periodic state.
@@ -68,4 +68,4 @@ def accuracy_of(waveform: Waveform, machine: Machine) -> Accuracy:
         here = machine.noise * np.sqrt(waveform.lines.window) / (seen * np.abs(machine.torque(place, f)))
         share = here / np.abs(place.plant.response(f))
         sigma, relative = np.where(share > relative, here, sigma), np.maximum(share, relative)
-    return Accuracy(sigma, relative)
+    return LineAccuracy(sigma, relative)

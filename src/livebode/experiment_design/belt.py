@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.experiment_design.machine import STANDING, Extremes, Machine, Place, Quantity, check_noise
+from livebode.experiment_design.machine import STANDSTILL, Extremes, Machine, OperatingPoint, Quantity, check_noise
 from livebode.simulation import BeltAxis, Sampled, SimulatedAxis
 
 Floats = NDArray[np.float64]
 
 _PLACES = 9
-_STANDING_S = 2.0  # of the simulation that finds the effect of the noise alone
+_STANDSTILL_S = 2.0  # of the simulation that finds the effect of the noise alone
 _DRY = "dry friction is not included: at standstill the axis moves less than predicted, and its responses are biased"
 
 
@@ -30,7 +30,7 @@ def belt_machine(axis: BeltAxis) -> Machine:
     moves = position_m.size > 1
     low, high = float(position_m.min()), float(position_m.max())
     at_m = np.linspace(low, high, _PLACES) if moves else np.array([low])
-    seconds = position_m.size / axis.drive.rate_hz if moves else _STANDING_S
+    seconds = position_m.size / axis.drive.rate_hz if moves else _STANDSTILL_S
     block, truth = SimulatedAxis(replace(quiet, seconds=(1 + moves) * seconds)).run()
     radius, again = axis.mechanics.radius_m, moves * position_m.size
     observed: dict[Quantity, Floats] = {
@@ -56,15 +56,15 @@ def _extremes(observed: dict[Quantity, Floats], here: NDArray[np.bool_], at_m: f
     if (
         not here.any()
     ):  # a place that the cart never approached within half the distance to the next: as at standstill there
-        return STANDING | {"travel": (at_m, at_m)}
+        return STANDSTILL | {"travel": (at_m, at_m)}
     return {name: (float(x[here].min()), float(x[here].max())) for name, x in observed.items()}
 
 
-def _place(axis: BeltAxis, at_m: float, motion: Extremes) -> Place:
+def _place(axis: BeltAxis, at_m: float, motion: Extremes) -> OperatingPoint:
     linear, rate_hz, radius = axis.linear(at_m), axis.drive.rate_hz, axis.mechanics.radius_m
     velocity, angle = linear.sampled(rate_hz), linear.out("position").sampled(rate_hz)
     differenced = Sampled(angle.a, angle.b, angle.c, rate_hz, differenced=True)
-    return Place(
+    return OperatingPoint(
         plant=differenced if axis.sensor.velocity_differenced else velocity,
         speed=radius * velocity,
         travel=linear.out("cart").sampled(rate_hz),

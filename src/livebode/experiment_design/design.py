@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from livebode.experiment_design.accuracy import Accuracy, Floats
+from livebode.experiment_design.accuracy import Floats, LineAccuracy
 from livebode.experiment_design.encoder import encoder_counts
 from livebode.experiment_design.limits import MachineLimits
 from livebode.experiment_design.machine import UNITS, Machine
@@ -51,7 +51,7 @@ class Design:
     amplitude_n_m: float | list[float]
     limits: MachineLimits
     peaks: tuple[Peak, ...]
-    accuracy: Accuracy
+    accuracy: LineAccuracy
     windows: int
     recording_s: float
     hop: int

@@ -9,7 +9,7 @@ import numpy as np
 from livebode.core import counted
 from livebode.experiment_design.design import Choice, Design
 from livebode.experiment_design.encoder import encoder_words
-from livebode.experiment_design.grid import Grid
+from livebode.experiment_design.grid import LineChoice
 from livebode.experiment_design.limits import MachineLimits
 from livebode.experiment_design.machine import UNITS, Quantity
 from livebode.experiment_design.mains import mains_words
@@ -19,7 +19,7 @@ _LISTED_MAX = 4  # amplitudes
 _LONG_S = 3600.0
 
 
-def explained(design: Design, found: Grid, amplitude_why: str, recording_why: str) -> tuple[Choice, ...]:
+def explained(design: Design, found: LineChoice, amplitude_why: str, recording_why: str) -> tuple[Choice, ...]:
     """The table: chosen values and reasons."""
     waveform, lines, machine = design.waveform, design.waveform.lines, design.machine
     f, window_s = lines.frequency_hz, lines.window / lines.rate_hz
@@ -39,8 +39,8 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
     ]
     rows += [_limit_row(peak, design.limits) for peak in worst(design.peaks).values()]
     if machine.noise > 0:
-        told = f"at {f[weakest]:g} Hz after {counted(design.windows, 'window')}; σ = {machine.noise:g}"
-        rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", told))
+        reason = f"at {f[weakest]:g} Hz after {counted(design.windows, 'window')}; σ = {machine.noise:g}"
+        rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", reason))
     if (counts := design.encoder_counts) is not None:
         rows.append(Choice("encoder", *encoder_words(counts, f, moves=machine.stroke_s is not None)))
     rows.append(Choice("recording", _duration(design.recording_s), recording_why))
@@ -66,8 +66,8 @@ def _amplitude(design: Design) -> str:
     amplitude = design.amplitude_n_m
     if isinstance(amplitude, list):
         few = len(amplitude) <= _LISTED_MAX
-        told = ", ".join(f"{a:.4g}" for a in amplitude) if few else f"{min(amplitude):.4g} … {max(amplitude):.4g}"
-        return f"{told} N m"
+        reason = ", ".join(f"{a:.4g}" for a in amplitude) if few else f"{min(amplitude):.4g} … {max(amplitude):.4g}"
+        return f"{reason} N m"
     return f"{amplitude:.4g} N m" + ", rms of the lines" * (design.waveform.about.get("shape") == "equal snr")
 
 

@@ -27,7 +27,7 @@ _WORTH_FACTORS = 1000  # a longer window, due to lines typed with many digits, i
 
 
 @dataclass(frozen=True)
-class Grid:
+class LineChoice:
     """Lines with their window, the reason for them, and the parameters of a PRBS."""
 
     lines: Lines
@@ -40,7 +40,7 @@ class Grid:
     mains: tuple[int, ...] = ()  # bins of the band that are not used because of the mains
 
 
-def grid(spec: ExperimentSpec, rate_hz: float) -> Grid:
+def grid(spec: ExperimentSpec, rate_hz: float) -> LineChoice:
     """The lines and the window of a specification.
 
     Raises
@@ -75,7 +75,7 @@ def _too_many(spec: ExperimentSpec, lines: Lines) -> GridError:
     )
 
 
-def _found(spec: ExperimentSpec, rate_hz: float) -> Grid:
+def _found(spec: ExperimentSpec, rate_hz: float) -> LineChoice:
     if spec.lines is not None:
         return _stepped(spec, _of_text(spec, spec.lines, rate_hz))
     assert spec.band_hz is not None
@@ -88,18 +88,18 @@ def _found(spec: ExperimentSpec, rate_hz: float) -> Grid:
     apart = 1 if spec.kind in ("chirp", "stepped") else _QUIET_BETWEEN
     window, why = (spec.window, "as given") if spec.window else _window(spec.resolution_hz or 0.0, apart, rate_hz)
     if spec.kind == "chirp":
-        return Grid(chirp_lines(low, high, rate_hz, window), why, "every bin of the band")
+        return LineChoice(chirp_lines(low, high, rate_hz, window), why, "every bin of the band")
     if spec.kind == "stepped":
         first, last = ceil(low * window / rate_hz - 1e-9), floor(high * window / rate_hz + 1e-9)
         bins = [k for k in range(max(first, 1), last + 1) if 2 * k < window]
         if not bins:
             raise _no_line(low, high, 1, window, rate_hz)
         bins, mains = _without_mains(spec, bins, rate_hz / window)
-        return _stepped(spec, Grid(Lines.of_bins(bins, window, rate_hz), why, "the band's bins", mains=mains))
+        return _stepped(spec, LineChoice(Lines.of_bins(bins, window, rate_hz), why, "the band's bins", mains=mains))
     return _odd(spec, low, high, window, rate_hz, why)
 
 
-def _odd(spec: ExperimentSpec, low: float, high: float, window: int, rate_hz: float, why: str) -> Grid:
+def _odd(spec: ExperimentSpec, low: float, high: float, window: int, rate_hz: float, why: str) -> LineChoice:
     """Odd bins: with even bins only, the excitation would repeat after half the window."""
     all_odd = odd_bins(low, high, rate_hz, window).tolist()
     if not all_odd:
@@ -110,9 +110,9 @@ def _odd(spec: ExperimentSpec, low: float, high: float, window: int, rate_hz: fl
         words = (
             "odd bins, one in four of them not excited, at random: noise and distortion show there and at the even ones"
         )
-        return Grid(lines, why, words, mains=mains)
+        return LineChoice(lines, why, words, mains=mains)
     words = "odd bins; the even ones between show noise and even distortion"
-    return Grid(Lines.of_bins(bins, window, rate_hz), why, words, mains=mains)
+    return LineChoice(Lines.of_bins(bins, window, rate_hz), why, words, mains=mains)
 
 
 def _without_mains(spec: ExperimentSpec, bins: list[int], resolution_hz: float) -> tuple[list[int], tuple[int, ...]]:
@@ -141,13 +141,13 @@ def _no_line(low: float, high: float, apart: int, window: int, rate_hz: float) -
     )
 
 
-def _stepped(spec: ExperimentSpec, found: Grid) -> Grid:
+def _stepped(spec: ExperimentSpec, found: LineChoice) -> LineChoice:
     if spec.kind != "stepped":
         return found
     steps, periods = len(found.lines), spec.periods or _PERIODS
     whole = stepped_lines(found.lines, periods=periods)
     why = f"{counted(steps, 'step')} of {counted(periods, 'period')} of {found.lines.window} samples"
-    return Grid(whole, why, found.lines_why, base=found.lines, periods=periods)
+    return LineChoice(whole, why, found.lines_why, base=found.lines, periods=periods)
 
 
 def _window(resolution_hz: float, apart: int, rate_hz: float) -> tuple[int, str]:
@@ -181,9 +181,9 @@ def _window(resolution_hz: float, apart: int, rate_hz: float) -> tuple[int, str]
     return shortest, why
 
 
-def _of_text(spec: ExperimentSpec, text: str, rate_hz: float) -> Grid:
+def _of_text(spec: ExperimentSpec, text: str, rate_hz: float) -> LineChoice:
     if spec.window is not None:
-        return Grid(Lines.parse(text, rate_hz, spec.window), "as given", "as given")
+        return LineChoice(Lines.parse(text, rate_hz, spec.window), "as given", "as given")
     if "k=" in text:
         raise GridError(
             "window-missing",
@@ -192,18 +192,18 @@ def _of_text(spec: ExperimentSpec, text: str, rate_hz: float) -> Grid:
             argument="window",
             lines=text,
         )
-    wanted = Lines.parse(text, rate_hz, _smallest_window(text, rate_hz))
-    return Grid(wanted, "the shortest on whose grid the lines are, two bins apart or more", "as given")
+    required = Lines.parse(text, rate_hz, _smallest_window(text, rate_hz))
+    return LineChoice(required, "the shortest on whose grid the lines are, two bins apart or more", "as given")
 
 
 def _smallest_window(text: str, rate_hz: float) -> int:
     """The shortest window with all lines on its grid, none next to another."""
-    wanted = [Fraction(f) for item in text.split(",") for f in _numbers(item)]
-    unit = lcm(*((f / Fraction(rate_hz)).limit_denominator(10**9).denominator for f in wanted)) if wanted else 1
-    if not wanted or unit > _WORTH_FACTORS * rate_hz or unit * _QUIET_BETWEEN > WINDOW_MAX:
+    required = [Fraction(f) for item in text.split(",") for f in _numbers(item)]
+    unit = lcm(*((f / Fraction(rate_hz)).limit_denominator(10**9).denominator for f in required)) if required else 1
+    if not required or unit > _WORTH_FACTORS * rate_hz or unit * _QUIET_BETWEEN > WINDOW_MAX:
         # Lines.parse reports what cannot be read, or which line is off this grid, with the nearest ones.
         return max(3, round(2 * rate_hz))
-    bins = sorted({int(f * unit / Fraction(rate_hz)) for f in wanted})
+    bins = sorted({int(f * unit / Fraction(rate_hz)) for f in required})
     apart = min(np.diff(bins), default=_QUIET_BETWEEN)
     return max(3, unit * (_QUIET_BETWEEN if apart < _QUIET_BETWEEN else 1))
 
@@ -218,7 +218,7 @@ def _numbers(item: str) -> list[str]:
     return parts if len(parts) != 3 else [parts[0], parts[2]]
 
 
-def _prbs(spec: ExperimentSpec, low: float, high: float, rate_hz: float) -> Grid:
+def _prbs(spec: ExperimentSpec, low: float, high: float, rate_hz: float) -> LineChoice:
     held = spec.held_ticks or max(1, int(rate_hz / (_BITS_PER_PERIOD * high)))
     order = spec.order
     if order is None:
@@ -261,4 +261,4 @@ def _prbs(spec: ExperimentSpec, low: float, high: float, rate_hz: float) -> Grid
             order=order,
         )
     why = f"2^{order} − 1 bits of {counted(held, 'tick')}"
-    return Grid(Lines.of_bins(bins, window, rate_hz), why, "every bin of the band", order=order, held_ticks=held)
+    return LineChoice(Lines.of_bins(bins, window, rate_hz), why, "every bin of the band", order=order, held_ticks=held)

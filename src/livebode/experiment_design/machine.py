@@ -25,7 +25,7 @@ MOTION_KEYS: Mapping[Quantity, str] = {
 """Key of a file with the extremes of each quantity in the motion alone."""
 Extremes = dict[Quantity, tuple[float, float]]
 """Lowest and highest value of each quantity."""
-STANDING: Extremes = {"torque": (0.0, 0.0), "speed": (0.0, 0.0), "following error": (0.0, 0.0)}
+STANDSTILL: Extremes = {"torque": (0.0, 0.0), "speed": (0.0, 0.0), "following error": (0.0, 0.0)}
 """Motion of an axis at standstill at an unknown position."""
 
 _EDGE = 1e-9  # of a frequency: a line at the end of the band is inside
@@ -51,7 +51,7 @@ def check_noise(noise: float) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class OperatingPoint:
     """The linear machine at one place of its travel, sampled behind the hold of its drive.
 
     Parameters
@@ -98,7 +98,7 @@ class Machine:
         Travel of the motor per count of its encoder; 0 where it is not known.
     """
 
-    places: tuple[Place, ...]
+    places: tuple[OperatingPoint, ...]
     loop: Loop
     rate_hz: float
     noise: float = 0.0
@@ -122,12 +122,12 @@ class Machine:
             )
         check_noise(self.noise)
 
-    def torque(self, place: Place, frequency_hz: Floats) -> Complex:
+    def torque(self, place: OperatingPoint, frequency_hz: Floats) -> Complex:
         """U/W = E/(1 + G·F) at one place."""
         feedback = self.loop.feedback_at(frequency_hz)
         return self.loop.entry_at(frequency_hz) / (1 + place.plant.response(frequency_hz) * feedback)
 
-    def responses(self, place: Place, frequency_hz: Floats) -> dict[Quantity, Complex]:
+    def responses(self, place: OperatingPoint, frequency_hz: Floats) -> dict[Quantity, Complex]:
         """From the excitation to each quantity, per N m; frequencies above 0."""
         torque = self.torque(place, frequency_hz)
         return {

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.core import DesignError, Lines, UsageError
 from livebode.excitation import Phases, chirp, equal_snr, multisine, prbs, stepped_sine
-from livebode.experiment_design.grid import Grid
+from livebode.experiment_design.grid import LineChoice
 from livebode.experiment_design.machine import Machine
 from livebode.experiment_design.spec import ExperimentSpec
 from livebode.experiment_design.waveform import Waveform
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 REACHED = 1e-9
 
 
-def unit_waveform(spec: ExperimentSpec, found: Grid, machine: Machine) -> Waveform:
+def unit_waveform(spec: ExperimentSpec, found: LineChoice, machine: Machine) -> Waveform:
     """The excitation with an amplitude of 1 N m (of a list: with those), before limits and accuracy are applied."""
     lines = found.lines
     about: dict[str, Any] = {"kind": spec.kind, "seed": spec.seed}

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.core import DesignError, GridError, Loop, Responses, SignalError, UsageError
 from livebode.core.controllers import integral
 from livebode.core.model import Algebra, Gain, Model, as_model
-from livebode.experiment_design.machine import STANDING, Extremes, Machine, Place, within
+from livebode.experiment_design.machine import STANDSTILL, Extremes, Machine, OperatingPoint, within
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -169,7 +169,7 @@ def measured_machine(
     speed = Gain(radius_m) * (given if output == "velocity" else _Differentiated(given))
     own = _motion(motion or {}, stroke_s)
     band_hz = given.band_hz if isinstance(given, MeasuredResponse) else None
-    place = Place(plant=given, speed=speed, travel=way, angle=way, motion=own, name="as measured")
+    place = OperatingPoint(plant=given, speed=speed, travel=way, angle=way, motion=own, name="as measured")
     step_m = 2 * np.pi * radius_m / encoder_counts_per_turn if encoder_counts_per_turn > 0 else 0.0
     return Machine(
         places=(place,), loop=loop, rate_hz=rate_hz, noise=noise, stroke_s=stroke_s, notes=notes, band_hz=band_hz,
@@ -208,4 +208,4 @@ def _motion(given: Extremes, stroke_s: float | None) -> Extremes:
             argument="stroke_s",
             speed_m_per_s=[low, high],
         )
-    return STANDING | given
+    return STANDSTILL | given

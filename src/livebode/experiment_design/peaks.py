@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.experiment_design.machine import QUANTITIES, Machine, Place, Quantity, within
+from livebode.experiment_design.machine import QUANTITIES, Machine, OperatingPoint, Quantity, within
 from livebode.experiment_design.waveform import Waveform
 
 Floats = NDArray[np.float64]
@@ -78,7 +78,7 @@ def peaks(waveform: Waveform, machine: Machine) -> tuple[Peak, ...]:
 
 def _peak(
     quantity: Quantity,
-    place: Place,
+    place: OperatingPoint,
     response: NDArray[np.complex128],
     spectrum: NDArray[np.complex128],
     excited: NDArray[np.int64],

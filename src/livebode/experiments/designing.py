@@ -98,8 +98,8 @@ def design_experiment(
             if draw is not None:
                 draw(design, partial / f"{name}.png")
             files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
-            told = {"files": files} | design.plain()
-            (partial / _MARK).write_text(to_json(told, indent=1) + "\n", encoding="utf-8")
+            facts = {"files": files} | design.plain()
+            (partial / _MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
             _check_free(directory, force)
             _put(partial, there, aside=Path(folder) / "before")
     except OSError as error:

@@ -55,11 +55,11 @@ class Experiment(BaseModel):
             If the file cannot be read, is not TOML, or a key or a value is invalid; the message contains it.
         """
         data = read_table(path)
-        wanted, above = data.get("excitation", {}), dict(over or {})
-        if isinstance(wanted, dict):
+        required, above = data.get("excitation", {}), dict(over or {})
+        if isinstance(required, dict):
             # A band instead of lines, a resolution instead of a window: both at once would contradict each other.
             gone = {"lines": "band_hz" in above, "window": "resolution_hz" in above, "order": "resolution_hz" in above}
-            data["excitation"] = {key: value for key, value in wanted.items() if not gone.get(key)} | above
+            data["excitation"] = {key: value for key, value in required.items() if not gone.get(key)} | above
         found = cls.of(data, str(path))
         if found.measured is None:
             return found

@@ -15,7 +15,7 @@ from livebode.experiment_design import Machine, MeasuredResponse, measured_machi
 from livebode.experiment_design.machine import MOTION_KEYS
 from livebode.experiment_design.measured import Output
 from livebode.fitting import mean_response
-from livebode.records import Run
+from livebode.records import RunRecord
 
 Number = Annotated[float, Field(strict=True)]  # true is not a number
 
@@ -53,10 +53,10 @@ class MeasuredAxis:
     """
 
     def __init__(self, section: MeasuredSection, loop: LoopSection | None) -> None:
-        self._section, self._run = section, Run.open(section.run)
-        self._said = recorded_configuration(self._run.summary)
+        self._section, self._run = section, RunRecord.open(section.run)
+        self._recorded = recorded_configuration(self._run.summary)
         self._given = loop
-        self._loop = loop or LoopSection.model_validate(self._said.get("loop", {}))
+        self._loop = loop or LoopSection.model_validate(self._recorded.get("loop", {}))
 
     def machine(self) -> Machine:
         """The Machine of the run's mean response."""
@@ -68,27 +68,27 @@ class MeasuredAxis:
                 key="loop.excitation_at",
                 value=self._loop.excitation_at,
             )
-        told, rate_hz = self._section, self._run.lines.rate_hz
-        motion = {name: getattr(told, key) for name, key in MOTION_KEYS.items() if getattr(told, key) is not None}
+        section, rate_hz = self._section, self._run.lines.rate_hz
+        motion = {name: getattr(section, key) for name, key in MOTION_KEYS.items() if getattr(section, key) is not None}
         return measured_machine(
             MeasuredResponse.of(mean_response(self._run.steady_batches())), self._loop.build(rate_hz), rate_hz,
-            output=self._output(), radius_m=told.radius_m, noise=told.noise, motion=motion, stroke_s=told.stroke_s,
-            notes=self._notes(), encoder_counts_per_turn=told.encoder_counts_per_turn,
+            output=self._output(), radius_m=section.radius_m, noise=section.noise, motion=motion,
+            stroke_s=section.stroke_s, notes=self._notes(), encoder_counts_per_turn=section.encoder_counts_per_turn,
         )  # fmt: skip
 
     def loop_tables(self) -> dict[str, Any]:
         """[loop] of the file or of the run."""
         if self._given is not None:
             return self._given.model_dump(exclude_unset=True, exclude_none=True)
-        return dict(self._said.get("loop", {}))
+        return dict(self._recorded.get("loop", {}))
 
     def signal_names(self) -> dict[str, str]:
         """[signals] of the run; a design always has an excitation."""
-        return {"excitation": "w"} | dict(self._said.get("signals", {}))
+        return {"excitation": "w"} | dict(self._recorded.get("signals", {}))
 
     def tracking(self) -> dict[str, Any]:
         """The part of the run's [tracking] that its recordings need."""
-        tracking = self._said.get("tracking", {})
+        tracking = self._recorded.get("tracking", {})
         kept = {name: tracking[name] for name in _KEPT if tracking.get(name)}
         return kept if "input" in self.signal_names() else {"estimator": "indirect"} | kept
 

@@ -5,7 +5,7 @@ from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import RunningMean, mean_response
 from livebode.fitting.models import MODELS, model_named
 from livebode.fitting.once import Fit, best_of, fit, fit_of
-from livebode.fitting.physical import Grid, Parameter, PhysicalModel
+from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel
 from livebode.fitting.rational import fit_rational
 from livebode.fitting.rational_model import Rational, rational_of
 from livebode.fitting.three_mass import ThreeMass
@@ -13,9 +13,9 @@ from livebode.fitting.unknown_gain import TwoMassGain
 
 __all__ = [
     "MODELS",
+    "EvaluationGrid",
     "Fit",
     "Fitter",
-    "Grid",
     "Parameter",
     "PhysicalModel",
     "Rational",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.core import UsageError
 from livebode.fitting.modal import chain_of, scan
-from livebode.fitting.physical import Grid, Parameter, PhysicalModel, delay, free_friction
+from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, delay, free_friction
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -98,7 +98,7 @@ class Chain(PhysicalModel):
     def _motor(self) -> Parameter:
         return Parameter("Js", "kg m²", 1e-2, *_INERTIA)
 
-    def shown(self, values: Floats, grid: Grid) -> Floats:
+    def shown(self, values: Floats, grid: EvaluationGrid) -> Floats:
         """Frictions that stop the motor's inertia in as long as ten of the lowest line's radians take."""
         dragged = np.array(values)
         for name in self.frictions:
@@ -106,7 +106,7 @@ class Chain(PhysicalModel):
             dragged[..., self.names.index(name)] = values[..., 0] * (2 * np.pi * grid.frequency_hz.min() / 10) / arm
         return dragged
 
-    def _whole(self, found: Floats, grid: Grid) -> Floats:
+    def _whole(self, found: Floats, grid: EvaluationGrid) -> Floats:
         """Values (..., some) followed by frictions and a delay of zero."""
         rest = np.zeros((*found.shape[:-1], len(self.names) - found.shape[-1]))
         return self.shown(np.concatenate([found, rest], axis=-1), grid)
@@ -131,7 +131,7 @@ class Rigid(Chain):
     def transfer(self, inertia: Any, friction: Any) -> tuple[list[Any], list[Any]]:
         return [self.lever], [inertia, friction] + [0.0] * (self.integrators - 1)
 
-    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+    def starts(self, value: Complex, weight: Floats, grid: EvaluationGrid) -> Floats:
         weights = scan(value, weight, grid, modes=0, integrators=self.integrators)[0]
         return self._whole(self.lever / weights[..., :1], grid)
 
@@ -213,7 +213,7 @@ class TwoMass(Chain):
             others = [js * self.inertia_ratio / self.arm, *others]
         return [js, *(x * self.arm for x in others), friction, load_friction * self.arm]
 
-    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+    def starts(self, value: Complex, weight: Floats, grid: EvaluationGrid) -> Floats:
         ratio = self.inertia_ratio
         load_side = self.side == "load"
         weights, omega = scan(

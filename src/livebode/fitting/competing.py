@@ -12,7 +12,7 @@ from livebode.core.parameters import OK
 from livebode.fitting.extended import BEYOND, LAG, MODE, RESIDUAL, START_DAMPING, Extended
 from livebode.fitting.physical import DELAY, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
-from livebode.fitting.rows import Fitted, fit_rows
+from livebode.fitting.rows import FittedRows, fit_rows
 from livebode.fitting.weighing import misfit, weights
 
 Floats = NDArray[np.float64]
@@ -41,7 +41,7 @@ class Competitor:
     """
 
     problem: Problem
-    fitted: Fitted
+    fitted: FittedRows
     cost: float
     taken: tuple[str, ...]
 
@@ -76,7 +76,7 @@ def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: A
 
 
 def competitor(
-    problem: Problem, measured: Measured, noise_dof: Floats, fitted: Fitted, taken: tuple[str, ...] = ()
+    problem: Problem, measured: Measured, noise_dof: Floats, fitted: FittedRows, taken: tuple[str, ...] = ()
 ) -> Competitor:
     """A fit with its cost."""
     price = sum(_PRICE.get(name, _FRICTION_PRICE) for name in taken)
@@ -185,7 +185,7 @@ def _padded(model: PhysicalModel, of: PhysicalModel, at: Floats) -> Floats:
     return np.array([known.get(p.name, p.start) for p in model.parameters])
 
 
-def _mode_starts(problem: Problem, of: Problem, measured: Measured, fitted: Fitted) -> Floats:
+def _mode_starts(problem: Problem, of: Problem, measured: Measured, fitted: FittedRows) -> Floats:
     """Values with a further mode where it would lower chi² most to first order, (starts, parameters).
 
     For each frequency and damping the gain is the only new parameter, and linear: least squares together with the
@@ -229,7 +229,7 @@ def _stacked(values: Complex) -> Floats:
     return np.concatenate([values.real, values.imag])
 
 
-def _best_start(problem: Problem, measured: Measured, fitted: Fitted, starts: Floats) -> Floats:
+def _best_start(problem: Problem, measured: Measured, fitted: FittedRows, starts: Floats) -> Floats:
     """One row, from the start with the least cost."""
     if len(starts) == 1:
         return starts
@@ -239,7 +239,7 @@ def _best_start(problem: Problem, measured: Measured, fitted: Fitted, starts: Fl
     return found.values[[int(np.argmin(cost))]]
 
 
-def _possible(problem: Problem, fitted: Fitted, allowed: Allowed) -> bool:
+def _possible(problem: Problem, fitted: FittedRows, allowed: Allowed) -> bool:
     """Whether its mode is separate from the model's own, and a free delay, if any, is one that logging can cause."""
     model = problem.model
     if isinstance(model, Extended) and MODE in model.extras:

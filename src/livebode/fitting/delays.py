@@ -11,7 +11,7 @@ from livebode.core import Stage, StatefulBase
 from livebode.core.parameters import OK
 from livebode.fitting.physical import DELAY
 from livebode.fitting.problem import Measured, Problem
-from livebode.fitting.rows import FRICTION, Fitted, fit_rows
+from livebode.fitting.rows import FRICTION, FittedRows, fit_rows
 from livebode.fitting.weighing import misfit
 
 Floats = NDArray[np.float64]
@@ -54,7 +54,7 @@ class DelayChoice(StatefulBase):
         """The problem that rows are fitted with at present."""
         return self.freed if self.taken else self.held
 
-    def weigh(self, group: int, measured: Measured, noise_dof: Floats, found: Fitted) -> Fitted:
+    def weigh(self, group: int, measured: Measured, noise_dof: Floats, found: FittedRows) -> FittedRows:
         """Compare both fits where this group (its number) decides; rows as they are fitted, `found` or with a delay."""
         if self._freed is None or not _decides(group, self.taken):
             return found
@@ -82,7 +82,7 @@ class DelayChoice(StatefulBase):
             raise ValueError(f"taken is {state['taken']!r}")
         self.taken, self.gains = state["taken"], [float(gain) for gain in state["gains"]]
 
-    def _possible(self, freed: Fitted) -> NDArray[np.bool_]:
+    def _possible(self, freed: FittedRows) -> NDArray[np.bool_]:
         late_s = freed.ended[:, self.held.model.names.index(DELAY)]
         return np.asarray(late_s * self.held.grid.rate_hz >= -_EARLIEST_TICKS)
 
@@ -92,7 +92,9 @@ def _decides(group: int, taken: bool | None) -> bool:
     return group % _EVERY == 0 or (taken is None and group & (group - 1) == 0)
 
 
-def fitted_freely(held: Problem, freed: Problem, measured: Measured, noise_dof: Floats, found: Fitted) -> Fitted:
+def fitted_freely(
+    held: Problem, freed: Problem, measured: Measured, noise_dof: Floats, found: FittedRows
+) -> FittedRows:
     """Rows fitted with a free delay, started from the fit without; where both failed, from several delays."""
     best = fit_rows(freed, measured, noise_dof, found.ended)
     lost = np.flatnonzero((found.status != OK) & (found.status != FRICTION) & (best.status != OK))
@@ -109,12 +111,12 @@ def fitted_freely(held: Problem, freed: Problem, measured: Measured, noise_dof: 
     return best
 
 
-def gains(measured: Measured, noise_dof: Floats, less: Fitted, more: Fitted) -> Floats:
+def gains(measured: Measured, noise_dof: Floats, less: FittedRows, more: FittedRows) -> Floats:
     """Decrease of −2·ln(likelihood) from one fit to the other, (rows,), each with the ε that it needs."""
     before, after = (misfit(measured, x.response, x.dof, noise_dof) for x in (less, more))
     return np.asarray(before - after)
 
 
-def chosen(first: Fitted, second: Fitted, take: NDArray[np.bool_]) -> Fitted:
+def chosen(first: FittedRows, second: FittedRows, take: NDArray[np.bool_]) -> FittedRows:
     """Rows of the second where `take`, else of the first."""
-    return Fitted(*(np.where(take.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in zip(first, second)))
+    return FittedRows(*(np.where(take.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in zip(first, second)))

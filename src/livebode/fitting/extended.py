@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.fitting.physical import Grid, Parameter, PhysicalModel
+from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel
 from livebode.fitting.polynomials import plus, times
 
 Floats = NDArray[np.float64]
@@ -118,7 +118,7 @@ class Extended(PhysicalModel):
     def derived(self, values: Floats) -> Floats:
         return self.base.derived(values[..., : len(self.base.names)])
 
-    def shown(self, values: Floats, grid: Grid) -> Floats:
+    def shown(self, values: Floats, grid: EvaluationGrid) -> Floats:
         own = len(self.base.names)
         found = np.concatenate([self.base.shown(values[..., :own], grid), values[..., own:]], axis=-1)
         top = grid._replace(frequency_hz=np.array([self.top_hz]))
@@ -130,7 +130,7 @@ class Extended(PhysicalModel):
                 found[..., self.names.index(name)] = size * square
         return found
 
-    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+    def starts(self, value: Complex, weight: Floats, grid: EvaluationGrid) -> Floats:
         first = self.base.starts(value, weight, grid)
         rest = np.array([p.start for p in self.parameters[len(self.base.parameters) :]])
         return self.shown(np.concatenate([first, np.broadcast_to(rest, (*first.shape[:-1], rest.size))], axis=-1), grid)

@@ -24,9 +24,9 @@ from livebode.core import (
 from livebode.core.parameters import OK
 from livebode.fitting.delays import DelayChoice
 from livebode.fitting.models import model_named
-from livebode.fitting.physical import DELAY, Grid, Hold, PhysicalModel
+from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
-from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, Fitted, fit_rows
+from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, FittedRows, fit_rows
 from livebode.fitting.weighing import epsilon_for, squares
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,9 @@ class Fitter(StatefulBase):
         self.model = model_named(model, **options) if isinstance(model, str) else model
         self._fixed, self._free = dict(fixed or {}), tuple(free)
         self._band, self._hold = band_hz, hold
-        Problem(self.model, Grid(np.ones(1), 1.0, hold), self._fixed, self._free)  # rejected before anything starts
+        Problem(
+            self.model, EvaluationGrid(np.ones(1), 1.0, hold), self._fixed, self._free
+        )  # rejected before anything starts
         self._lines: Lines | None = None
         self._word = NO_RESPONSE
         self._seen = 0
@@ -150,7 +152,7 @@ class Fitter(StatefulBase):
     @property
     def held(self) -> dict[str, float]:
         """Parameters that are not fitted, and their values."""
-        return Problem(self.model, Grid(np.ones(1), 1.0, self._hold), self._fixed, self._free).held
+        return Problem(self.model, EvaluationGrid(np.ones(1), 1.0, self._hold), self._fixed, self._free).held
 
     def start_of(self, responses: Responses, parameters: Parameters) -> tuple[Problem, Measured, Floats]:
         """The basis of one row's fit: the problem, the lines in use, and the degrees of freedom of its sigmas."""
@@ -173,7 +175,7 @@ class Fitter(StatefulBase):
         return DELAY in self.held and DELAY not in self._fixed
 
     @property
-    def grid(self) -> Grid:
+    def grid(self) -> EvaluationGrid:
         """The lines of the band; RuntimeError before the first responses, which define them."""
         if self._lines is None:
             raise RuntimeError("the fitter has processed no responses, so its lines are not known; process some first")
@@ -198,7 +200,7 @@ class Fitter(StatefulBase):
     def _prepare(self, lines: Lines) -> NDArray[np.bool_]:
         """Which lines are used."""
         if self._lines is None:
-            grid = Grid.of(lines, self._hold)
+            grid = EvaluationGrid.of(lines, self._hold)
             low, high = self._band or (0.0, np.inf)
             use = (grid.frequency_hz >= low) & (grid.frequency_hz <= high)
             problem = Problem(self.model, grid._replace(frequency_hz=grid.frequency_hz[use]), self._fixed, self._free)
@@ -253,7 +255,7 @@ class Fitter(StatefulBase):
             dof = 2.0 * np.count_nonzero(size) - problem.size * len(self._rows)
             self._epsilon = float(epsilon_for(rest, noise, size, np.array([dof]))[0])
 
-    def _parameters(self, responses: Responses, found: Fitted) -> Parameters:
+    def _parameters(self, responses: Responses, found: FittedRows) -> Parameters:
         return Parameters(
             model=self.model.name, names=self.model.names, units=self.model.units, value=found.values,
             covariance=found.covariance, status=found.status, epsilon=found.epsilon, chi2=found.chi2, dof=found.dof,

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.fitting.physical import Grid
+from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.transfer import Transfer
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,7 @@ _LEAST = 1e-3  # of the largest weight, for one that is negative
 
 
 def scan(
-    value: Complex, weight: Floats, grid: Grid, *, modes: int, integrators: int, ratio: float | None = None
+    value: Complex, weight: Floats, grid: EvaluationGrid, *, modes: int, integrators: int, ratio: float | None = None
 ) -> tuple[Floats, Floats]:
     """Weights of the rigid body and of each mode, (starts, rows, 1 + modes), and the modes' ω, (starts, rows, modes).
 
@@ -69,7 +69,7 @@ def chain_of(weights: Floats, omega: Floats) -> tuple[Floats, Floats, Floats]:
     return np.stack(inertia, axis=-1), spring, spring / (omega[..., :1] * QUALITY)
 
 
-def _part(numerator: list[float], denominator: list[float], grid: Grid) -> Complex:
+def _part(numerator: list[float], denominator: list[float], grid: EvaluationGrid) -> Complex:
     transfer = Transfer.of(numerator, denominator)
     s = np.asarray(2j * np.pi * grid.frequency_hz, dtype=np.complex128)
     if grid.hold == "none":

@@ -16,7 +16,7 @@ from livebode.fitting.fitter import Fitter
 from livebode.fitting.hold import to_discrete
 from livebode.fitting.mean import mean_response
 from livebode.fitting.patterns import correlation, covariance, follows_pattern
-from livebode.fitting.physical import DELAY, Grid, Hold, PhysicalModel
+from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import SENTENCES, fit_rows
 
@@ -144,7 +144,7 @@ class Fit:
             If the fit failed.
         """
         f = np.asarray(frequency_hz, dtype=np.float64)
-        found = self.model.at(self._values(), Grid(f.ravel(), self.rate_hz, self.hold))
+        found = self.model.at(self._values(), EvaluationGrid(f.ravel(), self.rate_hz, self.hold))
         return np.asarray(found.reshape(f.shape))
 
     def to_control(self, discrete: bool = False) -> Any:

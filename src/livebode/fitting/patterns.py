@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.fitting.problem import Measured, Problem
-from livebode.fitting.rows import Fitted
+from livebode.fitting.rows import FittedRows
 from livebode.fitting.weighing import misfit, weights
 
 Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ _SIZES = (0.5, 1.0, 2.0, 4.0, 8.0)  # of ε
 _ROUNDING = 1e-9
 
 
-def correlation(measured: Measured, fitted: Fitted) -> float:
+def correlation(measured: Measured, fitted: FittedRows) -> float:
     """Correlation of neighbouring lines' weighted residuals, −1 … 1, of one row."""
     used = measured.use[0]
     weight = weights(measured.sigma, np.abs(fitted.response), fitted.epsilon)[0, used]
@@ -32,7 +32,7 @@ def correlation(measured: Measured, fitted: Fitted) -> float:
     return float(np.sum((rest[1:] * rest[:-1].conj()).real) / power) if power > 0 else 0.0
 
 
-def follows_pattern(measured: Measured, fitted: Fitted, noise_dof: Floats) -> bool:
+def follows_pattern(measured: Measured, fitted: FittedRows, noise_dof: Floats) -> bool:
     """Whether the residual is not noise: neighbouring lines correlate, or there are too few lines for this test and
     noise does not explain their residuals.
 
@@ -51,7 +51,7 @@ def follows_pattern(measured: Measured, fitted: Fitted, noise_dof: Floats) -> bo
     return bool((alone - misfit(known, fitted.response, fitted.dof, noise_dof))[0] > LACKS)
 
 
-def covariance(problem: Problem, measured: Measured, fitted: Fitted) -> Floats:
+def covariance(problem: Problem, measured: Measured, fitted: FittedRows) -> Floats:
     """Covariance (parameters, parameters) of one row's values under a misfit that is smooth over the lines.
 
     The misfit is m·G with E[mᵢ·mⱼ*] = ε²·ρ(|i − j|/length), ρ Matérn's of order 3/2. Its size and length are weighted

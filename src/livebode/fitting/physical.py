@@ -21,7 +21,7 @@ Hold = Literal["zero-order", "none"]
 DELAY = "delay"
 
 
-class Grid(NamedTuple):
+class EvaluationGrid(NamedTuple):
     """Where a model is evaluated: lines, the loop's rate, and the hold of the input."""
 
     frequency_hz: Floats
@@ -29,7 +29,7 @@ class Grid(NamedTuple):
     hold: Hold = "zero-order"
 
     @classmethod
-    def of(cls, lines: Lines, hold: Hold = "zero-order") -> Grid:
+    def of(cls, lines: Lines, hold: Hold = "zero-order") -> EvaluationGrid:
         return cls(lines.frequency_hz, lines.rate_hz, hold)
 
 
@@ -142,7 +142,7 @@ class PhysicalModel:
         """Coefficients of numerator and denominator, each a number or an array like the arguments."""
         raise NotImplementedError(f"{type(self).__name__} has no transfer function; define transfer()")
 
-    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
+    def starts(self, value: Complex, weight: Floats, grid: EvaluationGrid) -> Floats:  # noqa: ARG002  for those who look
         """First values to try for responses (rows, lines), shape (starts, rows, parameters).
 
         By default: the declared ones, and each of them a third and three times as large.
@@ -157,7 +157,7 @@ class PhysicalModel:
                     tried.append(other)
         return np.repeat(np.array(tried)[:, np.newaxis], len(value), axis=1)
 
-    def shown(self, values: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
+    def shown(self, values: Floats, grid: EvaluationGrid) -> Floats:  # noqa: ARG002  for those who look
         """The same values (..., parameters), with frictions that may be zero at the smallest visible value."""
         return values
 
@@ -169,7 +169,7 @@ class PhysicalModel:
     def units(self) -> tuple[str, ...]:
         return tuple(p.unit for p in self.parameters)
 
-    def at(self, values: ArrayLike, grid: Grid) -> Complex:
+    def at(self, values: ArrayLike, grid: EvaluationGrid) -> Complex:
         """Response at the lines, behind the hold and the delay, for values (..., parameters): shape (..., lines)."""
         p = np.asarray(values, dtype=np.float64)
         transfer, delay_s = self._transfer(p), self._delay_s(p)

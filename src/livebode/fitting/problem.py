@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.core import UsageError, nearest_name
 from livebode.fitting.least_squares import Minimum, minimise
-from livebode.fitting.physical import Grid, PhysicalModel
+from livebode.fitting.physical import EvaluationGrid, PhysicalModel
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -58,7 +58,11 @@ class Problem:
     """
 
     def __init__(
-        self, model: PhysicalModel, grid: Grid, fixed: Mapping[str, float] | None = None, free: Sequence[str] = ()
+        self,
+        model: PhysicalModel,
+        grid: EvaluationGrid,
+        fixed: Mapping[str, float] | None = None,
+        free: Sequence[str] = (),
     ) -> None:
         fixed = dict(fixed or {})
         for name in (*fixed, *free):

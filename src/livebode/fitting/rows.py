@@ -50,7 +50,7 @@ _CONDITION_MAX = 1e11
 _ROUNDING = 1e-14
 
 
-class Fitted(NamedTuple):
+class FittedRows(NamedTuple):
     """Result of a batch of rows: the arrays of `Parameters`, and, failed or not, the model's response (rows, lines)
     and the values at the end of the search."""
 
@@ -70,7 +70,7 @@ def fit_rows(
     noise_dof: Floats,
     start: Floats | None = None,
     epsilon: Floats | None = None,
-) -> Fitted:
+) -> FittedRows:
     """Fit each row, from `start` (rows, parameters) where there is one; where there is none or it fails, from a scan.
 
     `epsilon` (rows,) is fixed where it is given; else each row's own is found, such that its reduced chi² is 1.
@@ -89,11 +89,11 @@ def fit_rows(
     return whole
 
 
-def _none(problem: Problem, measured: Measured, dof: Floats) -> Fitted:
+def _none(problem: Problem, measured: Measured, dof: Floats) -> FittedRows:
     """Rows without a fit."""
     rows, n = len(dof), len(problem.model.names)
     nan = np.full(rows, np.nan)
-    return Fitted(
+    return FittedRows(
         np.full((rows, n), np.nan), np.full((rows, n, n), np.nan), np.full(rows, NO_RESPONSE, dtype=_WORD), nan,
         nan.copy(), dof, np.full(measured.value.shape, np.nan, dtype=np.complex128), np.full((rows, n), np.nan),
     )  # fmt: skip
@@ -101,7 +101,7 @@ def _none(problem: Problem, measured: Measured, dof: Floats) -> Fitted:
 
 def _fitted(
     problem: Problem, measured: Measured, noise_dof: Floats, start: Floats | None, epsilon: Floats | None, dof: Floats
-) -> Fitted:
+) -> FittedRows:
     eps = np.full(len(dof), _FIRST_EPSILON) if epsilon is None else epsilon
     # Before a model is known the measured size replaces the model's.
     size = np.where(measured.use, np.abs(measured.value), 0.0)
@@ -169,7 +169,7 @@ def _reweighted(problem: Problem, measured: Measured, found: Solution, dof: Floa
 
 def _judged(
     problem: Problem, measured: Measured, noise_dof: Floats, found: Solution, eps: Floats, dof: Floats
-) -> Fitted:
+) -> FittedRows:
     rest, noise, _ = squares(measured, found.response)
     small = covariance(measured, found, eps, noise_dof)
     with np.errstate(invalid="ignore"):
@@ -190,7 +190,7 @@ def _judged(
     free = np.flatnonzero(problem.free)
     whole[:, free[:, np.newaxis], free] = outward[:, :, np.newaxis] * small * outward[:, np.newaxis]
     whole[failed] = np.nan
-    return Fitted(
+    return FittedRows(
         np.where(failed[:, np.newaxis], np.nan, found.values),
         whole, status, np.where(failed, np.nan, eps), chi_squared(rest, noise), dof,
         found.response, found.values,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.fitting.chains import Chain
 from livebode.fitting.modal import chain_of, scan
-from livebode.fitting.physical import Grid, Parameter, delay
+from livebode.fitting.physical import EvaluationGrid, Parameter, delay
 from livebode.fitting.polynomials import plus, times
 
 Floats = NDArray[np.float64]
@@ -48,7 +48,7 @@ class ThreeMass(Chain):
             numerator = [self.lever * x for x in times([b1, k1], [b2, k2])]
         return numerator, denominator + [0.0] * self.integrators
 
-    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+    def starts(self, value: Complex, weight: Floats, grid: EvaluationGrid) -> Floats:
         weights, omega = scan(value, weight, grid, modes=2, integrators=self.integrators)
         inertia, spring, damper = chain_of(weights, omega)
         found = [inertia[..., :1], *(x / self.arm for x in (inertia[..., 1:], spring, damper))]

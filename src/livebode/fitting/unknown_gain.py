@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.core import UsageError
 from livebode.fitting.modal import QUALITY, scan
-from livebode.fitting.physical import Grid, Parameter, PhysicalModel, delay
+from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, delay
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -83,7 +83,7 @@ class TwoMassGain(PhysicalModel):
         _, low, high, damping_low, damping_high, _ = np.moveaxis(values, -1, 0)
         return np.stack([1 / (2 * damping_low), 1 / (2 * damping_high), (high / low) ** 2 - 1], axis=-1)
 
-    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+    def starts(self, value: Complex, weight: Floats, grid: EvaluationGrid) -> Floats:
         weights, omega = scan(value, weight, grid, modes=1, integrators=1 if self.output == "velocity" else 2)
         high, gain = omega[..., 0] / (2 * pi), weights[..., 0]
         low = high * np.sqrt(gain / weights.sum(axis=-1))

@@ -75,7 +75,7 @@ def design(
 def _described(experiment: str | PathLike[str] | Mapping[str, Any], over: Mapping[str, Any]) -> Experiment:
     if not isinstance(experiment, Mapping):
         return Experiment.read(Path(experiment), over)
-    wanted = experiment.get("excitation")
-    if not isinstance(wanted, Mapping):
+    required = experiment.get("excitation")
+    if not isinstance(required, Mapping):
         raise ConfigError("key-missing", "'excitation' is missing", "add it, with the band", key="excitation")
-    return Experiment.of({**experiment, "excitation": {**wanted, **over}}, "the description")
+    return Experiment.of({**experiment, "excitation": {**required, **over}}, "the description")

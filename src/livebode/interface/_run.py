@@ -20,8 +20,7 @@ from livebode.core import Event, Lines, LivebodeError, Loop, PlotKind, Response,
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.fitting import Fit
 from livebode.margins import Margins
-from livebode.records import PARAMETERS
-from livebode.records import Run as RunRecord
+from livebode.records import PARAMETERS, RunRecord
 
 if TYPE_CHECKING:
     import numpy as np

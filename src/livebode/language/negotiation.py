@@ -9,7 +9,7 @@ from functools import cache
 from livebode.language.catalogue import ENGLISH, available, catalogue
 
 _HEADER_LETTERS = 500
-_WISHES_MAX = 32
+_PREFERENCES_MAX = 32
 
 
 def negotiated(asked: str, configured: str | None, accepted: str) -> str:
@@ -32,9 +32,11 @@ def negotiated(asked: str, configured: str | None, accepted: str) -> str:
     for code in (asked, configured or ""):
         if code in available():
             return code
-    wishes = [part.partition(";q=") for part in accepted[:_HEADER_LETTERS].replace(" ", "").split(",")[:_WISHES_MAX]]
-    for wanted, _, _ in sorted(wishes, key=lambda wish: -_weight(wish[2])):
-        base = wanted.lower().partition("-")[0]
+    preferences = [
+        part.partition(";q=") for part in accepted[:_HEADER_LETTERS].replace(" ", "").split(",")[:_PREFERENCES_MAX]
+    ]
+    for required, _, _ in sorted(preferences, key=lambda preference: -_weight(preference[2])):
+        base = required.lower().partition("-")[0]
         if found := next((code for code in available() if code.lower().partition("-")[0] == base), None):
             return found
     return ENGLISH.code

@@ -27,7 +27,7 @@ class Crossings(NamedTuple):
     open_loop: Complex
 
 
-class Kind(NamedTuple):
+class CrossingKind(NamedTuple):
     """Function whose sign changes at a crossing, and which of the changes are used."""
 
     side: Callable[[Complex], Floats]
@@ -38,9 +38,9 @@ def _everywhere(value: Complex) -> NDArray[np.bool_]:
     return np.ones(value.shape, dtype=np.bool_)
 
 
-GAIN = Kind(lambda x: np.log(np.abs(x)), _everywhere)
-PHASE = Kind(lambda x: np.asarray(x.imag), lambda x: x.real < 0)
-CLOSED = Kind(lambda x: np.log(np.abs(x / (1 + x)) / BANDWIDTH), _everywhere)
+GAIN = CrossingKind(lambda x: np.log(np.abs(x)), _everywhere)
+PHASE = CrossingKind(lambda x: np.asarray(x.imag), lambda x: x.real < 0)
+CLOSED = CrossingKind(lambda x: np.log(np.abs(x / (1 + x)) / BANDWIDTH), _everywhere)
 _KINDS = (GAIN, PHASE, CLOSED)
 
 
@@ -90,7 +90,7 @@ def nearest_to_minus_one(loop: OpenLoop, values: Floats, frequency_hz: Floats, g
 Starts = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
-def _changes(grid: Complex, kind: Kind) -> Starts:
+def _changes(grid: Complex, kind: CrossingKind) -> Starts:
     """Row and grid point before every change of sign that is used.
 
     At half the rate L is real except for rounding, so the sign there is meaningless.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import FitError, Loop, Model
-from livebode.fitting import Grid, PhysicalModel
+from livebode.fitting import EvaluationGrid, PhysicalModel
 from livebode.fitting.physical import Hold
 
 Floats = NDArray[np.float64]
@@ -60,7 +60,7 @@ class OpenLoop:
 
     def at(self, values: Floats, frequency_hz: Floats) -> Complex:
         """L for values (rows, parameters) at frequencies (lines,) or (rows, lines): shape (rows, lines)."""
-        plant = self.plant.at(values, Grid(frequency_hz, self.rate_hz, self.hold))
+        plant = self.plant.at(values, EvaluationGrid(frequency_hz, self.rate_hz, self.hold))
         behind = self.loop.feedback_at(frequency_hz)
         for part in self.filters:
             behind = behind * part.response(frequency_hz)

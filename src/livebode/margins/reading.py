@@ -11,7 +11,7 @@ from livebode.core import Parameters, UsageError
 from livebode.margins.crossings import Crossings, crossings, nearest_to_minus_one
 from livebode.margins.margins import EXTRAPOLATED, INTERPOLATED, NAMES, NONE, UNSTABLE, Margins
 from livebode.margins.open_loop import OpenLoop
-from livebode.margins.slopes import Fits, Slopes, moved, peak_moved, slopes
+from livebode.margins.slopes import FittedValues, Slopes, moved, peak_moved, slopes
 from livebode.margins.stability import stable
 
 Floats = NDArray[np.float64]
@@ -125,7 +125,7 @@ def _read(
     sigma = np.sqrt(np.einsum("rii->ri", covariance))
     unit = np.where(sigma > 0, sigma, 1.0)
     correlation = covariance / unit[:, :, np.newaxis] / unit[:, np.newaxis]
-    fits = Fits(values, sigma)
+    fits = FittedValues(values, sigma)
     everywhere = slopes(loop, fits, Crossings(*(np.concatenate(parts) for parts in zip(*chosen))))
     ends = np.cumsum([0, *(len(at.row) for at in chosen)])
     for column, at in enumerate(chosen):
@@ -166,7 +166,7 @@ def _nearest(places: Crossings, cost: Floats, counts: NDArray[np.bool_] | None =
 Reading = tuple[Floats, Floats, Floats]
 
 
-def _gain(loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
+def _gain(loop: OpenLoop, _fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
     """−|L| in dB where L is negative. At half the rate, the place itself is fixed."""
     by_f, by = along
     by_log_f = moved(by_f.imag, by.imag)
@@ -175,12 +175,12 @@ def _gain(loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
     return -_DB * np.log(np.abs(at.open_loop)), -_DB * moving, by_log_f
 
 
-def _reduction(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
+def _reduction(loop: OpenLoop, fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
     value, by, by_log_f = _gain(loop, fits, at, along)
     return -value, -by, by_log_f
 
 
-def _phase(_loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
+def _phase(_loop: OpenLoop, _fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
     """Angle of −L where |L| = 1, deg."""
     by_f, by = along
     by_log_f = moved(by_f.real, by.real)
@@ -188,7 +188,7 @@ def _phase(_loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Readin
     return turn, np.degrees(by.imag + by_f.imag[:, np.newaxis] * by_log_f), by_log_f
 
 
-def _delay(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
+def _delay(loop: OpenLoop, fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
     """The delay that rotates L to −1 where |L| = 1, ms."""
     turn, by_turn, by_log_f = _phase(loop, fits, at, along)
     late = (turn % 360) / 360e-3 / at.frequency_hz
@@ -196,7 +196,7 @@ def _delay(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
     return late, by, by_log_f
 
 
-def _peak(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
+def _peak(loop: OpenLoop, fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
     """1/|1 + L| at its maximum; to first order a shift of the place has no effect."""
     largest = 1 / np.abs(1 + at.open_loop)
     closed = at.open_loop / (1 + at.open_loop)
@@ -204,7 +204,7 @@ def _peak(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
     return largest, by, peak_moved(loop, fits, at)
 
 
-def _bandwidth(_loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
+def _bandwidth(_loop: OpenLoop, _fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
     by_f, by = along
     sensitivity = 1 / (1 + at.open_loop)
     by_log_f = moved((sensitivity * by_f).real, (sensitivity[:, np.newaxis] * by).real)

@@ -18,14 +18,14 @@ _PEAK_STEP = 1e-3
 _OF_SIGMA, _OF_VALUE = 1e-3, 1e-7  # step of a parameter
 
 
-class Fits(NamedTuple):
+class FittedValues(NamedTuple):
     """Values and their sigma, shape (rows, parameters)."""
 
     values: Floats
     sigma: Floats
 
-    def of(self, row: NDArray[np.int64]) -> Fits:
-        return Fits(self.values[row], self.sigma[row])
+    def of(self, row: NDArray[np.int64]) -> FittedValues:
+        return FittedValues(self.values[row], self.sigma[row])
 
 
 class Slopes(NamedTuple):
@@ -38,12 +38,12 @@ class Slopes(NamedTuple):
         return Slopes(self.by_frequency[places], self.by_parameter[places])
 
 
-def slopes(loop: OpenLoop, fits: Fits, at: Crossings) -> Slopes:
+def slopes(loop: OpenLoop, fits: FittedValues, at: Crossings) -> Slopes:
     """Central differences of ln L at these places; by frequency one-sided at half the rate."""
     return _slopes(loop, fits.of(at.row), at.frequency_hz)
 
 
-def _slopes(loop: OpenLoop, fits: Fits, frequency_hz: Floats) -> Slopes:
+def _slopes(loop: OpenLoop, fits: FittedValues, frequency_hz: Floats) -> Slopes:
     """For one row of fits and one frequency each. A parameter without variance is not moved: it may be at its limit."""
     values, sigma = fits
     places, n = values.shape
@@ -70,7 +70,7 @@ def moved(residual: Floats, by: Floats) -> Floats:
         return np.asarray(-by / residual[:, np.newaxis])
 
 
-def peak_moved(loop: OpenLoop, fits: Fits, at: Crossings) -> Floats:
+def peak_moved(loop: OpenLoop, fits: FittedValues, at: Crossings) -> Floats:
     """d ln f by each parameter of the frequency where |1 + L| is least; NaN at half the rate, where it is fixed."""
     inside = at.frequency_hz < loop.rate_hz / 2
     found = np.full((len(at.row), fits.values.shape[1]), np.nan)
@@ -82,7 +82,7 @@ def peak_moved(loop: OpenLoop, fits: Fits, at: Crossings) -> Floats:
     return found
 
 
-def _distance_slopes(loop: OpenLoop, fits: Fits, frequency_hz: Floats) -> tuple[Floats, Floats]:
+def _distance_slopes(loop: OpenLoop, fits: FittedValues, frequency_hz: Floats) -> tuple[Floats, Floats]:
     """Of ln|1 + L|: by ln f and by each parameter."""
     value = loop.at(fits.values, frequency_hz[:, np.newaxis])[:, 0]
     closed = value / (1 + value)

@@ -4,12 +4,12 @@ from livebode.monitoring.baseline import Baseline, signals_of
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S
 from livebode.monitoring.learning import learn_machine
-from livebode.monitoring.machine import Machine
+from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.machine_detector import MachineDetector
 from livebode.monitoring.machine_monitor import MachineMonitor
 from livebode.monitoring.monitor import Monitor
 from livebode.monitoring.rows import PLACES, NonOverlappingWindows, Rows, places
-from livebode.monitoring.table import Table
+from livebode.monitoring.table import ScheduleTable
 from livebode.monitoring.table_learning import learn_table
 from livebode.monitoring.table_monitor import TableMonitor
 
@@ -18,13 +18,13 @@ __all__ = [
     "PLACES",
     "Baseline",
     "Evidence",
-    "Machine",
+    "LearnedMachine",
     "MachineDetector",
     "MachineMonitor",
     "Monitor",
     "NonOverlappingWindows",
     "Rows",
-    "Table",
+    "ScheduleTable",
     "TableMonitor",
     "learn_machine",
     "learn_table",

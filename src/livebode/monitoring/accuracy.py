@@ -16,7 +16,7 @@ _OFF = 1.5  # scatters are at least this many standard deviations of the baselin
 
 
 @dataclass(frozen=True, eq=False)
-class Accuracy:
+class ChangeAccuracy:
     """Accuracy of a change of each component, as healthy windows show it, each of shape (components,).
 
     Attributes
@@ -39,18 +39,18 @@ class Accuracy:
         """Permitted distance of a healthy machine from the model."""
         return 2 * self.scatter
 
-    def at_least(self, other: Accuracy) -> Accuracy:
+    def at_least(self, other: ChangeAccuracy) -> ChangeAccuracy:
         """The coarser of both in each component."""
         pairs = ((getattr(self, name), getattr(other, name)) for name in self.__dataclass_fields__)
-        return Accuracy(*(np.maximum(one, two) for one, two in pairs))
+        return ChangeAccuracy(*(np.maximum(one, two) for one, two in pairs))
 
-    def widened(self, by: Floats | float) -> Accuracy:
+    def widened(self, by: Floats | float) -> ChangeAccuracy:
         """With a further error of the baseline of this standard deviation, (components,)."""
         scatter = np.hypot(self.scatter, by)
-        return Accuracy(self.inflation, scatter, np.maximum(self.smallest, _APART * scatter))
+        return ChangeAccuracy(self.inflation, scatter, np.maximum(self.smallest, _APART * scatter))
 
 
-def accuracy(score: Floats, information: Floats, smallest: Floats, off: Floats | float = 0.0) -> Accuracy:
+def accuracy(score: Floats, information: Floats, smallest: Floats, off: Floats | float = 0.0) -> ChangeAccuracy:
     """From healthy windows in order, shape (windows, components) each; `smallest` as specified, (components,).
 
     `off` is the standard deviation of the baseline's own error over a stretch, (components,).
@@ -63,7 +63,7 @@ def accuracy(score: Floats, information: Floats, smallest: Floats, off: Floats |
     known = total > 0
     rest = np.where(known, (sums / np.where(known, total, 1.0)) ** 2 - 1 / np.where(known, total, np.inf), 0.0)
     scatter = np.hypot(np.sqrt(np.maximum(_mean(rest), 0.0)), _OFF * off)
-    return Accuracy(inflation, scatter, np.maximum(smallest, _APART * scatter))
+    return ChangeAccuracy(inflation, scatter, np.maximum(smallest, _APART * scatter))
 
 
 def _mean(rows: Floats) -> Floats:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from livebode.core import Stage, StatefulBase
 from livebode.monitoring.alarms import Alarm
-from livebode.monitoring.machine import Machine
-from livebode.monitoring.naming import Change, Segment, bound
-from livebode.monitoring.offset import FAR, Offset, Place
+from livebode.monitoring.machine import LearnedMachine
+from livebode.monitoring.naming import NamedChange, ScoredWindows, bound
+from livebode.monitoring.offset import FAR, LocalChange, Offset
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class ActiveAlarms(StatefulBase):
     _stage = Stage("active-alarms", 1)
     _STATE = ("_score", "_information", "_moving")
 
-    def __init__(self, machine: Machine, threshold: float) -> None:
+    def __init__(self, machine: LearnedMachine, threshold: float) -> None:
         self._machine, self._threshold = machine, threshold
         self.alarms: list[Alarm] = []
         self.offset = Offset()
@@ -60,7 +60,12 @@ class ActiveAlarms(StatefulBase):
         return self._moving or any(_share(place, position_m) > _UNSEEN for place in places)
 
     def add(
-        self, change: Change, rival: Change | None, since: tuple[int, float], way_m: tuple[float, float], seen: Segment
+        self,
+        change: NamedChange,
+        rival: NamedChange | None,
+        since: tuple[int, float],
+        way_m: tuple[float, float],
+        seen: ScoredWindows,
     ) -> None:
         """Add an identified change, with the windows since it began: their evidence of changes from the baseline."""
         alarm = Alarm(change, rival, *since, way_m, change.amount, change.bound, self._threshold)
@@ -80,15 +85,15 @@ class ActiveAlarms(StatefulBase):
         new = [a for a in self.alarms if not a.announced]
         if self.far and (not known or any(abs(a.now) == _MOST for a in new)):
             return []
-        new = [a.tell() for a in new if not known or a.change.place is not None or not self._moving]
+        new = [a.announce() for a in new if not known or a.change.place is not None or not self._moving]
         nothing = [a for a in new if abs(a.now) <= max(a.bound, self._middle(a))]
         self.alarms = [a for a in self.alarms if not any(a is n for n in nothing)]
         return [a for a in new if not any(a is n for n in nothing)]
 
     def corrected(self) -> list[tuple[Alarm, float]]:
         """Reported alarms whose amount is wrong now that the others are identified, with the reported amount."""
-        wrong = [(a, a.told) for a in self.alarms if a.change.place is None and a.needs_correction]
-        return [(alarm.tell(), told) for alarm, told in wrong]
+        wrong = [(a, a.reported) for a in self.alarms if a.change.place is None and a.needs_correction]
+        return [(alarm.announce(), reported) for alarm, reported in wrong]
 
     def step(self, score: Floats, information: Floats, position_m: float) -> list[Alarm]:
         """Process a window; returns the alarms that it ends."""
@@ -180,7 +185,7 @@ class ActiveAlarms(StatefulBase):
     def _load(self, state: dict[str, Any]) -> None:
         super()._load(state)
         self.alarms = [Alarm.of(row) for row in state["alarms"]]
-        self.offset = Offset(state["logarithms"], tuple(Place(*map(float, row)) for row in state["places"]))
+        self.offset = Offset(state["logarithms"], tuple(LocalChange(*map(float, row)) for row in state["places"]))
 
 
 def _neglected(step: Floats) -> float:
@@ -188,9 +193,9 @@ def _neglected(step: Floats) -> float:
     return float(np.abs(step).clip(0.0, _MOST).max() ** 2 / 2)
 
 
-def _share(place: Place, position_m: float) -> float:
+def _share(place: LocalChange, position_m: float) -> float:
     return float(place.share(np.array([position_m]))[0])
 
 
-def _same(one: Place, other: Place) -> bool:
+def _same(one: LocalChange, other: LocalChange) -> bool:
     return (one.centre_m, one.width_m) == (other.centre_m, other.width_m)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Stage, StatefulBase
-from livebode.monitoring.naming import Change, Segment
-from livebode.monitoring.offset import Offset, Place
+from livebode.monitoring.naming import NamedChange, ScoredWindows
+from livebode.monitoring.offset import LocalChange, Offset
 
 Floats = NDArray[np.float64]
 
@@ -33,12 +33,12 @@ class Alarm:
         The sum that keeps it active, between 0 and the threshold: at 0 it is cleared.
     announced
         Whether its Event was given.
-    told, reported_bound
+    reported, reported_bound
         Amount and bound of its newest Event.
     """
 
-    change: Change
-    rival: Change | None
+    change: NamedChange
+    rival: NamedChange | None
     since_sample: int
     since_s: float
     way_m: tuple[float, float]
@@ -48,25 +48,25 @@ class Alarm:
     announced: bool = False
     score: float = 0.0
     information: float = 0.0
-    told: float = 0.0
+    reported: float = 0.0
     reported_bound: float = 0.0
 
     @property
     def needs_correction(self) -> bool:
         """Whether the amount now differs from the reported one by more than both bounds."""
-        return self.announced and abs(self.now - self.told) > self.bound + self.reported_bound
+        return self.announced and abs(self.now - self.reported) > self.bound + self.reported_bound
 
-    def tell(self) -> Alarm:
+    def announce(self) -> Alarm:
         """The alarm itself, with its present amount recorded as reported."""
         if not self.announced:
             self.change = replace(self.change, amount=self.now)
-        self.announced, self.told, self.reported_bound = True, self.now, self.bound
+        self.announced, self.reported, self.reported_bound = True, self.now, self.bound
         return self
 
     def row(self) -> list[float]:
         """As numbers, for a snapshot."""
         rest = [self.since_sample, self.since_s, *self.way_m, self.now, self.bound, self.height, self.announced]
-        sums = [self.score, self.information, self.told, self.reported_bound]
+        sums = [self.score, self.information, self.reported, self.reported_bound]
         return [*_numbers(self.change), *_numbers(self.rival), *rest, *sums]
 
     @classmethod
@@ -81,21 +81,21 @@ class Alarm:
 _NUMBERS = 6
 
 
-def _numbers(change: Change | None) -> list[float]:
+def _numbers(change: NamedChange | None) -> list[float]:
     if change is None:
         return [-1.0] * _NUMBERS
-    place = change.place or Place(np.nan, np.nan)
+    place = change.place or LocalChange(np.nan, np.nan)
     return [change.direction, change.amount, change.bound, change.evidence, place.centre_m, place.width_m]
 
 
-def _change(numbers: NDArray[Any]) -> Change | None:
+def _change(numbers: NDArray[Any]) -> NamedChange | None:
     direction, amount, bound, evidence, centre_m, width_m = (float(n) for n in numbers)
-    place = Place(centre_m, width_m) if np.isfinite(centre_m) else None
-    return Change(int(direction), amount, bound, evidence, place) if direction >= 0 else None
+    place = LocalChange(centre_m, width_m) if np.isfinite(centre_m) else None
+    return NamedChange(int(direction), amount, bound, evidence, place) if direction >= 0 else None
 
 
 @dataclass
-class Recent(StatefulBase):
+class RecentWindows(StatefulBase):
     """The newest windows, as many as an alarm may look back over; scores are of changes from the baseline."""
 
     _stage = Stage("recent-windows", 1)
@@ -112,11 +112,11 @@ class Recent(StatefulBase):
         self.information = [*self.information[-self.rows + 1 :], information]
         self.moment = [*self.moment[-self.rows + 1 :], moment]
 
-    def segment(self, first: int, offset: Offset) -> Segment:
+    def segment(self, first: int, offset: Offset) -> ScoredWindows:
         """Windows from position `first` on, which counts from the end, as evidence of changes beyond the offset."""
         position_m = np.array([m[0] for m in self.moment[first:]])
         information = np.array(self.information[first:])
-        return Segment(np.array(self.score[first:]) - information @ offset.logarithms, information, position_m)
+        return ScoredWindows(np.array(self.score[first:]) - information @ offset.logarithms, information, position_m)
 
     def _state(self) -> dict[str, Any]:
         return {name: np.array(getattr(self, name)) for name in ("score", "information", "moment")}

@@ -10,9 +10,9 @@ from livebode.core import BaselineError, Lines, counted
 from livebode.estimation import Settings
 from livebode.monitoring import baseline_file
 from livebode.monitoring.baseline_file import ROLES
-from livebode.monitoring.machine import Machine
+from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.rows import PLACES, places
-from livebode.monitoring.table import Table
+from livebode.monitoring.table import ScheduleTable
 
 _ON = {True: "on", False: "off"}
 
@@ -57,8 +57,8 @@ class Baseline:
     signals: dict[str, str | None]
     estimator: str
     quantity: str
-    tables: tuple[Table, ...]
-    machine: Machine | None
+    tables: tuple[ScheduleTable, ...]
+    machine: LearnedMachine | None
     corrected: bool = False
     runs: tuple[str, ...] = ()
     remark: str = ""

@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import BaselineError, Lines, LivebodeError, OutputError
-from livebode.monitoring.accuracy import Accuracy
-from livebode.monitoring.baseline_part import Part
+from livebode.monitoring.accuracy import ChangeAccuracy
+from livebode.monitoring.baseline_part import BaselinePart
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
-from livebode.monitoring.machine import Machine
+from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.ripple import Ripple
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.monitoring.table import Table
-from livebode.motion import Curve, MovingModel
+from livebode.monitoring.table import ScheduleTable
+from livebode.motion import MovingModel, PositionCurve
 
 ROLES = ("output", "input", "excitation", "schedule")
 
@@ -95,7 +95,7 @@ def load(path: Path) -> dict[str, Any]:
             path=str(path),
             version=found,
         )
-    return _fields(Part(str(path), "", data))
+    return _fields(BaselinePart(str(path), "", data))
 
 
 def _plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
@@ -117,7 +117,7 @@ def _plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _fields(data: Part) -> dict[str, Any]:
+def _fields(data: BaselinePart) -> dict[str, Any]:
     part = data.part("lines")
     bins, quiet = (tuple(int(b) for b in part.array(name, 1, least=0)) for name in ("bins", "quiet"))
     window, rate_hz = part.whole("window"), part.number("rate_hz", 0)
@@ -153,7 +153,7 @@ def _fields(data: Part) -> dict[str, Any]:
     }
 
 
-def _machine_plain(machine: Machine) -> dict[str, Any]:
+def _machine_plain(machine: LearnedMachine) -> dict[str, Any]:
     model = machine.model
     return {
         "inertia_kg_m2": model.inertia_kg_m2,
@@ -177,17 +177,17 @@ def _machine_plain(machine: Machine) -> dict[str, Any]:
     }
 
 
-def _machine(data: Part, lines: Lines) -> Machine:
+def _machine(data: BaselinePart, lines: Lines) -> LearnedMachine:
     low, high = data.number("low_m"), data.number("high_m")
     if high < low:
         raise data.wrong("high_m", "below low_m")
-    stiffness, damping = (Curve(low, high, data.array(name, 1)) for name in ("log_stiffness", "log_damping"))
+    stiffness, damping = (PositionCurve(low, high, data.array(name, 1)) for name in ("log_stiffness", "log_damping"))
     inertia, load, radius = (data.number(name, 0) for name in ("inertia_kg_m2", "load_kg", "radius_m"))
     noise, quiet = data.array("noise_power", 1, least=0), data.array("quiet_power", 1, least=0)
     for name, values, of in (("noise_power", noise, lines.bins), ("quiet_power", quiet, lines.quiet)):
         if len(values) != len(of):
             raise data.wrong(name, f"not {len(of)} numbers")
-    return Machine(
+    return LearnedMachine(
         MovingModel(inertia, load, radius, stiffness, damping),
         noise,
         quiet,
@@ -203,7 +203,7 @@ def _machine(data: Part, lines: Lines) -> Machine:
     )
 
 
-def _ripple(data: Part) -> Ripple:
+def _ripple(data: BaselinePart) -> Ripple:
     ripple = Ripple(*(data.array(name, 1, least=0) for name in Ripple.__dataclass_fields__))
     if ripple.cycles_per_m.size != ripple.amplitude_n_m.size:
         raise data.wrong("amplitude_n_m", f"not {ripple.cycles_per_m.size} numbers")
@@ -215,7 +215,7 @@ def _covariates_plain(covariates: Covariates) -> dict[str, Any]:
     return {"names": list(covariates.names)} | arrays
 
 
-def _covariates(data: Part) -> Covariates:
+def _covariates(data: BaselinePart) -> Covariates:
     names = data.texts("names")
     arrays = {name: data.array(name, dimensions) for name, dimensions in _COVARIATE_ARRAYS.items()}
     for name, array in arrays.items():
@@ -231,14 +231,14 @@ def _between_plain(between: BetweenRuns) -> dict[str, Any]:
     return {"direction": _list(between.direction), "spread": between.spread}
 
 
-def _between(data: Part) -> BetweenRuns:
+def _between(data: BaselinePart) -> BetweenRuns:
     direction = data.array("direction", 1)
     if direction.size != len(DIRECTIONS) or not direction.any():
         raise data.wrong("direction", f"not {len(DIRECTIONS)} numbers of which one is not 0")
     return BetweenRuns(direction, data.number("spread", 0))
 
 
-def _table_plain(table: Table) -> dict[str, Any]:
+def _table_plain(table: ScheduleTable) -> dict[str, Any]:
     return {
         "what": table.what,
         "names": list(table.names),
@@ -255,13 +255,13 @@ def _table_plain(table: Table) -> dict[str, Any]:
     }
 
 
-def _table(data: Part) -> Table:
+def _table(data: BaselinePart) -> ScheduleTable:
     real, imaginary = data.array("mean_re", 3, known=False), data.array("mean_im", 3, known=False)
     if real.shape != imaginary.shape:
         raise data.wrong("mean_im", "not of the shape of mean_re")
     mean = np.empty(real.shape, dtype=np.complex128)
     mean.real, mean.imag = real, imaginary
-    return Table(
+    return ScheduleTable(
         data.text("what"),
         data.texts("names"),
         data.number("low"),
@@ -275,12 +275,12 @@ def _table(data: Part) -> Table:
     )
 
 
-def _accuracy_plain(known: Accuracy) -> dict[str, Any]:
-    return {name: _list(getattr(known, name)) for name in Accuracy.__dataclass_fields__}
+def _accuracy_plain(known: ChangeAccuracy) -> dict[str, Any]:
+    return {name: _list(getattr(known, name)) for name in ChangeAccuracy.__dataclass_fields__}
 
 
-def _accuracy(data: Part) -> Accuracy:
-    return Accuracy(*(data.array(name, 1, least=0, known=False) for name in Accuracy.__dataclass_fields__))
+def _accuracy(data: BaselinePart) -> ChangeAccuracy:
+    return ChangeAccuracy(*(data.array(name, 1, least=0, known=False) for name in ChangeAccuracy.__dataclass_fields__))
 
 
 def _list(array: NDArray[Any]) -> Any:

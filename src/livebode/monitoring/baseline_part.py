@@ -12,21 +12,21 @@ from livebode.core import BaselineError
 
 
 @dataclass(frozen=True)
-class Part:
+class BaselinePart:
     """Values by name; `file` and `path` are for the message where one is invalid."""
 
     file: str
     path: str
     data: Any
 
-    def part(self, name: str) -> Part:
+    def part(self, name: str) -> BaselinePart:
         """A table in it."""
-        return Part(self.file, f"{self.path}{name}.", self._typed(name, dict, "a table"))
+        return BaselinePart(self.file, f"{self.path}{name}.", self._typed(name, dict, "a table"))
 
-    def parts(self, name: str) -> list[Part]:
+    def parts(self, name: str) -> list[BaselinePart]:
         """A list of tables in it."""
         rows = self._typed(name, list, "a list")
-        return [Part(self.file, f"{self.path}{name}[{i}].", row) for i, row in enumerate(rows)]
+        return [BaselinePart(self.file, f"{self.path}{name}[{i}].", row) for i, row in enumerate(rows)]
 
     def text(self, name: str) -> str:
         return str(self._typed(name, str, "a text"))

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import BaselineError, Block, Lines
-from livebode.monitoring.accuracy import Accuracy, accuracy
+from livebode.monitoring.accuracy import ChangeAccuracy, accuracy
 from livebode.monitoring.between_runs import KNOWN, between_runs
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
 from livebode.monitoring.evidence import Evidence
-from livebode.monitoring.machine import Machine, cells
+from livebode.monitoring.machine import LearnedMachine, cells
 from livebode.monitoring.machine_fit import joint_step, moved, normal, normal_of, step_of
 from livebode.monitoring.model_evidence import SIGNALS, ModelEvidence, held, missing, wave, way
 from livebode.monitoring.offset import Offset
@@ -22,7 +22,7 @@ from livebode.monitoring.order_search import find_orders
 from livebode.monitoring.ripple import Ripple, amplitudes, noise_power
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.stretches import Stretches
-from livebode.motion.fit import Fit, Rows
+from livebode.motion.fit import MotionFitOptions, Rows
 
 Floats = NDArray[np.float64]
 Run = Callable[[], Iterable[Block]]
@@ -40,7 +40,7 @@ _ROWS_MIN, _ROWS_MAX = 60, 4000
 _SMALLEST = np.array([0.005, 0.005, 0.05, 0.01])
 # While a change is active, another one must be larger by this factor.
 _FURTHER = np.array([2.0, 2.0, 4.0, 4.0])
-_EXACT = Accuracy(np.ones(4), np.zeros(4), _SMALLEST)
+_EXACT = ChangeAccuracy(np.ones(4), np.zeros(4), _SMALLEST)
 
 
 def learn_machine(
@@ -52,7 +52,7 @@ def learn_machine(
     schedule: str,
     radius_m: float,
     covariates: Sequence[str] = (),
-) -> Machine:
+) -> LearnedMachine:
     """The Machine that is common to all runs.
 
     Two masses are fitted to single windows first, as `MotionCorrection` does; then the model is driven through every
@@ -71,10 +71,10 @@ def learn_machine(
     rows, speed, covariate = _first_look(runs, lines, names)
     low, high = float(rows.position_m.min()), float(rows.position_m.max())
     splines = _SPLINES if high - low > _FLAT_M else (1, 1)
-    fit = Fit(lines.z, lines.rate_hz, radius_m, *splines)
+    fit = MotionFitOptions(lines.z, lines.rate_hz, radius_m, *splines)
     model = fit.refine(rows, fit.start(rows))
     slowest, fastest = float(np.abs(speed).min()), float(np.abs(speed).max())
-    machine = Machine(
+    machine = LearnedMachine(
         model=model,
         noise_power=np.ones(len(lines)),
         quiet_power=np.full(len(lines.quiet), np.inf),
@@ -97,13 +97,13 @@ def learn_machine(
     parts = _all_seen(runs, machine, lines, names)
     machine = _with_uncertainty(parts, machine, lines.rate_hz)
     if (between := between_runs(parts, _SMALLEST)) is not None:
-        machine, parts = _fitted_apart(runs, replace(machine, between=between), lines, names)
+        machine, parts = _fitted_separately(runs, replace(machine, between=between), lines, names)
     return _judged(Evidence.join(parts), machine)
 
 
 def _fitted(
-    runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, ...], passes: int = _PASSES
-) -> Machine:
+    runs: Sequence[Run], machine: LearnedMachine, lines: Lines, names: tuple[str, ...], passes: int = _PASSES
+) -> LearnedMachine:
     """The model, noise and ripple that all runs share (Gauss–Newton on the output's error)."""
     for _ in range(passes):
         parts = _all_seen(runs, machine, lines, names)
@@ -115,9 +115,9 @@ def _fitted(
     return machine
 
 
-def _fitted_apart(
-    runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, ...]
-) -> tuple[Machine, list[Evidence]]:
+def _fitted_separately(
+    runs: Sequence[Run], machine: LearnedMachine, lines: Lines, names: tuple[str, ...]
+) -> tuple[LearnedMachine, list[Evidence]]:
     """The Machine whose runs have an offset each, and its residuals.
 
     Without the offsets, differences between runs would appear as differences between positions, because no two runs
@@ -134,7 +134,7 @@ def _fitted_apart(
     return machine, _all_seen(runs, machine, lines, names, own)
 
 
-def _with_noise(machine: Machine, seen: Evidence) -> Machine:
+def _with_noise(machine: LearnedMachine, seen: Evidence) -> LearnedMachine:
     """The Machine with the noise of these windows, and the size of the ripple."""
     if not len(machine.ripple):
         return replace(machine, noise_power=seen.power.mean(axis=0))
@@ -182,7 +182,7 @@ def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> Itera
 
 
 def _all_seen(
-    runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, ...], own: Floats | None = None
+    runs: Sequence[Run], machine: LearnedMachine, lines: Lines, names: tuple[str, ...], own: Floats | None = None
 ) -> list[Evidence]:
     """Residuals of each run, with its own offset along the direction between runs."""
     if machine.between is None or own is None:
@@ -191,7 +191,7 @@ def _all_seen(
     return [_seen(run, machine, lines, names, offset) for run, offset in zip(runs, offsets)]
 
 
-def _seen(run: Run, machine: Machine, lines: Lines, names: tuple[str, ...], offset: Offset) -> Evidence:
+def _seen(run: Run, machine: LearnedMachine, lines: Lines, names: tuple[str, ...], offset: Offset) -> Evidence:
     """Residuals of the model for a run, judged windows only."""
     source, stretches = ModelEvidence(machine, lines), Stretches(names, lines.window, lines.rate_hz)
     parts = [source.process(stretch, offset) for block in run() for stretch in stretches.process(block)]
@@ -208,7 +208,7 @@ def _seen(run: Run, machine: Machine, lines: Lines, names: tuple[str, ...], offs
     return seen.rows(seen.judged)
 
 
-def _with_uncertainty(parts: Sequence[Evidence], machine: Machine, rate_hz: float) -> Machine:
+def _with_uncertainty(parts: Sequence[Evidence], machine: LearnedMachine, rate_hz: float) -> LearnedMachine:
     """The Machine with the covariance of the covariates' slopes, from fits with one run omitted each."""
     covariates, c = machine.covariates, len(machine.covariates)
     if not c:
@@ -225,7 +225,7 @@ def _with_uncertainty(parts: Sequence[Evidence], machine: Machine, rate_hz: floa
     return replace(machine, covariates=replace(covariates, covariance=np.einsum("jcjd->jcd", own)))
 
 
-def _judged(seen: Evidence, machine: Machine) -> Machine:
+def _judged(seen: Evidence, machine: LearnedMachine) -> LearnedMachine:
     """The Machine with its noise, and with the correlation of neighbouring windows and whole stretches."""
     held = accuracy(seen.score, np.einsum("rjj->rj", seen.information), _SMALLEST)
     if (between := machine.between) is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
 from livebode.monitoring.ripple import Ripple
@@ -21,7 +21,7 @@ _STILL_M = 1e-9  # a travel of zero length has one cell
 
 
 @dataclass(frozen=True, eq=False)
-class Machine:
+class LearnedMachine:
     """Two masses with Keff(x), bs(x), learned from healthy runs, and statistics of their windows.
 
     Attributes
@@ -49,8 +49,8 @@ class Machine:
     model: MovingModel
     noise_power: Floats
     quiet_power: Floats
-    held: Accuracy
-    free: Accuracy
+    held: ChangeAccuracy
+    free: ChangeAccuracy
     slowest_m_per_s: float
     fastest_m_per_s: float
     windows: NDArray[np.int64]

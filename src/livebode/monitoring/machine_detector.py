@@ -9,11 +9,11 @@ import numpy as np
 from livebode.core import Event, Stage, StatefulBase
 from livebode.monitoring import evidence as word
 from livebode.monitoring.active_alarms import ActiveAlarms
-from livebode.monitoring.alarms import Alarm, Recent
+from livebode.monitoring.alarms import Alarm, RecentWindows
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import Evidence
-from livebode.monitoring.machine import Machine
-from livebode.monitoring.naming import Change, Segment, begin_of, candidates, far, lead
+from livebode.monitoring.machine import LearnedMachine
+from livebode.monitoring.naming import NamedChange, ScoredWindows, begin_of, candidates, far, lead
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.run_offset import RunOffset
 from livebode.monitoring.sensitivity import DIRECTIONS
@@ -61,7 +61,7 @@ class MachineDetector(StatefulBase):
         "_passed",
     )  # fmt: skip
 
-    def __init__(self, machine: Machine, threshold: float) -> None:
+    def __init__(self, machine: LearnedMachine, threshold: float) -> None:
         held, free, size = machine.held, machine.free, len(machine.windows)
         self._machine = machine
         self._first = Charts(held.smallest, held.allowed, threshold)
@@ -69,7 +69,7 @@ class MachineDetector(StatefulBase):
         self._cells = Charts(np.repeat(held.smallest[:1], size), np.repeat(held.allowed[:1], size), threshold)
         self.standing = ActiveAlarms(machine, threshold)
         self._own = RunOffset(machine.between, held, threshold)
-        self._recent = Recent(_LOOK_WINDOWS)
+        self._recent = RecentWindows(_LOOK_WINDOWS)
         self._passed = np.full(size, -1)  # mark of the newest window in each cell
         self._pending, self._taken = -1, 0
         self._unknown: set[str] = set()
@@ -99,16 +99,16 @@ class MachineDetector(StatefulBase):
         if self._own.unreachable and word.OFFSET not in self._unknown:
             self._unknown.add(word.OFFSET)
             events.append(offset_unknown(self._machine, self._own.error_reachable, sample, time_s))
-        return events + self._said(sample, time_s)
+        return events + self._new_events(sample, time_s)
 
     def finish(self) -> list[Event]:
         """Identify a change that was found but not yet identified as the likeliest one."""
         if self._pending >= 0:
             self._name(final=True)
         _, sample, time_s = self._recent.moment[-1] if self._recent.moment else (0.0, 0.0, 0.0)
-        return self._said(int(sample), time_s, known=False)
+        return self._new_events(int(sample), time_s, known=False)
 
-    def _said(self, sample: int, time_s: float, known: bool = True) -> list[Event]:
+    def _new_events(self, sample: int, time_s: float, known: bool = True) -> list[Event]:
         """Events of new changes, and corrections of the reported amounts."""
         if self._far:
             self._far = False
@@ -116,7 +116,7 @@ class MachineDetector(StatefulBase):
         new = self.standing.announced(known)
         wrong = self.standing.corrected() if new and known else []
         events = [changed(a, sample, time_s, within_run=self.within_run(a)) for a in new]
-        return events + [corrected(a, told, sample, time_s, within_run=self.within_run(a)) for a, told in wrong]
+        return events + [corrected(a, reported, sample, time_s, within_run=self.within_run(a)) for a, reported in wrong]
 
     def within_run(self, alarm: Alarm) -> bool:
         """Whether its amount is relative to the earlier part of this run, not to the baseline."""
@@ -140,7 +140,7 @@ class MachineDetector(StatefulBase):
         if not self.standing.alarms:
             self._own.step(around, known, mark, time_s)
         if self.standing.directions:
-            rest = Segment(score[np.newaxis], information[np.newaxis], np.array([position_m]))
+            rest = ScoredWindows(score[np.newaxis], information[np.newaxis], np.array([position_m]))
             rest = rest.without(self.standing.directions)
             inflation = self._machine.free.inflation
             self._further.step(rest.score[0] / inflation, np.diagonal(rest.information[0]) / inflation, mark)
@@ -194,7 +194,9 @@ class MachineDetector(StatefulBase):
         if large:
             self._stand([best], rivals[0] if rivals else None, segment, moments)
 
-    def _stand(self, changes: list[Change], rival: Change | None, segment: Segment, moments: list[Moment]) -> None:
+    def _stand(
+        self, changes: list[NamedChange], rival: NamedChange | None, segment: ScoredWindows, moments: list[Moment]
+    ) -> None:
         """Make these changes active, since the likeliest of them began."""
         began = begin_of(segment, max(changes, key=lambda change: change.evidence))
         way = segment.position_m[began:]
@@ -203,10 +205,10 @@ class MachineDetector(StatefulBase):
         for change in changes:
             self.standing.add(change, rival, since, (float(way.min()), float(way.max())), seen)
 
-    def _gone_around(self, segment: Segment) -> bool:
+    def _gone_around(self, segment: ScoredWindows) -> bool:
         return bool(np.ptp(segment.position_m) >= _LOOK * self._machine.way_m)
 
-    def _seen_around(self, segment: Segment, best: Change) -> bool:
+    def _seen_around(self, segment: ScoredWindows, best: NamedChange) -> bool:
         if not self._gone_around(segment):
             return False
         behind = abs(float(segment.position_m[-1]) - best.place.centre_m) if best.place else np.inf

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring.evidence import Evidence
-from livebode.monitoring.machine import Machine
+from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.motion import Curve
+from livebode.motion import PositionCurve
 from livebode.motion.model import basis
 
 Floats = NDArray[np.float64]
@@ -20,7 +20,9 @@ _SMOOTH = 1e-4
 _SLOPE_MAX = 0.5  # of a logarithm per half range of a covariate: prior standard deviation
 
 
-def joint_step(parts: Sequence[Evidence], machine: Machine, own: Floats, rate_hz: float) -> tuple[Floats, Floats]:
+def joint_step(
+    parts: Sequence[Evidence], machine: LearnedMachine, own: Floats, rate_hz: float
+) -> tuple[Floats, Floats]:
     """Step of the unknowns and the delay, and the new offsets of the runs, which are eliminated (Schur complement)."""
     assert machine.between is not None
     direction, prior = machine.between.direction, machine.between.spread**-2
@@ -38,7 +40,7 @@ def joint_step(parts: Sequence[Evidence], machine: Machine, own: Floats, rate_hz
     return step, own + (score - shared @ step) / information
 
 
-def _design(seen: Evidence, machine: Machine) -> Floats:
+def _design(seen: Evidence, machine: LearnedMachine) -> Floats:
     """From the unknowns to the logarithms of stiffness, load, damping, inertia, (rows, 4, unknowns).
 
     The unknowns are the model's, and the slope of each logarithm per half range of each covariate.
@@ -56,13 +58,13 @@ def _design(seen: Evidence, machine: Machine) -> Floats:
     return design
 
 
-def normal(parts: Sequence[Evidence], machine: Machine, rate_hz: float) -> tuple[Floats, Floats]:
+def normal(parts: Sequence[Evidence], machine: LearnedMachine, rate_hz: float) -> tuple[Floats, Floats]:
     """Gradient and information of the unknowns and of the delay in samples, without a prior."""
     gradients, matrices = zip(*(normal_of(part, machine, rate_hz) for part in parts if len(part)))
     return np.sum(gradients, axis=0), np.sum(matrices, axis=0)
 
 
-def normal_of(seen: Evidence, machine: Machine, rate_hz: float) -> tuple[Floats, Floats]:
+def normal_of(seen: Evidence, machine: LearnedMachine, rate_hz: float) -> tuple[Floats, Floats]:
     """The same of one run's windows, (unknowns + 1,), (unknowns + 1, unknowns + 1)."""
     design = _design(seen, machine)
     gradient = np.append(np.einsum("rju,rj->u", design, seen.score), seen.late_score.sum() / rate_hz)
@@ -74,7 +76,7 @@ def normal_of(seen: Evidence, machine: Machine, rate_hz: float) -> tuple[Floats,
     return gradient, matrix
 
 
-def step_of(normal: tuple[Floats, Floats], machine: Machine) -> Floats:
+def step_of(normal: tuple[Floats, Floats], machine: LearnedMachine) -> Floats:
     """Of the unknowns, and of the delay in samples."""
     gradient, matrix = normal
     model, slopes = machine.model, machine.covariates.slope * machine.covariates.half_range
@@ -94,7 +96,7 @@ def step_of(normal: tuple[Floats, Floats], machine: Machine) -> Floats:
     return np.asarray(step)
 
 
-def moved(machine: Machine, step: Floats, rate_hz: float) -> Machine:
+def moved(machine: LearnedMachine, step: Floats, rate_hz: float) -> LearnedMachine:
     """The Machine after a step of its model, its delay and its covariates' slopes."""
     model, covariates = machine.model, machine.covariates
     k, b = len(model.log_stiffness.weights), len(model.log_damping.weights)
@@ -103,8 +105,8 @@ def moved(machine: Machine, step: Floats, rate_hz: float) -> Machine:
         model,
         load_kg=float(model.load_kg * np.exp(step[0])),
         inertia_kg_m2=float(model.inertia_kg_m2 * np.exp(step[1])),
-        log_stiffness=Curve(low, high, model.log_stiffness.weights + step[2 : 2 + k]),
-        log_damping=Curve(low, high, model.log_damping.weights + step[2 + k : 2 + k + b]),
+        log_stiffness=PositionCurve(low, high, model.log_stiffness.weights + step[2 : 2 + k]),
+        log_damping=PositionCurve(low, high, model.log_damping.weights + step[2 + k : 2 + k + b]),
     )
     slopes = step[2 + k + b : -1].reshape(covariates.slope.shape) / covariates.half_range
     return replace(

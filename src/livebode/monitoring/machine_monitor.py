@@ -9,11 +9,11 @@ from livebode.core import Block, Event, Lines, Stage, StatefulBase
 from livebode.monitoring.alarms import Alarm
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.false_alarms import threshold
-from livebode.monitoring.machine import Machine
+from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.machine_detector import CHARTS, MachineDetector
 from livebode.monitoring.model_evidence import ModelEvidence
 from livebode.monitoring.sentences import about, about_far, joint
-from livebode.monitoring.stretches import Stretch, Stretches
+from livebode.monitoring.stretches import Stretches, WindowStretch
 
 Look = Callable[[Evidence], object]
 
@@ -28,7 +28,7 @@ class MachineMonitor(StatefulBase):
     _stage = Stage("machine-monitor", 1)
     _STATE = ("_stretches", "detector")
 
-    def __init__(self, machine: Machine, lines: Lines, names: tuple[str, str, str], mean_s: float) -> None:
+    def __init__(self, machine: LearnedMachine, lines: Lines, names: tuple[str, str, str], mean_s: float) -> None:
         self._stretches = Stretches((*names, *machine.covariates.names), lines.window, lines.rate_hz)
         self._evidence = ModelEvidence(machine, lines)
         charts = CHARTS + (2 if machine.between is not None else 0)
@@ -53,18 +53,18 @@ class MachineMonitor(StatefulBase):
         """Active changes as plain data."""
         alarms = self.detector.standing.alarms
         far = [about_far(alarms[-1])] if self.detector.standing.far else []
-        return far + [about(alarm, within_run=self.detector.within_run(alarm)) for alarm in self._told()]
+        return far + [about(alarm, within_run=self.detector.within_run(alarm)) for alarm in self._announced()]
 
     def together(self) -> str:
         """Their present amounts, estimated together, as text; empty where none is known."""
         if self.detector.standing.far:
             return ": the machine is so far from the baseline that no amount can be given"
-        return joint(self._told())
+        return joint(self._announced())
 
-    def _told(self) -> list[Alarm]:
+    def _announced(self) -> list[Alarm]:
         return [alarm for alarm in self.detector.standing.alarms if alarm.announced]
 
-    def _judged(self, stretches: list[Stretch], look: Look | None) -> list[Event]:
+    def _judged(self, stretches: list[WindowStretch], look: Look | None) -> list[Event]:
         events: list[Event] = []
         for stretch in stretches:
             seen = self._evidence.process(stretch, self.detector.offset)

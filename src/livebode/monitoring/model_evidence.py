@@ -11,11 +11,11 @@ from livebode.core import Lines
 from livebode.monitoring import evidence as word
 from livebode.monitoring.covariates import window_means
 from livebode.monitoring.evidence import Evidence
-from livebode.monitoring.machine import Machine
+from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.ripple import allowed_for
 from livebode.monitoring.sensitivity import DIRECTIONS, Replay
-from livebode.monitoring.stretches import LEAD_S, Stretch
+from livebode.monitoring.stretches import LEAD_S, WindowStretch
 from livebode.motion.orders import shaft_position
 from livebode.motion.replay import without_drift
 
@@ -49,13 +49,13 @@ class ModelEvidence:
     the stretch, and the windows' own values are included to first order.
     """
 
-    def __init__(self, machine: Machine, lines: Lines) -> None:
+    def __init__(self, machine: LearnedMachine, lines: Lines) -> None:
         self._machine, self._lines = machine, lines
         self._replay = Replay(machine.model, lines.rate_hz, machine.delay_s)
         self.level = 1.0
         """Ratio of the noise to the learned one, at least 1."""
 
-    def process(self, stretch: Stretch, offset: Offset) -> Evidence:
+    def process(self, stretch: WindowStretch, offset: Offset) -> Evidence:
         """Evidence of every window of the stretch, in order."""
         lines, machine = self._lines, self._machine
         bad = missing(stretch.data[:SIGNALS])
@@ -114,14 +114,14 @@ class ModelEvidence:
         common = shift.sum(axis=0) / max(np.count_nonzero(known), 1)
         return replace(offset, logarithms=offset.logarithms + common), np.where(known, shift - common, 0.0)
 
-    def way(self, stretch: Stretch) -> tuple[Floats, Floats, NDArray[np.str_]]:
+    def way(self, stretch: WindowStretch) -> tuple[Floats, Floats, NDArray[np.str_]]:
         """Position, speed and status of every window, without the check for disturbances by the noise."""
         bad = missing(stretch.data[:SIGNALS])
         begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
         covariate = window_means(stretch.data[SIGNALS:], begin, self._lines.window)
         return self._way(held(stretch.data[:SIGNALS], bad)[2], begin, stretch, bad, covariate)
 
-    def residual(self, stretch: Stretch, offset: Offset) -> tuple[Floats, Floats]:
+    def residual(self, stretch: WindowStretch, offset: Offset) -> tuple[Floats, Floats]:
         """The measured velocity less the model's, without slow drift, and the shaft's position, (samples,) each."""
         u, y, x = held(stretch.data[:SIGNALS], missing(stretch.data[:SIGNALS]))
         begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
@@ -139,7 +139,7 @@ class ModelEvidence:
         return np.array([without_drift(row, still, self._lines.window) for row in velocity])
 
     def _way(
-        self, x: Floats, begin: NDArray[np.int64], stretch: Stretch, bad: NDArray[np.bool_], covariate: Floats
+        self, x: Floats, begin: NDArray[np.int64], stretch: WindowStretch, bad: NDArray[np.bool_], covariate: Floats
     ) -> tuple[Floats, Floats, NDArray[np.str_]]:
         """Position and speed at the windows' centres, and which windows are judged."""
         window, machine = self._lines.window, self._machine

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.monitoring.accuracy import Accuracy
-from livebode.monitoring.offset import FAR, Place
+from livebode.monitoring.accuracy import ChangeAccuracy
+from livebode.monitoring.offset import FAR, LocalChange
 from livebode.monitoring.sensitivity import DIRECTIONS
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,7 @@ _SHAPE = 0.3  # of a place's depth, which depends on its assumed shape
 
 
 @dataclass(frozen=True)
-class Change:
+class NamedChange:
     """A change of one parameter, everywhere or at a place.
 
     Attributes
@@ -43,7 +43,7 @@ class Change:
     amount: float
     bound: float
     evidence: float
-    place: Place | None = None
+    place: LocalChange | None = None
 
     def share(self, position_m: Floats) -> Floats:
         """Share of the change at these positions, 0 … 1."""
@@ -51,14 +51,14 @@ class Change:
 
 
 @dataclass(frozen=True, eq=False)
-class Segment:
+class ScoredWindows:
     """Windows since a change seems to have begun: score (rows, 4), information (rows, 4, 4), position (rows,)."""
 
     score: Floats
     information: Floats
     position_m: Floats
 
-    def without(self, known: list[int]) -> Segment:
+    def without(self, known: list[int]) -> ScoredWindows:
         """The same with changes of any size in these directions allowed for."""
         if not known:
             return self
@@ -68,10 +68,10 @@ class Segment:
         information = self.information - gain @ self.information[:, known]
         for i in known:
             score[:, i], information[:, i], information[:, :, i] = 0.0, 0.0, 0.0
-        return Segment(score, information, self.position_m)
+        return ScoredWindows(score, information, self.position_m)
 
 
-def candidates(segment: Segment, known: Accuracy, way_m: float, local: bool = True) -> list[Change]:
+def candidates(segment: ScoredWindows, known: ChangeAccuracy, way_m: float, local: bool = True) -> list[NamedChange]:
     """Every single change, the likeliest first; the `known` accuracy of the healthy machine widens the bounds.
 
     `way_m` is the learned travel; with `local`, places of a few hundredths of it are searched too.
@@ -79,7 +79,7 @@ def candidates(segment: Segment, known: Accuracy, way_m: float, local: bool = Tr
     score = segment.score.sum(axis=0)
     information = np.einsum("rjj->j", segment.information)
     found = [
-        Change(
+        NamedChange(
             j, score[j] / information[j], bound(known, j, float(information[j])), score[j] ** 2 / (2 * information[j])
         )
         for j in range(len(DIRECTIONS))
@@ -90,13 +90,13 @@ def candidates(segment: Segment, known: Accuracy, way_m: float, local: bool = Tr
     return sorted(found, key=lambda change: -change.evidence)
 
 
-def bound(known: Accuracy, direction: int, information: float) -> float:
+def bound(known: ChangeAccuracy, direction: int, information: float) -> float:
     """Half-width of the 95 % bound, from windows with this total information."""
     noise = np.sqrt(known.inflation[direction] / information)
     return float(_CONFIDENCE * np.hypot(noise, known.scatter[direction]))
 
 
-def _place(segment: Segment, known: Accuracy, way_m: float) -> Change:
+def _place(segment: ScoredWindows, known: ChangeAccuracy, way_m: float) -> NamedChange:
     """The likeliest bell-shaped place of changed stiffness."""
     x, widths = segment.position_m, _WIDTHS * way_m
     centres = np.arange(x.min(), x.max() + _GRID * way_m, _GRID * way_m)
@@ -107,17 +107,17 @@ def _place(segment: Segment, known: Accuracy, way_m: float) -> Change:
         evidence = np.where(information > 0, score**2 / (2 * information), 0.0)
     c, w = np.unravel_index(int(np.argmax(evidence)), evidence.shape)
     amount = float(score[c, w] / information[c, w])
-    return Change(
+    return NamedChange(
         _STIFFNESS,
         amount,
         float(np.hypot(bound(known, _STIFFNESS, float(information[c, w])), _SHAPE * amount)),
         # One of many places, chosen by the data: the likelihood is reduced by the effect of this choice.
         float(evidence[c, w] - np.log(max(np.ptp(x) / widths[0], 1.0) * len(widths))),
-        Place(float(centres[c]), float(widths[w])),
+        LocalChange(float(centres[c]), float(widths[w])),
     )
 
 
-def far(segment: Segment, best: Change, known: Accuracy) -> list[Change]:
+def far(segment: ScoredWindows, best: NamedChange, known: ChangeAccuracy) -> list[NamedChange]:
     """All directions at once, where the machine is far from the baseline and no single change explains it; else none.
 
     A large change of one direction is nonlinear, so that a linear model confuses it with others and explains none.
@@ -128,11 +128,12 @@ def far(segment: Segment, best: Change, known: Accuracy) -> list[Change]:
         return []
     own = np.diagonal(information)
     return [
-        Change(j, float(amount[j]), bound(known, j, float(own[j])), float(own[j] * amount[j] ** 2 / 2)) for j in _FIRM
+        NamedChange(j, float(amount[j]), bound(known, j, float(own[j])), float(own[j] * amount[j] ** 2 / 2))
+        for j in _FIRM
     ]
 
 
-def lead(segment: Segment, best: Change, rival: Change, free: Accuracy) -> float:
+def lead(segment: ScoredWindows, best: NamedChange, rival: NamedChange, free: ChangeAccuracy) -> float:
     """Log-likelihood ratio of the windows between two changes, nats, with the uncertainty of the model allowed for.
 
     Two directions are separated by the part of one that remains with the other free; the accuracy of that part on a
@@ -146,7 +147,7 @@ def lead(segment: Segment, best: Change, rival: Change, free: Accuracy) -> float
     return float(ahead / (free.inflation[b] + left * free.scatter[b] ** 2))
 
 
-def begin_of(segment: Segment, change: Change) -> int:
+def begin_of(segment: ScoredWindows, change: NamedChange) -> int:
     """Row from which the windows best support the change: its likeliest beginning."""
     amount = change.amount * change.share(segment.position_m)
     score, information = segment.score[:, change.direction], segment.information[:, change.direction, change.direction]

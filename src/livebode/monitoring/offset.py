@@ -14,7 +14,7 @@ FAR = 0.2
 
 
 @dataclass(frozen=True)
-class Place:
+class LocalChange:
     """A bell-shaped change of ln Keff: its centre and standard deviation, m, and its depth."""
 
     centre_m: float
@@ -35,7 +35,7 @@ class Offset:
     """Active changes: of the logarithms of stiffness, load, damping, inertia, (4,), and of places."""
 
     logarithms: Floats = field(default_factory=lambda: np.zeros(4))
-    places: tuple[Place, ...] = ()
+    places: tuple[LocalChange, ...] = ()
 
     def stiffness(self, position_m: Floats) -> Floats:
         """Change of ln Keff at these positions."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Lines
 from livebode.monitoring.evidence import JUDGED
-from livebode.monitoring.machine import Machine
+from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.model_evidence import ModelEvidence
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.stretches import Stretches
@@ -18,7 +18,9 @@ from livebode.motion.orders import OrderSpectrum
 Floats = NDArray[np.float64]
 
 
-def find_orders(runs: Iterable[Iterable[Block]], machine: Machine, lines: Lines, names: tuple[str, ...]) -> Floats:
+def find_orders(
+    runs: Iterable[Iterable[Block]], machine: LearnedMachine, lines: Lines, names: tuple[str, ...]
+) -> Floats:
     """Orders in cycles a metre, the strongest first."""
     if machine.way_m == 0:
         return np.zeros(0)
@@ -30,7 +32,7 @@ def find_orders(runs: Iterable[Iterable[Block]], machine: Machine, lines: Lines,
 
 
 def _strokes(
-    run: Iterable[Block], machine: Machine, lines: Lines, names: tuple[str, ...]
+    run: Iterable[Block], machine: LearnedMachine, lines: Lines, names: tuple[str, ...]
 ) -> Iterator[tuple[Floats, Floats]]:
     """Residual and position of windows in a row that are judged."""
     source, stretches = ModelEvidence(machine, lines), Stretches(names, lines.window, lines.rate_hz)

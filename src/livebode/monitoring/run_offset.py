@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Stage, StatefulBase
-from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.between_runs import KNOWN, BetweenRuns
 from livebode.monitoring.charts import Charts
-from livebode.monitoring.naming import Segment
+from livebode.monitoring.naming import ScoredWindows
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class RunOffset(StatefulBase):
     _stage = Stage("run-offset", 1)
     _STATE = ("chart", "_sums", "_fixed", "_last_s", "replayed")
 
-    def __init__(self, between: BetweenRuns | None, held: Accuracy, threshold: float) -> None:
+    def __init__(self, between: BetweenRuns | None, held: ChangeAccuracy, threshold: float) -> None:
         self._between, self._held = between, held
         along = slice(None) if between is None else between.dominant(held.smallest)
         self._inflation = float(held.inflation[along].max())
@@ -92,9 +92,9 @@ class RunOffset(StatefulBase):
             return score, information
         return self._between.projected(score, information, self._held.smallest)
 
-    def segment(self, segment: Segment) -> Segment:
+    def segment(self, segment: ScoredWindows) -> ScoredWindows:
         """The same of a segment."""
-        return Segment(*self.judged(segment.score, segment.information), segment.position_m)
+        return ScoredWindows(*self.judged(segment.score, segment.information), segment.position_m)
 
     def step(self, score: Floats, information: Floats, mark: int, time_s: float) -> None:
         """Process a window without an alarm: evidence around the baseline, (4,), (4, 4)."""

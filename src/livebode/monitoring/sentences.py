@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from livebode.monitoring.alarms import Alarm
     from livebode.monitoring.covariates import Covariates
     from livebode.monitoring.evidence import Evidence
-    from livebode.monitoring.machine import Machine
-    from livebode.monitoring.naming import Change
+    from livebode.monitoring.machine import LearnedMachine
+    from livebode.monitoring.naming import NamedChange
 
 Floats = NDArray[np.float64]
 
@@ -58,13 +58,13 @@ def about_far(alarm: Alarm) -> dict[str, Any]:
     return about(alarm) | unknown | {"what": "machine", "may_also_be": None}
 
 
-def corrected(alarm: Alarm, told: float, sample: int, time_s: float, *, within_run: bool = False) -> Event:
+def corrected(alarm: Alarm, reported: float, sample: int, time_s: float, *, within_run: bool = False) -> Event:
     """The corrected amount of a reported change, after another change was identified that seemed part of it."""
     message = (
         f"With all changes since then allowed for, {_amount(alarm.change, alarm.now, alarm.bound)} than "
-        f"{_reference(within_run)}, not {_size(told)} as reported earlier."
+        f"{_reference(within_run)}, not {_size(reported)} as reported earlier."
     )
-    details = about(alarm, within_run=within_run) | {"told_percent": percent(told)}
+    details = about(alarm, within_run=within_run) | {"told_percent": percent(reported)}
     return Event("change-corrected", sample, time_s, message, details)
 
 
@@ -86,7 +86,7 @@ def cleared(alarm: Alarm, sample: int, time_s: float, *, within_run: bool = Fals
     return Event("change-cleared", sample, time_s, message, about(alarm, within_run=within_run))
 
 
-def unknown(machine: Machine, seen: Evidence, row: int) -> Event:
+def unknown(machine: LearnedMachine, seen: Evidence, row: int) -> Event:
     """The machine is outside of the learned range in this window."""
     status, position_m, speed_m_per_s = str(seen.status[row]), seen.position_m[row], seen.speed_m_per_s[row]
     details = {"reason": status, "position_m": float(position_m), "speed_m_per_s": float(speed_m_per_s)}
@@ -106,7 +106,7 @@ def unknown(machine: Machine, seen: Evidence, row: int) -> Event:
     return Event("baseline-unknown", int(seen.sample[row]), float(seen.time_s[row]), message, details)
 
 
-def offset_unknown(machine: Machine, error: float, sample: int, time_s: float) -> Event:
+def offset_unknown(machine: LearnedMachine, error: float, sample: int, time_s: float) -> Event:
     """The windows of this run do not determine its offset from the baseline; `error` is in smallest changes."""
     between, smallest = machine.between, machine.held.smallest
     assert between is not None
@@ -167,7 +167,7 @@ def _reference(within_run: bool) -> str:
     return "before in this run" if within_run else "in the baseline"
 
 
-def _amount(change: Change, amount: float, bound: float) -> str:
+def _amount(change: NamedChange, amount: float, bound: float) -> str:
     within = bound_percent(amount, bound)
     digits = 2 if within < 0.1 else 1
     size = f"{abs(percent(amount)):.{digits}f} ± {within:.{digits}f} %"
@@ -178,5 +178,5 @@ def _size(amount: float) -> str:
     return f"{abs(percent(amount)):.1f} % {'less' if amount < 0 else 'more'}"
 
 
-def _where(change: Change) -> str:
+def _where(change: NamedChange) -> str:
     return f" around position {change.place.centre_m:.3g}" if change.place else ""

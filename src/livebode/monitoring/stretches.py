@@ -17,7 +17,7 @@ LEAD_S = 0.5  # for a model to reach the machine's state; a Q of 10 at 50 Hz dec
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class WindowStretch:
     """Whole windows on the grid of sample numbers, the lead before them and up to a window after them.
 
     `data` (signals, samples) begins with sample number `start`, `first` and `last` are numbers of windows: window i
@@ -44,7 +44,7 @@ class Stretches(StatefulBase):
         self._parts: list[Floats] = []
         self._start, self._stop, self._next, self._settled, self._origin_s = 0, -1, 0, 0, 0.0
 
-    def process(self, block: Block) -> list[Stretch]:
+    def process(self, block: Block) -> list[WindowStretch]:
         """Stretches that this Block completes."""
         data = block.data[[block.index(name) for name in self._names]]
         done = self.finish() if self._stop >= 0 and (block.gap or block.start != self._stop) else []
@@ -58,7 +58,7 @@ class Stretches(StatefulBase):
             done.append(self._cut(self._end()))
         return done
 
-    def finish(self) -> list[Stretch]:
+    def finish(self) -> list[WindowStretch]:
         """The remaining stretches, without a last window that has none after it; the next Block starts a new lead."""
         last = self._stop // self._window - 1
         done = [self._cut(last)] if self._stop >= 0 and last > self._next else []
@@ -68,12 +68,12 @@ class Stretches(StatefulBase):
     def _end(self) -> int:
         return (self._next // WINDOWS + 1) * WINDOWS
 
-    def _cut(self, last: int) -> Stretch:
+    def _cut(self, last: int) -> WindowStretch:
         data = np.concatenate(self._parts, axis=1)
         begin = max(self._start, self._next * self._window - self._lead)
         end = min((last + 1) * self._window, self._stop)
         cut = data[:, begin - self._start : end - self._start]
-        stretch = Stretch(cut, begin, self._next, last, self._settled, self._origin_s)
+        stretch = WindowStretch(cut, begin, self._next, last, self._settled, self._origin_s)
         self._next = last
         keep = max(self._start, last * self._window - self._lead)
         self._parts, self._start = [data[:, keep - self._start :].copy()], keep

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.rows import Rows
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ KNOWN = 4.0  # a change is at least this many standard deviations of the mean th
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class ScheduleTable:
     """Mean and covariance of rows of numbers in every bin of a schedule, by direction.
 
     A row is the result of a window: its response at the lines, or the parameters fitted to it. Deviations are
@@ -59,7 +59,7 @@ class Table:
     covariance: Floats
     variance: Floats
     count: NDArray[np.int64]
-    accuracy: Accuracy
+    accuracy: ChangeAccuracy
 
     def place(self, rows: Rows) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """Flat number of the cell (bin and direction) of each row, and whether the cell was learned."""

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import BaselineError
-from livebode.monitoring.accuracy import STRETCH, Accuracy, accuracy
+from livebode.monitoring.accuracy import STRETCH, ChangeAccuracy, accuracy
 from livebode.monitoring.rows import Rows
-from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, Table, cells
+from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, ScheduleTable, cells
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ _STILL = 0.05  # of the fastest usual step
 _ENOUGH = 0.9  # of the cells are to be known well enough for the smallest change
 
 
-def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: int = 1) -> Table:
+def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: int = 1) -> ScheduleTable:
     """Mean and covariance in 24 bins of the schedule, by direction.
 
     The runs should contain the usual speeds, directions and temperatures. The correlation of consecutive windows and
@@ -80,7 +80,7 @@ def _grid(rows: Rows) -> tuple[float, float, float, int]:
 def _moments(
     what: str, names: tuple[str, ...], grid: tuple[float, float, float], bins: int, rows: Rows,
     cell: NDArray[np.intp], overlap: int,
-) -> Table:  # fmt: skip
+) -> ScheduleTable:  # fmt: skip
     number, columns = bins * WAYS, rows.value.shape[1]
     lines = what == "lines"
     parts = (columns, 2) if lines else (1, columns)
@@ -97,7 +97,7 @@ def _moments(
         part = np.stack([relative.real, relative.imag], axis=2) if lines else relative.real[:, np.newaxis, :]
         covariance[i] = np.einsum("rgi,rgj->gij", part, part) / len(part) * count[i] / (count[i] - 1)
     components = 2 * columns if lines else columns
-    return Table(
+    return ScheduleTable(
         what,
         names,
         *grid,
@@ -105,11 +105,11 @@ def _moments(
         covariance.reshape(bins, WAYS, *covariance.shape[1:]),
         variance.reshape(bins, WAYS, columns),
         count.reshape(bins, WAYS),
-        Accuracy(np.ones(components), np.zeros(components), np.full(components, _SMALLEST)),
+        ChangeAccuracy(np.ones(components), np.zeros(components), np.full(components, _SMALLEST)),
     )
 
 
-def _smallest(table: Table) -> Floats:
+def _smallest(table: ScheduleTable) -> Floats:
     """The change that most cells can detect, at least a hundredth."""
     own = np.einsum("...ii->...i", table.covariance).reshape(table.count.size, -1)
     enough = table.count.ravel() >= WINDOWS_MIN
@@ -117,7 +117,7 @@ def _smallest(table: Table) -> Floats:
     return np.asarray(np.maximum(_SMALLEST, np.quantile(known, _ENOUGH, axis=0)))
 
 
-def _off(table: Table, cell: NDArray[np.intp], information: Floats) -> Floats:
+def _off(table: ScheduleTable, cell: NDArray[np.intp], information: Floats) -> Floats:
     """Standard deviation of the sum of the means' own errors over a stretch of rows, (components,).
 
     The mean of n rows has an error of variance/n, the same in every row of its cell: a machine that remains in one cell

@@ -12,7 +12,7 @@ from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.noise_level import NoiseLevel
 from livebode.monitoring.rows import Rows
-from livebode.monitoring.table import Table
+from livebode.monitoring.table import ScheduleTable
 from livebode.monitoring.table_sentences import cleared, differs, unknown
 
 Floats = NDArray[np.float64]
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 _LOOK_WINDOWS = 10  # rows between detection and report, so that all changes are visible
 _KEPT = 600  # rows, over which the amount of a change is taken at most
 _CONFIDENCE = 1.96
-_TOLD = 3.0  # standard deviations, from which on a component counts among what changed
+_CHANGED_FROM = 3.0  # standard deviations, from which on a component counts among what changed
 
 
 class TableMonitor(StatefulBase):
@@ -42,7 +42,7 @@ class TableMonitor(StatefulBase):
     _stage = Stage("table-monitor", 1)
     _STATE = ("_charts", "_noise", "_standing", "_seen_in", "judged", "_found", "_told_unknown")
 
-    def __init__(self, table: Table, mean_s: float, step_s: float) -> None:
+    def __init__(self, table: ScheduleTable, mean_s: float, step_s: float) -> None:
         self._table = table
         size = table.accuracy.smallest.size
         self._charts = Charts(table.accuracy.smallest, table.accuracy.allowed, threshold(mean_s, step_s, 2 * size))
@@ -88,7 +88,7 @@ class TableMonitor(StatefulBase):
         """An alarm that is not reported yet."""
         if self._found < 0 or not len(self._moment):
             return []
-        return self._tell()
+        return self._changes()
 
     def _row(self, score: Floats, information: Floats, moment: tuple[float, int, float, float]) -> list[Event]:
         self.judged += 1
@@ -109,9 +109,9 @@ class TableMonitor(StatefulBase):
         self._moment = np.vstack([self._moment, moment])[-_KEPT:]
         if self._found < 0 and self._charts.raised.any():
             self._found = self.judged
-        return self._tell() if 0 <= self._found <= self.judged - _LOOK_WINDOWS else []
+        return self._changes() if 0 <= self._found <= self.judged - _LOOK_WINDOWS else []
 
-    def _tell(self) -> list[Event]:
+    def _changes(self) -> list[Event]:
         raised = self._charts.sums >= self._charts.threshold
         first = _began(self._score, self._information, np.asarray(raised.any(axis=0)))
         # The window in which the change occurs contains a part of it; the amount is from the windows after it.
@@ -121,17 +121,17 @@ class TableMonitor(StatefulBase):
         seen = information > 0
         amount = np.where(seen, score / np.where(seen, information, 1.0), 0.0)
         sigma = np.where(seen, np.hypot(1 / np.sqrt(np.where(seen, information, 1.0)), accuracy.scatter), np.inf)
-        told = (np.abs(amount) >= np.maximum(_TOLD * sigma, accuracy.smallest / 2)) | raised.any(axis=0)
-        self._standing, self._found = told, -1
-        if not told.any():  # the sum that raised it decreased again before the report
+        changed = (np.abs(amount) >= np.maximum(_CHANGED_FROM * sigma, accuracy.smallest / 2)) | raised.any(axis=0)
+        self._standing, self._found = changed, -1
+        if not changed.any():  # the sum that raised it decreased again before the report
             self._forget()
             return []
         moment = self._moment[first:]
         self._seen_in[:] = False
         self._seen_in[moment[:, 3].astype(int)] = True
-        event = differs(self._table, told, amount, _CONFIDENCE * sigma, moment)
+        event = differs(self._table, changed, amount, _CONFIDENCE * sigma, moment)
         # A named component without a sum of its own gets one that keeps the alarm active.
-        up = np.stack([amount > 0, amount <= 0]) & told
+        up = np.stack([amount > 0, amount <= 0]) & changed
         self._charts.sums = np.where(up, self._charts.threshold, 0.0)
         self._forget()
         return [event]

@@ -9,18 +9,18 @@ from numpy.typing import NDArray
 
 from livebode.core import Event
 from livebode.core.clock import moment as clock_moment
-from livebode.monitoring.table import Table
+from livebode.monitoring.table import ScheduleTable
 
 Floats = NDArray[np.float64]
 
 _NAMED = 4
 
 
-def differs(table: Table, told: NDArray[np.bool_], amount: Floats, bound: Floats, moment: Floats) -> Event:
+def differs(table: ScheduleTable, changed: NDArray[np.bool_], amount: Floats, bound: Floats, moment: Floats) -> Event:
     """A change; `moment` is schedule, sample and time of every row since it began."""
     if table.what == "lines":
         amount, bound = _polar(amount, bound)
-    items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in np.flatnonzero(told)]
+    items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in np.flatnonzero(changed)]
     items.sort(key=lambda item: -abs(item["amount"]) / item["bound"])
     named = "; ".join(_phrase(item) for item in items[:_NAMED])
     more = f"; and {len(items) - _NAMED} more" if len(items) > _NAMED else ""
@@ -50,7 +50,7 @@ def _polar(amount: Floats, bound: Floats) -> tuple[Floats, Floats]:
     return amounts, np.stack([magnitude, phase], axis=1).ravel()
 
 
-def cleared(table: Table, sample: int, time_s: float) -> Event:
+def cleared(table: ScheduleTable, sample: int, time_s: float) -> Event:
     """All changes have disappeared."""
     message = f"At {clock_moment(time_s)} the {_KIND[table.what]} agree with the baseline again."
     return Event("change-cleared", sample, time_s, message, {"what": table.what})
@@ -68,7 +68,7 @@ def unknown(schedule: float, sample: int, time_s: float) -> Event:
 _KIND = {"lines": "responses", "parameters": "parameters"}
 
 
-def _item(table: Table, component: int, amount: float, bound: float) -> dict[str, Any]:
+def _item(table: ScheduleTable, component: int, amount: float, bound: float) -> dict[str, Any]:
     if table.what == "parameters":
         return {
             "name": table.names[component],

@@ -1,6 +1,6 @@
 """Responses of an axis in motion, corrected by a model that follows the axis's motion."""
 
 from livebode.motion.correction import MotionCorrection
-from livebode.motion.model import Curve, MovingModel
+from livebode.motion.model import MovingModel, PositionCurve
 
-__all__ = ["Curve", "MotionCorrection", "MovingModel"]
+__all__ = ["MotionCorrection", "MovingModel", "PositionCurve"]

@@ -19,16 +19,16 @@ def check(
             "name their channels",
             argument="schedule" if settings.input is not None else "input",
         )
-    for name, wanted in (("quantity", "plant"), ("average", False), ("estimator", "joint")):
+    for name, required in (("quantity", "plant"), ("average", False), ("estimator", "joint")):
         value = getattr(settings, name)
-        if value not in (wanted, "direct"):
+        if value not in (required, "direct"):
             raise UsageError(
                 "conflict",
                 f"{name}={value!r} cannot be corrected for motion",
-                f"take {wanted!r}, or leave out the correction ([motion])",
+                f"take {required!r}, or leave out the correction ([motion])",
                 argument=name,
                 value=value,
-                allowed=[wanted],
+                allowed=[required],
             )
     if not (np.isfinite(radius_m) and radius_m > 0):
         raise UsageError(

@@ -49,7 +49,7 @@ class Chunk:
         return np.lib.stride_tricks.sliding_window_view(signal, window)[sample - self.start - window + 1]
 
 
-class Recorded(StatefulBase):
+class RecentSamples(StatefulBase):
     """The newest samples of w, u, y, x, as many as the next chunk needs."""
 
     _stage = Stage("recorded-samples", 1)

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, Stage, StatefulBase, hand_over, ignore
 from livebode.estimation import Settings, Tracker
 from livebode.motion.checks import check
-from livebode.motion.chunk import Chunk, Recorded
+from livebode.motion.chunk import Chunk, RecentSamples
 from livebode.motion.drive import drive_of
 from livebode.motion.learner import Learner, Replayed, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.replay import by_excitation
 from livebode.motion.residual import Scatter, residual
-from livebode.motion.ripple_watch import RippleWatch
-from livebode.motion.standstill import Standstill, without
-from livebode.motion.waiting import Waiting
+from livebode.motion.ripple_watch import RippleMonitor
+from livebode.motion.standstill import StandstillDetector, without
+from livebode.motion.waiting import PendingResponses
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -128,12 +128,12 @@ class MotionCorrection(StatefulBase):
         # Sigma is from the residual of the model, which does not contain the motion.
         self._tracker = Tracker(replace(settings, noise="periods") if settings.noise == "auto" else settings)
         self._events: list[Event] = []
-        self._recorded = Recorded(self._names, lines)
-        self._waiting = Waiting(lines)
+        self._recorded = RecentSamples(self._names, lines)
+        self._waiting = PendingResponses(lines)
         self._learner = Learner(settings, radius_m, splines, passes)
         self._scatter = Scatter(settings)
-        self._standstill = Standstill(settings, self._events)
-        self._ripple = RippleWatch(settings)
+        self._standstill = StandstillDetector(settings, self._events)
+        self._ripple = RippleMonitor(settings)
         self._from = 0
         self._parts: dict[str, StatefulBase] = {
             "tracker": self._tracker,
@@ -193,11 +193,11 @@ class MotionCorrection(StatefulBase):
         self._waiting.append(tracked)
         at = 0
         while at < len(block):
-            wanted = self._from + self._chunk + self.settings.lines.window
-            piece = block.cut(at, wanted - block.start)
+            required = self._from + self._chunk + self.settings.lines.window
+            piece = block.cut(at, required - block.start)
             self._recorded.append(piece)
             at += len(piece)
-            if self._recorded.stop == wanted:
+            if self._recorded.stop == required:
                 done.append(self._corrected(self._from + self._chunk))
         hand_over(self._events, emit)
         return Responses.join(done) if done else tracked[0:0]

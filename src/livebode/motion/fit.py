@@ -12,7 +12,7 @@ from livebode.core import FitError
 from livebode.fitting import two_masses
 from livebode.fitting.least_squares import minimise
 from livebode.fitting.windows import scan
-from livebode.motion.model import Curve, MovingModel, basis
+from livebode.motion.model import MovingModel, PositionCurve, basis
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -30,7 +30,7 @@ class Rows(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class MotionFitOptions:
     """Options of the fit of a MovingModel.
 
     Parameters
@@ -150,8 +150,8 @@ class Fit:
             inertia_kg_m2=float(np.exp(unknowns[0])),
             load_kg=float(np.exp(unknowns[1] - arm)),
             radius_m=self.radius_m,
-            log_stiffness=Curve(low, high, unknowns[2:k] - arm),
-            log_damping=Curve(low, high, unknowns[k:-1] - arm),
+            log_stiffness=PositionCurve(low, high, unknowns[2:k] - arm),
+            log_damping=PositionCurve(low, high, unknowns[k:-1] - arm),
             delay_s=float(unknowns[-1]) / self.rate_hz,
         )
 

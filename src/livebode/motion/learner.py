@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from livebode.core import Responses, Stage, StatefulBase
 from livebode.estimation import Settings
 from livebode.motion.chunk import Chunk
-from livebode.motion.fit import Fit, Rows, sampled
-from livebode.motion.model import Curve, MovingModel
+from livebode.motion.fit import MotionFitOptions, Rows, sampled
+from livebode.motion.model import MovingModel, PositionCurve
 from livebode.motion.residual import Residual
 from livebode.motion.standstill import turns
 from livebode.motion.steady import FLAT_M, steady_rows
@@ -88,7 +88,7 @@ class Learner(StatefulBase):
         self.model = model
         return replay(model)
 
-    def _over_all(self, tracked: Responses, now: Replayed) -> tuple[NDArray[np.intp], Fit, MovingModel]:
+    def _over_all(self, tracked: Responses, now: Replayed) -> tuple[NDArray[np.intp], MotionFitOptions, MovingModel]:
         rows = self._thinned(tracked, self._usable(tracked))
         at = np.append(tracked.schedule[rows], (now.model.low_m, now.model.high_m))
         fit = self._fit(len(now.model.log_stiffness.weights), len(now.model.log_damping.weights))
@@ -118,7 +118,7 @@ class Learner(StatefulBase):
 
     def _refined(
         self,
-        fit: Fit,
+        fit: MotionFitOptions,
         now: Replayed,
         tracked: Responses,
         used: NDArray[np.intp],
@@ -165,9 +165,11 @@ class Learner(StatefulBase):
         fastest = np.maximum(np.sqrt(stiffness / reduced), damping / reduced)
         return bool(np.all(fastest < np.pi * self._settings.lines.rate_hz))
 
-    def _fit(self, stiffness_splines: int, damping_splines: int) -> Fit:
+    def _fit(self, stiffness_splines: int, damping_splines: int) -> MotionFitOptions:
         lines = self._settings.lines
-        return Fit(lines.z, lines.rate_hz, self._radius_m, stiffness_splines, damping_splines, delayed=True)
+        return MotionFitOptions(
+            lines.z, lines.rate_hz, self._radius_m, stiffness_splines, damping_splines, delayed=True
+        )
 
     def _state(self) -> dict[str, Any]:
         m = self.model
@@ -182,7 +184,7 @@ class Learner(StatefulBase):
         self.chunks, self._misfit, self.model = int(state["chunks"]), float(state["misfit"]), None
         if "constants" in state:
             inertia, load, low, high, delay_s = (float(n) for n in state["constants"])
-            stiffness, damping = (Curve(low, high, state[name]) for name in ("stiffness", "damping"))
+            stiffness, damping = (PositionCurve(low, high, state[name]) for name in ("stiffness", "damping"))
             self.model = MovingModel(inertia, load, self._radius_m, stiffness, damping, delay_s)
 
 

@@ -17,7 +17,7 @@ _BEYOND = 0.1  # of the range, on either side, where a curve continues straight
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PositionCurve:
     """A smooth function of the position: a cubic spline with evenly spaced knots.
 
     Outside of its range it continues straight for a tenth of the range, and is constant beyond.
@@ -81,8 +81,8 @@ class MovingModel:
     inertia_kg_m2: float
     load_kg: float
     radius_m: float
-    log_stiffness: Curve
-    log_damping: Curve
+    log_stiffness: PositionCurve
+    log_damping: PositionCurve
     delay_s: float = 0.0
 
     @property

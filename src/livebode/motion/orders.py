@@ -79,8 +79,8 @@ class OrderSpectrum(StatefulBase):
         bin_hz = lines.rate_hz / lines.window
         self._least_hz, self._most_hz = _FROM * bin_hz, float(self._lines_hz[-1]) + _BEYOND * bin_hz
         self._rate_hz = lines.rate_hz
-        wanted_m = slowest_m_per_s / (_FINE * self._most_hz)
-        self._points = 1 << max(int(np.ceil(np.log2(_PADDED * way_m / wanted_m))), 1)
+        required_m = slowest_m_per_s / (_FINE * self._most_hz)
+        self._points = 1 << max(int(np.ceil(np.log2(_PADDED * way_m / required_m))), 1)
         self._step_m = _PADDED * way_m / self._points
         self.cycles_per_m = np.arange(self._points // 2 + 1) / (_PADDED * way_m)
         self._sum, self._whole, self._torque = np.zeros((3, self.cycles_per_m.size))

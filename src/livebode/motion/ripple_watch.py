@@ -22,7 +22,7 @@ _SLOWER = 0.5  # of the first stroke's speed: lowest speed of a later one
 _GRID = 64  # frequencies at which the model's gain is computed
 
 
-class RippleWatch(StatefulBase):
+class RippleMonitor(StatefulBase):
     """Orders of a ripple that the settings name, or that the previous strokes show (`OrderSpectrum`).
 
     Five strokes whose order does not meet a line are needed to find it. Delay: an order is used from the chunk on in

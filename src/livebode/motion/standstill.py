@@ -22,7 +22,7 @@ _LONGEST = 4  # windows per verdict
 
 
 @dataclass(frozen=True)
-class Stretch:
+class StandstillStretch:
     """Samples `first` to `last` with standstill or reversal of motor or cart; `unexplained`: share of the output."""
 
     first: int
@@ -30,7 +30,7 @@ class Stretch:
     unexplained: float
 
 
-class Standstill(StatefulBase):
+class StandstillDetector(StatefulBase):
     """Finds the stretches in which the axis does not respond as the model that was fitted to its motion.
 
     Coulomb friction is a constant torque while motor and cart do not change their direction, and does not affect a
@@ -61,14 +61,14 @@ class Standstill(StatefulBase):
         groups = np.split(where, 1 + np.flatnonzero(apart))
         return [(int(group[0]), int(group[-1])) for group in groups if group.size]
 
-    def tail(self, chunk: Chunk) -> list[Stretch]:
+    def tail(self, chunk: Chunk) -> list[StandstillStretch]:
         """The end of a stretch with friction from the previous chunk, if it reaches into this one."""
         reaches = self._until >= 0 and self._until + 2 * self._window > chunk.first
-        return [Stretch(self._until, self._until, 0.0)] if reaches else []
+        return [StandstillStretch(self._until, self._until, 0.0)] if reaches else []
 
     def held(
         self, found: list[tuple[int, int]], tracked: Responses, seen: Responses, chunk: Chunk, inertia_kg_m2: float
-    ) -> list[Stretch]:
+    ) -> list[StandstillStretch]:
         """The stretches in which friction stops the axis.
 
         `seen` is R/U with a model whose belt fits here too, `inertia_kg_m2` the total inertia at the motor.
@@ -95,7 +95,7 @@ class Standstill(StatefulBase):
             rest_of_one = continues and last - first < self._window
             at = touch & np.isfinite(rest)
             excess = max(np.mean(rest[at]) - self._noise, 0.0) / np.mean(output[at]) if at.any() else 0.0
-            stretch = Stretch(first, last, float(np.sqrt(excess)))
+            stretch = StandstillStretch(first, last, float(np.sqrt(excess)))
             if rest_of_one or (dragged and stretch.unexplained > _UNEXPLAINED):
                 if not continues:
                     self._report(stretch, tracked)
@@ -103,7 +103,7 @@ class Standstill(StatefulBase):
                 done.append(stretch)
         return done
 
-    def _report(self, stretch: Stretch, tracked: Responses) -> None:
+    def _report(self, stretch: StandstillStretch, tracked: Responses) -> None:
         lines = self._settings.lines
         newest_s = float(tracked.time_s[0]) + (lines.window - 1) / 2 / lines.rate_hz
         time_s = newest_s + (stretch.first - int(tracked.sample[0])) / lines.rate_hz
@@ -124,7 +124,7 @@ def turns(left: Residual, chunk: Chunk, first: int) -> NDArray[np.int64]:
     return np.asarray(first + 1 + np.flatnonzero(changes), dtype=np.int64)
 
 
-def without(velocity: Floats, held: list[Stretch], chunk: Chunk, window: int) -> Floats:
+def without(velocity: Floats, held: list[StandstillStretch], chunk: Chunk, window: int) -> Floats:
     """The residual with NaN where friction stops the axis and a window to either side: its drift has a kink there."""
     left = velocity.copy()
     for stretch in held:

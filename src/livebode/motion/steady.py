@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from livebode.motion.chunk import Chunk
 
 _UNEVEN = 0.1
-_STANDING = 0.5
+_STANDSTILL = 0.5
 FLAT_M = 1e-3  # a chunk with less travel has no curves to fit
 
 
@@ -24,4 +24,4 @@ def steady_rows(sample: NDArray[np.int64], chunk: Chunk, window: int) -> NDArray
     here, middle, there = (x[(last - back).clip(0)] for back in (0, window, 2 * window))
     travel = np.abs(here - there)
     even = np.abs(here - 2 * middle + there) <= _UNEVEN * travel
-    return np.asarray(known & even & (travel >= max(_STANDING * np.max(travel, initial=0.0), FLAT_M)))
+    return np.asarray(known & even & (travel >= max(_STANDSTILL * np.max(travel, initial=0.0), FLAT_M)))

@@ -11,7 +11,7 @@ from livebode.core import PER_LINE, PER_RESPONSE, Lines, Responses, Stage, State
 _ARRAYS = PER_LINE + PER_RESPONSE
 
 
-class Waiting(StatefulBase):
+class PendingResponses(StatefulBase):
     """The Tracker's responses from the newest chunk on."""
 
     _stage = Stage("waiting-responses", 1)

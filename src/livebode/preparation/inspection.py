@@ -108,10 +108,10 @@ def inspect(
     With lines (a text and the window), hum is searched in `output` and `input` where there is no excitation.
     """
     log = open_log(path, rate_hz=rate_hz, time=time)
-    wanted = [name for name in (excitation, output, input) if name is not None]
+    required = [name for name in (excitation, output, input) if name is not None]
     known = {channel.name for channel in log.channels}
     # A channel given by a path or an alias is listed by that name.
-    extra = [name for name in dict.fromkeys(wanted) if name not in known]
+    extra = [name for name in dict.fromkeys(required) if name not in known]
     names = [channel.name for channel in log.channels] + extra
     summaries: dict[str, ChannelSummary] = {}
     samples, gaps, missing, stop = 0, 0, 0, None

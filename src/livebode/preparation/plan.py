@@ -23,7 +23,7 @@ _LOOKED_AT = 1 << 22  # samples that "auto" uses: half an hour at 2 kHz, and 100
 _ROLES_SAMPLES, _ROLES_WINDOWS = 1 << 17, 32  # to judge the roles, whichever is longer
 
 
-class Recorded(Protocol):
+class RecordedSource(Protocol):
     """A source of Blocks that begins at the first sample."""
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
@@ -164,7 +164,7 @@ def beginning(log: Log, channel: str, samples: int = _LOOKED_AT) -> np.ndarray:
     return np.asarray(beginnings(log, [channel], samples)[0])
 
 
-def beginnings(log: Recorded, channels: Sequence[str], samples: int) -> np.ndarray:
+def beginnings(log: RecordedSource, channels: Sequence[str], samples: int) -> np.ndarray:
     """The same of several channels, shape (channels, samples)."""
     parts: list[np.ndarray] = []
     size = 0

@@ -7,7 +7,7 @@ import pyarrow as pa
 
 from livebode.arrow import from_numpy, text
 from livebode.core import Parameters
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 
 SCHEMA = pa.schema(
     [
@@ -26,7 +26,7 @@ SCHEMA = pa.schema(
 """Columns: those of the response; model, parameter or derived quantity, its value and standard deviation (NaN if the
 status is not "ok"), unit, status, and the model's misfit as a share of |G|."""
 
-PARAMETERS = Table(SCHEMA, ("sample", "time_s", "schedule", "model", "name", "unit", "status"))
+PARAMETERS = ColumnTable(SCHEMA, ("sample", "time_s", "schedule", "model", "name", "unit", "status"))
 
 
 def parameter_rows(parameters: Parameters) -> pa.RecordBatch:

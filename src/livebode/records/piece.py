@@ -21,7 +21,7 @@ _verified: dict[tuple[object, ...], list[bool]] = {}
 
 
 @dataclass(frozen=True)
-class Part:
+class ParquetPart:
     """Consecutive bytes of a Parquet file: a row group, or, with no rows, the bytes after the last one."""
 
     rows: int
@@ -39,10 +39,10 @@ def parts_of(path: Path) -> list[dict[str, Any]]:
         file.seek(0)
         size = os.fstat(file.fileno()).st_size
         sizes = [end - begin for begin, end in zip([0, *ends], [*ends, size])]
-        return [asdict(Part(n, size, _sha256(file, size))) for n, size in zip([*rows, 0], sizes)]
+        return [asdict(ParquetPart(n, size, _sha256(file, size))) for n, size in zip([*rows, 0], sizes)]
 
 
-class Piece:
+class StoredTable:
     """A table in one file, with the entries of run.json on its parts.
 
     Raises
@@ -52,9 +52,9 @@ class Piece:
     """
 
     def __init__(self, run: Path, name: str, parts: Any, report: Callable[[Event], None]) -> None:
-        self._run, self._name, self._tell = run, name, report
+        self._run, self._name, self._report = run, name, report
         try:
-            self._parts = [Part(int(p["rows"]), int(p["size_bytes"]), str(p["sha256"])) for p in parts]
+            self._parts = [ParquetPart(int(p["rows"]), int(p["size_bytes"]), str(p["sha256"])) for p in parts]
             self._parts[-1]
         except (TypeError, LookupError, ValueError):
             raise RecordError(
@@ -76,12 +76,12 @@ class Piece:
         with open_read(self._run, self._name) as file:
             whole = self._whole(file, self._parts)
         if not whole[-1]:
-            self._tell_of("its end is damaged, so it cannot be read", sum(part.rows for part in self._parts))
+            self._report_of("its end is damaged, so it cannot be read", sum(part.rows for part in self._parts))
             return []
         begin = 0
         for part, sound in zip(self._parts, whole):
             if not sound:
-                self._tell_of(f"rows {begin} to {begin + part.rows - 1} are not read", part.rows)
+                self._report_of(f"rows {begin} to {begin + part.rows - 1} are not read", part.rows)
             begin += part.rows
         return [number for number, sound in enumerate(whole[:-1]) if sound]
 
@@ -94,7 +94,7 @@ class Piece:
         with pq.ParquetFile(self._run / self._name, pre_buffer=False) as file:
             yield from file.iter_batches(rows, row_groups=groups)
 
-    def _whole(self, file: BinaryIO, parts: list[Part]) -> list[bool]:
+    def _whole(self, file: BinaryIO, parts: list[ParquetPart]) -> list[bool]:
         """Whether each part is intact; computed once per process, as long as the file is unchanged."""
         status = os.fstat(file.fileno())
         key = (tuple(parts), status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
@@ -104,9 +104,11 @@ class Piece:
             _verified[key] = sound
         return _verified[key]
 
-    def _tell_of(self, what: str, rows: int) -> None:
+    def _report_of(self, what: str, rows: int) -> None:
         table = self._name.removesuffix(".parquet")
-        self._tell(Event(KIND, 0, 0.0, f"{self._name} is damaged: {what}", {"file": self._name, "rows": {table: rows}}))
+        self._report(
+            Event(KIND, 0, 0.0, f"{self._name} is damaged: {what}", {"file": self._name, "rows": {table: rows}})
+        )
 
 
 def _end(column: Any) -> int:

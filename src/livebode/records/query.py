@@ -14,7 +14,7 @@ from livebode.core import Event, ExtraError, UsageError
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
-from livebode.records.run import Files, Run
+from livebode.records.run import Files, RunRecord
 
 _TABLES = ("responses", "parameters", "samples")
 _SINGLE_EVENTS = pa.schema(
@@ -40,7 +40,7 @@ _CONFINED = (
 
 
 @dataclass(frozen=True)
-class Found:
+class QueryResult:
     """The rows of a query; `more`: there are others that were omitted."""
 
     columns: tuple[str, ...]
@@ -48,7 +48,7 @@ class Found:
     more: bool
 
 
-def query(run: Run, sql: str, rows_max: int) -> Found:
+def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
     """The first rows of a query on the tables responses, parameters, samples, events and single_events.
 
     Parameters
@@ -109,15 +109,15 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
     return found
 
 
-def _answered(database: Any, sql: str, rows_max: int) -> Found | None:
+def _answered(database: Any, sql: str, rows_max: int) -> QueryResult | None:
     """The result; None if the SQL is empty. Ctrl-C ends the query."""
 
-    def ask() -> Found | None:
+    def ask() -> QueryResult | None:
         answer = database.execute(sql)
         if answer is None:
             return None
         columns, rows = tuple(column[0] for column in answer.description or ()), answer.fetchmany(rows_max + 1)
-        return Found(columns, rows[:rows_max], len(rows) > rows_max)
+        return QueryResult(columns, rows[:rows_max], len(rows) > rows_max)
 
     # In another thread, because DuckDB checks for signals only occasionally.
     with ThreadPoolExecutor(1) as worker:
@@ -129,11 +129,11 @@ def _answered(database: Any, sql: str, rows_max: int) -> Found | None:
             raise
 
 
-def _known(run: Run) -> list[str]:
+def _known(run: RunRecord) -> list[str]:
     return ["events", "single_events", *run.files(_TABLES)]
 
 
-def _show(run: Run, database: Any, asked: set[str]) -> None:
+def _show(run: RunRecord, database: Any, asked: set[str]) -> None:
     """Register the requested tables of the run, and its events, in the database."""
     found = run.files([table for table in _TABLES if table in asked])
     for table, files in found.items():

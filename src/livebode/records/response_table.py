@@ -7,7 +7,7 @@ import pyarrow as pa
 
 from livebode.arrow import from_numpy
 from livebode.core import Responses
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 
 SCHEMA = pa.schema(
     [
@@ -32,7 +32,7 @@ SCHEMA = pa.schema(
 response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
 input, weight in a mean, distortion. NaN for missing values."""
 
-RESPONSES = Table(SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
+RESPONSES = ColumnTable(SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
 
 
 def as_batch(responses: Responses) -> pa.RecordBatch:

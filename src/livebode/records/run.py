@@ -17,7 +17,7 @@ from livebode.arrow import to_numpy
 from livebode.core import PER_LINE, PER_RESPONSE, DamageWarning, Event, Lines, LivebodeError, RecordError, Responses
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
-from livebode.records.piece import Piece
+from livebode.records.piece import StoredTable
 from livebode.records.response_table import SCHEMA
 from livebode.records.segments import reading
 from livebode.records.segments.damage import KIND
@@ -44,7 +44,7 @@ def lines_in(found: Mapping[str, Any]) -> Lines:
 
 
 @dataclass(frozen=True)
-class Run:
+class RunRecord:
     """The directory of a run: finished, stopped, killed, or still being written.
 
     Reading returns what is committed at that time; a run that is being written has more later.
@@ -67,7 +67,7 @@ class Run:
     on_damage: Callable[[Event], None] | None = field(default=None, compare=False)
 
     @classmethod
-    def open(cls, path: Path, on_damage: Callable[[Event], None] | None = None) -> Run:
+    def open(cls, path: Path, on_damage: Callable[[Event], None] | None = None) -> RunRecord:
         """The run in this directory.
 
         Raises
@@ -190,11 +190,11 @@ class Run:
         except (OSError, pa.ArrowException, KeyError, TypeError) as error:
             raise _unreadable(file, error) from None
 
-    def _piece(self, name: str) -> Piece | None:
+    def _piece(self, name: str) -> StoredTable | None:
         """A table in one file; None if it was not recorded, or if the file is missing, which is reported."""
         file, parts = f"{name}.parquet", self.summary.get("files", {})
         if os.path.lexists(self.path / file):
-            return Piece(self.path, file, parts.get(file), self.report)
+            return StoredTable(self.path, file, parts.get(file), self.report)
         if name == "responses" or file in parts:
             self.report(Event(KIND, 0, 0.0, f"{file} is damaged: the file is missing", {"file": file}))
         return None

@@ -9,12 +9,12 @@ import pyarrow as pa
 
 from livebode.arrow import from_numpy
 from livebode.core import Block, Channel
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 
 _OWN = ("sample", "time_s")
 
 
-def samples_of(channels: Sequence[Channel]) -> Table:
+def samples_of(channels: Sequence[Channel]) -> ColumnTable:
     """The table: number of the sample, its time (s), and a column for each channel with its unit in the metadata.
 
     A channel with the name of one of the first two columns gets an underscore after its name.
@@ -24,10 +24,10 @@ def samples_of(channels: Sequence[Channel]) -> Table:
         pa.field(c.name + "_" * (c.name in _OWN), pa.float64(), metadata={"unit": c.unit} if c.unit else None)
         for c in channels
     ]
-    return Table(pa.schema(own + columns))
+    return ColumnTable(pa.schema(own + columns))
 
 
-def as_rows(block: Block, table: Table) -> pa.RecordBatch:
+def as_rows(block: Block, table: ColumnTable) -> pa.RecordBatch:
     """The samples of a Block whose channels are those of the table."""
     number = np.arange(block.start, block.stop, dtype=np.int64)
     return pa.record_batch([from_numpy(c) for c in (number, block.time_s, *block.data)], schema=table.schema)

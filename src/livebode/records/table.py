@@ -8,7 +8,7 @@ import pyarrow as pa
 
 
 @dataclass(frozen=True)
-class Table:
+class ColumnTable:
     """The columns of a table, with ``sample`` (int64) and ``time_s`` among them.
 
     `repeating` names those whose values repeat over lines or rows: they compress by a dictionary; measured ones never

@@ -7,7 +7,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 
 _GROUP_ROWS = 1 << 18
 
@@ -15,7 +15,7 @@ _GROUP_ROWS = 1 << 18
 class TableFile:
     """Appends rows of a Table to a Parquet file, by row groups of bounded size."""
 
-    def __init__(self, path: Path, table: Table) -> None:
+    def __init__(self, path: Path, table: ColumnTable) -> None:
         self._schema = table.schema
         self._file = pq.ParquetWriter(path, table.schema, use_dictionary=list(table.repeating), compression="lz4")
         self._waiting: list[pa.RecordBatch] = []

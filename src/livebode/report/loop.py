@@ -29,7 +29,7 @@ _LOWEST_DEG = -460.0  # below it only the delay acts
 _REACH = 2.2  # of the Nyquist plot
 
 
-class Loop(Protocol):
+class LoopCurves(Protocol):
     """The part of a loop report that is drawn."""
 
     @property
@@ -42,12 +42,14 @@ class Loop(Protocol):
     def responses(self) -> Responses: ...
 
 
-def save_loop_picture(found: Loop, directory: str | PathLike[str], *, title: str = "", dark: bool = False) -> Path:
+def save_loop_picture(
+    found: LoopCurves, directory: str | PathLike[str], *, title: str = "", dark: bool = False
+) -> Path:
     """Write margins.png to an existing directory."""
     return save(loop_figure(found, title=title, dark=dark), Path(directory) / "margins.png", style(dark))
 
 
-def loop_figure(found: Loop, *, title: str = "", dark: bool = False, width_in: float = 12.0) -> Figure:
+def loop_figure(found: LoopCurves, *, title: str = "", dark: bool = False, width_in: float = 12.0) -> Figure:
     """|L| and its phase over frequency beside the Nyquist plot, from the fit with a 95 % band.
 
     Dots are the measured lines, F·G, with 95 % bounds. Open diamonds mark |L| = 1 and squares negative L, if a margin
@@ -75,7 +77,7 @@ def loop_figure(found: Loop, *, title: str = "", dark: bool = False, width_in: f
     return figure
 
 
-def _curves(found: Loop, f: Floats) -> tuple[Complex, tuple[Floats, Floats], tuple[Floats, Floats]]:
+def _curves(found: LoopCurves, f: Floats) -> tuple[Complex, tuple[Floats, Floats], tuple[Floats, Floats]]:
     """L of the fit, and (dB, degrees) at both ends of its 95 % band."""
     values = found.fit.parameters.value[:1]
     covariance = found.fit.parameters.covariance[0]
@@ -95,7 +97,9 @@ def _degrees(value: Complex) -> Floats:
     return np.asarray(turned - 360 * np.ceil((turned[0] - 90) / 360))
 
 
-def _bode(magnitude: Axes, phase: Axes, look: Style, found: Loop, f: Floats, curves: tuple[Complex, Any, Any]) -> None:
+def _bode(
+    magnitude: Axes, phase: Axes, look: Style, found: LoopCurves, f: Floats, curves: tuple[Complex, Any, Any]
+) -> None:
     from livebode.drawing.scales import frequency_axis
 
     value, low, high = curves
@@ -144,7 +148,7 @@ def _round_numbers(low_hz: float, high_hz: float) -> Floats:
     return np.concatenate([[low_hz], inside, [high_hz]])
 
 
-def _nyquist(axes: Axes, look: Style, found: Loop, f: Floats, value: Complex) -> None:
+def _nyquist(axes: Axes, look: Style, found: LoopCurves, f: Floats, value: Complex) -> None:
     """The curve near −1, the circle that touches it, and the measured lines."""
     from matplotlib.patches import Circle
 
@@ -179,7 +183,7 @@ def _nyquist(axes: Axes, look: Style, found: Loop, f: Floats, value: Complex) ->
     plain(axes)
 
 
-def _measured(found: Loop) -> tuple[Floats, Complex, Floats]:
+def _measured(found: LoopCurves) -> tuple[Floats, Complex, Floats]:
     """Frequency, F·G and its 95 % bound at the valid lines."""
     one = found.responses
     use = one.valid[0]
@@ -188,7 +192,7 @@ def _measured(found: Loop) -> tuple[Floats, Complex, Floats]:
     return f, one.value[0, use] * behind, np.nan_to_num(one.bound(np.sqrt(np.log(20)))[0, use]) * np.abs(behind)
 
 
-def _marked(found: Loop) -> list[tuple[str, Floats]]:
+def _marked(found: LoopCurves) -> list[tuple[str, Floats]]:
     """Mark the frequencies of the margins: |L| = 1 (diamonds), L negative (squares)."""
     f = dict(zip(found.margins.names, found.margins.frequency_hz[0]))
     kinds = (("D", ("phase_margin", "delay_margin")), ("s", ("gain_margin", "gain_reduction")))
@@ -196,7 +200,7 @@ def _marked(found: Loop) -> list[tuple[str, Floats]]:
     return [(m, np.unique([f[n] for n in names if np.isfinite(f[n]) and f[n] >= low])) for m, names in kinds]
 
 
-def _facts(found: Loop) -> str:
+def _facts(found: LoopCurves) -> str:
     bound = found.margins.bound()[0]
     words = [
         f"{label} {number(found.margins.value[0, i], '.3g')} ± {number(bound[i], '.2g')}{unit}"

@@ -51,7 +51,7 @@ def save_pdf(document: Document, path: Path) -> None:
         If the file cannot be written.
     """
     register_fonts()
-    template = _Pages(document, path)
+    template = _PdfPages(document, path)
     flow: list[Flowable] = [
         _words(document.kind, _KIND), _words(document.title, _TITLE), _facts(document), Spacer(0, 4 * mm),
         _words(document.heading, _HEADING), _verdict(document),
@@ -61,7 +61,7 @@ def save_pdf(document: Document, path: Path) -> None:
     template.build(flow, canvasmaker=_Numbered)
 
 
-class _Pages(BaseDocTemplate):  # type: ignore[misc]
+class _PdfPages(BaseDocTemplate):  # type: ignore[misc]
     def __init__(self, document: Document, path: Path) -> None:
         super().__init__(
             str(path), pagesize=A4, title=readable(f"{document.title}: {document.kind}"), author="livebode",

@@ -233,15 +233,15 @@ def _name_lines(axes: Axes, responses: Responses, magnitude_db: Floats, colours:
         )
 
 
-def spread(wanted: Floats, apart: float) -> Floats:
+def spread(required: Floats, apart: float) -> Floats:
     """Positions at least `apart` from each other, in the same order, as near as possible to the given ones in 0 … 1.
 
     >>> spread(np.array([0.5, 0.52, 0.9]), 0.1)
     array([0.46, 0.56, 0.9 ])
     """
-    order = np.argsort(wanted, kind="stable")
+    order = np.argsort(required, kind="stable")
     groups: list[list[float]] = []  # centre, count
-    for level in wanted[order]:
+    for level in required[order]:
         groups.append([float(level), 1.0])
         while len(groups) > 1:
             (c0, n0), (c1, n1) = groups[-2:]
@@ -249,7 +249,7 @@ def spread(wanted: Floats, apart: float) -> Floats:
                 break
             groups[-2:] = [[(c0 * n0 + c1 * n1) / (n0 + n1), n0 + n1]]
     placed = [c + apart * (k - (n - 1) / 2) for c, n in groups for k in range(int(n))]
-    out = np.empty(len(wanted))
+    out = np.empty(len(required))
     out[order] = placed
     return out
 

@@ -7,13 +7,13 @@ from typing import Any
 from livebode.core import Event
 from livebode.core.document import Finding, Tone
 from livebode.language import recognised, tr, trn
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.reporting.event_summary import EventSummary
 
 _ACTIVE_MAX = 5
 
 
-def alarms(run: Run, event_summary: EventSummary) -> tuple[Finding, ...]:
+def alarms(run: RunRecord, event_summary: EventSummary) -> tuple[Finding, ...]:
     """The summary of the monitoring, then the active alarms."""
     monitoring: dict[str, Any] = run.summary.get("monitoring", {})
     if not monitoring:
@@ -41,7 +41,7 @@ def _newest(event_summary: EventSummary) -> list[Event]:
     return list(found.values())
 
 
-def _so_far(run: Run, event_summary: EventSummary) -> Finding:
+def _so_far(run: RunRecord, event_summary: EventSummary) -> Finding:
     """The changes so far, if run.json does not contain a summary yet."""
     if run.finished:
         return Finding(

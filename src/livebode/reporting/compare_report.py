@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.changes import Change, Changes, changes, percent
+from livebode.analysis.changes import Changes, QuantityChange, changes, percent
 from livebode.analysis.difference import ALPHA, Compared, Difference, compare
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core.clock import moment
 from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
 from livebode.language import marked, number, recognised, tr, trn
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.grouped_events import event_counts
 from livebode.reporting.comparison_verdict import verdict
 from livebode.reporting.report_data import written
@@ -38,7 +38,7 @@ class Comparison:
     @classmethod
     def of(cls, before: Path, after: Path) -> Comparison:
         """Read and compare two runs; raises the errors of `compare`."""
-        found = compare(Run.open(before), Run.open(after))
+        found = compare(RunRecord.open(before), RunRecord.open(after))
         return cls(found, changes(found))
 
     @property
@@ -206,7 +206,7 @@ def _how_tested(m: int) -> str:
     )  # fmt: skip
 
 
-def _settings(before: Run, after: Run) -> Section:
+def _settings(before: RunRecord, after: RunRecord) -> Section:
     """Differences between the configurations."""
     one, other = (set(_flat(recorded_configuration(run.summary))) for run in (before, after))
     rows = tuple((*key, _of(one, key), _of(other, key)) for key in sorted({line[:1] for line in one ^ other}))
@@ -229,7 +229,7 @@ def _of(lines: set[tuple[str, str]], key: tuple[str, ...]) -> str:
     return next((value for name, value in lines if (name,) == key), "—")
 
 
-def _row(c: Change) -> tuple[str, ...]:
+def _row(c: QuantityChange) -> tuple[str, ...]:
     changed = with_bound(c.amount, c.bound)
     return (
         recognised(c.words), *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed,
@@ -237,7 +237,7 @@ def _row(c: Change) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _plain_change(c: Change) -> dict[str, Any]:
+def _plain_change(c: QuantityChange) -> dict[str, Any]:
     return {
         "name": c.name, "unit": c.unit, "before": c.before[0], "before_bound_95": c.before[1], "after": c.after[0],
         "after_bound_95": c.after[1], "change": c.amount, "change_bound": c.bound, "significant": c.significant,

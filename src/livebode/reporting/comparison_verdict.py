@@ -8,8 +8,8 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.analysis.changes import Change, Changes, percent
-from livebode.analysis.difference import Compared, Difference, Place
+from livebode.analysis.changes import Changes, QuantityChange, percent
+from livebode.analysis.difference import Compared, ComparedPlace, Difference
 from livebode.core.document import Finding, Tone
 from livebode.language import listed, number, recognised, tr, trn
 from livebode.reporting.alarms import alarms
@@ -60,7 +60,7 @@ def _overall(d: Difference) -> Finding:
     return Finding("differs", words)
 
 
-def _by_place(places: tuple[Place, ...]) -> Iterator[Finding]:
+def _by_place(places: tuple[ComparedPlace, ...]) -> Iterator[Finding]:
     if not places:
         return
     if not any(np.isfinite(p.difference.p).any() for p in places):
@@ -98,7 +98,7 @@ def _seen(found: Sequence[Difference]) -> str:
     return tr("detectable: ≥ {most:.2g} % at every line, ≥ {least:.2g} % at the best line", most=most, least=least)
 
 
-def _parameters(table: tuple[Change, ...]) -> Iterator[Finding]:
+def _parameters(table: tuple[QuantityChange, ...]) -> Iterator[Finding]:
     moved, listing = _changed(table)
     if moved:
         text = trn(
@@ -112,7 +112,7 @@ def _parameters(table: tuple[Change, ...]) -> Iterator[Finding]:
         yield Finding("ok", seen if listing else without)
 
 
-def _margins(table: tuple[Change, ...]) -> Iterator[Finding]:
+def _margins(table: tuple[QuantityChange, ...]) -> Iterator[Finding]:
     moved, listing = _changed(table)
     if moved:
         text = trn(
@@ -126,7 +126,7 @@ def _margins(table: tuple[Change, ...]) -> Iterator[Finding]:
         yield Finding("ok", seen if listing else without)
 
 
-def _changed(table: tuple[Change, ...]) -> tuple[int, str]:
+def _changed(table: tuple[QuantityChange, ...]) -> tuple[int, str]:
     """Number of significant changes with their list; if there are none, the list of the detectable changes."""
     moved = [c for c in table if c.significant]
     if moved:

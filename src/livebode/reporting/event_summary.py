@@ -19,7 +19,7 @@ _LETTERS = 600
 
 
 @dataclass
-class Kind:
+class EventsOfKind:
     """The first and the newest event of a kind, and their number."""
 
     first: Event
@@ -31,7 +31,7 @@ class Kind:
 class EventSummary:
     """Events by kind, and the first and the newest of those that are listed individually."""
 
-    kinds: dict[str, Kind] = field(default_factory=dict)
+    kinds: dict[str, EventsOfKind] = field(default_factory=dict)
     early: list[Event] = field(default_factory=list)
     late: deque[Event] = field(default_factory=lambda: deque(maxlen=_IN_FULL))
     reported: int = 0
@@ -43,11 +43,11 @@ class EventSummary:
             for one in each_event(event):
                 found._add(one)
             for kind, count in event_counts(event).items():
-                found.kinds.setdefault(kind, Kind(event, event)).count += count
+                found.kinds.setdefault(kind, EventsOfKind(event, event)).count += count
         return found
 
     def _add(self, event: Event) -> None:
-        kind = self.kinds.setdefault(event.kind, Kind(event, event))
+        kind = self.kinds.setdefault(event.kind, EventsOfKind(event, event))
         kind.newest = event
         if event.kind not in ALARMS and not event.kind.startswith("record-"):
             return

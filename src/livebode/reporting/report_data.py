@@ -18,7 +18,7 @@ from livebode.core import LivebodeError, Responses
 from livebode.core.clock import moment
 from livebode.fitting import Fit
 from livebode.language import recognised, tr
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.reporting.event_summary import EventSummary
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class ReportData:
         The validation, if requested.
     """
 
-    run: Run
+    run: RunRecord
     configuration: dict[str, Any]
     of: Averaged
     fit: Fit | None
@@ -101,7 +101,7 @@ def read(directory: Path, judged: Judged | None = None) -> ReportData:
     RecordError, SignalError
         If the directory is not a run, cannot be read, or has no valid response.
     """
-    run = Run.open(directory)
+    run = RunRecord.open(directory)
     configuration, of = recorded_configuration(run.summary), averaged(run)
     fit, fit_words = _fit(configuration, of)
     loop, loop_words = _loop(configuration, of, fit)

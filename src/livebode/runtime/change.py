@@ -14,7 +14,7 @@ _KIND = "configuration-applied"
 
 
 @dataclass(frozen=True, eq=False)
-class Change:
+class ChangeRequest:
     """Request to an axis: use other settings of the record, or continue in another run with another pipeline."""
 
     sections: tuple[str, ...]
@@ -37,7 +37,7 @@ class Change:
             control.change(self.pipeline)
 
 
-def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
+def change_of(old: Axis, new: Axis, source: LiveSource | None) -> ChangeRequest | None:
     """The change from one configuration to the other; None if they are equal.
 
     Raises
@@ -78,5 +78,5 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
         )
     record, before = new.record or RecordSection(), old.record or RecordSection()
     if sections == ("record",) and record.samples == before.samples:
-        return Change(sections, record=record)
-    return Change(sections, pipeline=Pipeline.live(new, source))
+        return ChangeRequest(sections, record=record)
+    return ChangeRequest(sections, pipeline=Pipeline.live(new, source))

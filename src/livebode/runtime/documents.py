@@ -64,14 +64,14 @@ class ClockSet:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FitResults:
     """The fits of the responses before, quantities derived from them, and margins: one Parameters each."""
 
     parts: tuple[Parameters, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
+class TrackerResults:
     """All results of this Block were published; a LiveBlock contains its time of arrival.
 
     `samples` is the number of tracked samples, `samples_total` that of the whole source (None if it is not known).
@@ -89,6 +89,6 @@ class RunEnded:
     summary: Mapping[str, Any]
 
 
-Document = RunStarted | Channels | ClockSet | Responses | Fitted | Event | Tracked | RunEnded
+Document = RunStarted | Channels | ClockSet | Responses | FitResults | Event | TrackerResults | RunEnded
 """New `Responses` (when a run continues, first the newest previous ones), an `Event`, or one of the classes here."""
 Subscriber = Callable[[Document], None]

@@ -38,16 +38,16 @@ class FitBudget:
         self._row_s = _FIRST_ROW_S
         self._exceeded = False
 
-    def rows(self, wanted: int, behind_s: float) -> int:
-        """Number of the `wanted` responses that there is time to fit, at a backlog of `behind_s`."""
+    def rows(self, required: int, behind_s: float) -> int:
+        """Number of the `required` responses that there is time to fit, at a backlog of `behind_s`."""
         FitBudget._open.add(self)
         now = self._clock()
         relief = (RELIEF_TO_S - behind_s) / (RELIEF_TO_S - RELIEF_FROM_S)
         share = SHARE * min(max(relief, 0.0), 1.0) / len(FitBudget._open)
         self._credit_s = min(CREDIT_S_MAX, self._credit_s + share * (now - self._then))
         self._then = now
-        rows = min(wanted, self._affordable(share))
-        if (rows < wanted) != self._exceeded:
+        rows = min(required, self._affordable(share))
+        if (rows < required) != self._exceeded:
             self._exceeded = not self._exceeded
             _logger.debug("fit budget %s (%.1f s behind)", "exceeded" if self._exceeded else "suffices", behind_s)
         return rows

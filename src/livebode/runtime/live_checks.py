@@ -45,7 +45,7 @@ class LiveChecks:
         transient: bool,
         judged: Callable[[], None] = lambda: None,
     ) -> None:
-        self._settings, self._channels, self._tell_judged = settings, channels, judged
+        self._settings, self._channels, self._report_judged = settings, channels, judged
         self._roles, self._transient = roles, transient
         lines = settings.lines
         self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
@@ -83,7 +83,7 @@ class LiveChecks:
         if self._transient and (periods := transient_periods(signals, settings)):
             yield transient_event(periods, settings, first=start, time_s=_time_s(block, start))
         self._roles = self._transient = False
-        self._tell_judged()
+        self._report_judged()
 
     def _slipped(self, block: Block, name: str) -> Iterator[Event]:
         size = _SLIP_PERIODS * self._settings.lines.window

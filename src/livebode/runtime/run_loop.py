@@ -22,7 +22,7 @@ from livebode.runtime.ahead import LossesAhead
 from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition
 from livebode.runtime.destination import Destination
-from livebode.runtime.documents import Channels, ClockSet, Fitted, RunEnded, RunStarted, Tracked
+from livebode.runtime.documents import Channels, ClockSet, FitResults, RunEnded, RunStarted, TrackerResults
 from livebode.runtime.live_checks import LiveChecks
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.recorder import Recorder
@@ -171,7 +171,7 @@ class RunLoop:
         self._record_and_publish(responses)
         self._report_events()
         self._check_signals(block)
-        self._stream.announce(Tracked(block, self._follower.counts["samples"], self.source.samples))
+        self._stream.announce(TrackerResults(block, self._follower.counts["samples"], self.source.samples))
         self._recorder.commit(block)
 
     def _numbered(self) -> Iterator[Block | None]:
@@ -223,7 +223,7 @@ class RunLoop:
         else:
             with self._shedding.fitting(responses) as chosen:
                 parts, events = fits.process(chosen)
-        self._stream.publish(Fitted(parts))
+        self._stream.publish(FitResults(parts))
         self._stream.publish_all(events)
         return parts[0]
 
@@ -271,7 +271,7 @@ class RunLoop:
             self._overview.add(responses)
             self._stream.announce(responses)
             if self.pipeline.fits is not None:
-                self._stream.announce(Fitted(self.pipeline.fits.process(responses[0:0])[0]))  # sets the lines
+                self._stream.announce(FitResults(self.pipeline.fits.process(responses[0:0])[0]))  # sets the lines
         self._checks = self._live_checks()
 
     def _live_checks(self) -> LiveChecks | None:

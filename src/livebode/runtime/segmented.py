@@ -13,17 +13,17 @@ from typing import Any, Self
 from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Event, RecordError, Responses, Stateful
 from livebode.core.clock import RunClock
-from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
+from livebode.records import PARAMETERS, RESPONSES, RunRecord, as_batch, parameter_rows, to_json
 from livebode.records.inside import check_folder
 from livebode.records.removal import check_removable, remove
 from livebode.records.sample_table import as_rows, samples_of
 from livebode.records.segments.disk import why
 from livebode.records.segments.journal import FOLDER
-from livebode.records.segments.limits import Limits
+from livebode.records.segments.limits import SegmentLimits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.store import Store
 from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
-from livebode.runtime.documents import Document, Fitted
+from livebode.runtime.documents import Document, FitResults
 from livebode.runtime.run_control import StoppedError
 
 FOUND_ON_THE_WAY = "clock", "left_out_samples"
@@ -125,7 +125,7 @@ class SegmentedRecord:
         match document:
             case Responses() if len(document):
                 self._store.write("responses", as_batch(document))
-            case Fitted(parts):
+            case FitResults(parts):
                 for parameters in parts:
                     if len(parameters):
                         self._store.write("parameters", parameter_rows(parameters))
@@ -144,8 +144,8 @@ class SegmentedRecord:
         """Use other settings of the record from now; the selection of recorded samples does not change."""
         self._store.limits = self._limits(section)
 
-    def _limits(self, section: RecordSection) -> Limits:
-        return Limits(
+    def _limits(self, section: RecordSection) -> SegmentLimits:
+        return SegmentLimits(
             interval_samples=max(1, round(_INTERVAL_S * self._rate_hz)),
             segment_samples=max(1, round(section.segment_s * self._rate_hz)),
             interval_s=_INTERVAL_S,
@@ -155,7 +155,7 @@ class SegmentedRecord:
     def previous(self) -> Iterator[Responses]:
         """The newest responses of the continued run."""
         if self._continued or "continues" in self._more:
-            run = Run.open(self.path, self._found_damaged)
+            run = RunRecord.open(self.path, self._found_damaged)
             newest = run.batches(_SEEN_AGAIN_BYTES)
             yield next(newest, None) or run.responses()  # an empty batch contains the lines, unlike no run
             yield from newest
@@ -243,7 +243,7 @@ class SegmentedRecord:
         return {name: part.snapshot() for name, part in self._parts.items()}
 
     def _restore(self, states: Mapping[str, bytes]) -> None:
-        before = Run.open(self.path, self._found_damaged).summary
+        before = RunRecord.open(self.path, self._found_damaged).summary
         now = json.loads(to_json(self._summary))
         if states.keys() != self._parts.keys() or _identity(before) != _identity(now):
             raise RecordError(

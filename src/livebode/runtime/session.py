@@ -15,7 +15,7 @@ from livebode.configuration.axes import Axes, ConfigurationFile
 from livebode.configuration.axis import Axis
 from livebode.core import ConfigError, Event, LivebodeError
 from livebode.runtime.axis_thread import AxisThread
-from livebode.runtime.change import Change, change_of
+from livebode.runtime.change import ChangeRequest, change_of
 from livebode.runtime.destination import Destination
 from livebode.runtime.status import Status
 
@@ -38,7 +38,7 @@ class Session:
         Axes by name.
     to
         Destination of an axis, by name and configuration.
-    tell
+    report
         Called with an axis's name and the event of an edit of the file.
     file
         File of `axes`, if they may change.
@@ -51,11 +51,11 @@ class Session:
         axes: Axes,
         to: Callable[[str, Axis], Destination],
         *,
-        tell: Callable[[str, Event], None],
+        report: Callable[[str, Event], None],
         leave: Callable[[int, Mapping[str, Event]], None],
         file: ConfigurationFile | None = None,
     ) -> None:
-        self._to, self._tell, self._leave, self._file = to, tell, leave, file
+        self._to, self._report_event, self._leave, self._file = to, report, leave, file
         self.threads: dict[str, AxisThread] = {}
         """The axes of the present configuration, by name."""
         self.taken_out: list[AxisThread] = []
@@ -112,11 +112,13 @@ class Session:
             changes = self._checked(axes)
         except (LivebodeError, MemoryError) as error:
             why = str(error) or "there is not enough memory for it"
-            self._say("configuration-refused", f"configuration rejected: {why}; the previous one stays active")
+            self._report_to_axes(
+                "configuration-refused", f"configuration rejected: {why}; the previous one stays active"
+            )
             return
         if axes == {name: thread.axis for name, thread in self.threads.items()}:
             if asked:
-                self._say("configuration-applied", "the configuration is the same", record=False)
+                self._report_to_axes("configuration-applied", "the configuration is the same", record=False)
             return
         self._apply(axes, changes)
 
@@ -130,11 +132,11 @@ class Session:
         if self._postponed != name:
             self._postponed = name
             message = f"axis {name} was removed, its run is being finished; the configuration is applied after that"
-            self._say("configuration-postponed", message, record=False)
+            self._report_to_axes("configuration-postponed", message, record=False)
 
-    def _checked(self, axes: Axes) -> dict[str, Change | None]:
+    def _checked(self, axes: Axes) -> dict[str, ChangeRequest | None]:
         """The change for each running axis; LivebodeError if one of them cannot continue with it."""
-        changes: dict[str, Change | None] = {}
+        changes: dict[str, ChangeRequest | None] = {}
         if ("" in axes) != ("" in self.threads):
             raise ConfigError(
                 "change-needs-restart",
@@ -151,34 +153,34 @@ class Session:
                 raise (error.at(f"axis {name}") if name else error) from None
         return changes
 
-    def _apply(self, axes: Axes, changes: Mapping[str, Change | None]) -> None:
+    def _apply(self, axes: Axes, changes: Mapping[str, ChangeRequest | None]) -> None:
         for name, change in changes.items():
             thread = self.threads[name]
             if change is not None:
                 change.request(thread.control)
                 thread.axis = axes[name]
-                self._report(name, change.event)
+                self._publish(name, change.event)
         for name in [name for name in self.threads if name not in axes]:
-            self._report(name, Event("configuration-applied", 0, 0.0, "the axis was removed and ends"))
+            self._publish(name, Event("configuration-applied", 0, 0.0, "the axis was removed and ends"))
             self.taken_out.append(self.threads.pop(name))
             self.taken_out[-1].end()
         for name, axis in axes.items():
             old = self.threads.get(name)
             if old is None or (not old.alive and old.axis != axis):
-                self._report(name, Event("configuration-applied", 0, 0.0, "the axis begins"))
+                self._publish(name, Event("configuration-applied", 0, 0.0, "the axis begins"))
                 self._add(name, axis, replaces=False).start()
 
-    def _say(self, kind: str, message: str, *, record: bool = True) -> None:
-        self._report("", Event(kind, 0, 0.0, message))
+    def _report_to_axes(self, kind: str, message: str, *, record: bool = True) -> None:
+        self._publish("", Event(kind, 0, 0.0, message))
         for thread in self.threads.values() if record else ():
             if thread.alive:
                 thread.control.report(kind, message)
 
-    def _report(self, name: str, event: Event) -> None:
+    def _publish(self, name: str, event: Event) -> None:
         """Log and publish the result of an edit."""
         level = logging.WARNING if event.kind == "configuration-refused" else logging.INFO
         _logger.log(level, "%s%s", f"axis {name}: " if name else "", event.message)
-        self._tell(name, event)
+        self._report_event(name, event)
 
     @contextmanager
     def _hearing(self) -> Iterator[None]:

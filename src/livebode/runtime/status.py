@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from livebode.core import Block, Event, Responses
-from livebode.runtime.documents import Channels, Document, RunStarted, Tracked
+from livebode.runtime.documents import Channels, Document, RunStarted, TrackerResults
 from livebode.runtime.run_control import RunControl
 from livebode.sources.live import Health, LiveBlock
 
@@ -61,7 +61,7 @@ class Status:
                 self.responses += len(document)
             case Event():
                 self.event = document
-            case Tracked(block):
+            case TrackerResults(block):
                 self._followed(block)
 
     def _followed(self, block: Block) -> None:

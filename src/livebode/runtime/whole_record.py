@@ -9,7 +9,7 @@ from typing import Any, Self
 from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Event, Responses
 from livebode.records import RunDirectory
-from livebode.runtime.documents import Document, Fitted
+from livebode.runtime.documents import Document, FitResults
 
 
 class WholeRecord:
@@ -36,7 +36,7 @@ class WholeRecord:
         match document:
             case Responses():
                 self._directory.write(document)
-            case Fitted(parts):
+            case FitResults(parts):
                 self._directory.write_parameters(*parts)
             case Event():
                 self._directory.write_event(document)

@@ -30,9 +30,9 @@ class ArrowRecording(Recording):
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         del rows  # batches are as the writer cut them
-        wanted = sorted({column.key for column in columns})
-        places = [wanted.index(column.key) for column in columns]
-        with self._opened(wanted) as reader:
+        required = sorted({column.key for column in columns})
+        places = [required.index(column.key) for column in columns]
+        with self._opened(required) as reader:
             for batch in batches(reader):
                 if batch.num_rows:
                     yield [to_numpy(batch.column(place)) for place in places]

@@ -12,7 +12,7 @@ NUMBER = re.compile(r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|inf(?:ini
 MOMENT = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d(?::?\d\d(?::?\d\d(?:\.\d{1,9})?)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
 
 
-class Kind(Enum):
+class CellKind(Enum):
     """Content of a column."""
 
     NUMBER = "numbers"
@@ -51,9 +51,9 @@ def zoned(cell: str) -> bool:
     return bool(match and match["zone"])
 
 
-def kind_of(cells: list[str], decimal: str) -> Kind:
+def kind_of(cells: list[str], decimal: str) -> CellKind:
     """Content of a column: text only if no cell is a value, so that text among numbers is detected as an error."""
     filled = [cell for cell in cells if cell not in EMPTY]
     if any(is_number(cell, decimal) for cell in filled) or not filled:
-        return Kind.NUMBER
-    return Kind.MOMENT if any(is_moment(cell) for cell in filled) else Kind.TEXT
+        return CellKind.NUMBER
+    return CellKind.MOMENT if any(is_moment(cell) for cell in filled) else CellKind.TEXT

@@ -13,7 +13,7 @@ import pyarrow as pa
 from pyarrow import csv
 
 from livebode.core import RecordingError
-from livebode.sources.cells import EMPTY, Kind
+from livebode.sources.cells import EMPTY, CellKind
 from livebode.sources.columnar import to_numpy
 from livebode.sources.dialect import find_dialect
 from livebode.sources.locate import locate
@@ -39,8 +39,8 @@ class DelimitedRecording(Recording):
         for at, ((name, unit), kind) in enumerate(zip(split_units(headings), self._dialect.kinds, strict=True)):
             unit = self._dialect.units[at] or unit
             aliases = (headings[at],) if headings[at] != name else ()
-            if kind in (Kind.NUMBER, Kind.MOMENT):
-                is_moment = kind is Kind.MOMENT
+            if kind in (CellKind.NUMBER, CellKind.MOMENT):
+                is_moment = kind is CellKind.MOMENT
                 columns.append(Column(name, "ns" if is_moment else unit, None, aliases, temporal=is_moment, key=at))
             elif headings[at]:
                 skipped.append(Skipped(name, "it contains text"))
@@ -48,12 +48,12 @@ class DelimitedRecording(Recording):
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         del rows
-        wanted = list(dict.fromkeys(column.key for column in columns))
+        required = list(dict.fromkeys(column.key for column in columns))
         try:
             with self._opened() as file:
                 yield from self._parsed(file, columns)
         except pa.ArrowInvalid as error:
-            raise locate(self.path, self._dialect, wanted, ARROW_BLOCK_BYTES) or RecordingError(
+            raise locate(self.path, self._dialect, required, ARROW_BLOCK_BYTES) or RecordingError(
                 "damaged", f"cannot read {self.path}: {first_line(error)}", "repair the file", path=str(self.path)
             ) from error
 
@@ -77,10 +77,10 @@ class DelimitedRecording(Recording):
 
     def _parsed(self, file: Any, columns: Sequence[Column]) -> Iterator[Chunk]:
         dialect = self._dialect
-        wanted = list(dict.fromkeys(column.key for column in columns))
+        required = list(dict.fromkeys(column.key for column in columns))
         names = [str(at) for at in range(dialect.width)]
         moment = pa.timestamp("ns", dialect.zone)
-        types = {names[at]: moment if dialect.kinds[at] is Kind.MOMENT else pa.float64() for at in wanted}
+        types = {names[at]: moment if dialect.kinds[at] is CellKind.MOMENT else pa.float64() for at in required}
         with csv.open_csv(
             file,
             read_options=csv.ReadOptions(column_names=names, block_size=ARROW_BLOCK_BYTES),
@@ -90,7 +90,7 @@ class DelimitedRecording(Recording):
             ),
             convert_options=csv.ConvertOptions(
                 column_types=types,
-                include_columns=[names[at] for at in wanted],
+                include_columns=[names[at] for at in required],
                 decimal_point=dialect.decimal,
                 null_values=list(EMPTY),
                 check_utf8=False,
@@ -98,7 +98,7 @@ class DelimitedRecording(Recording):
         ) as reader:
             for batch in reader:
                 if batch.num_rows:
-                    yield [to_numpy(batch.column(wanted.index(column.key))) for column in columns]
+                    yield [to_numpy(batch.column(required.index(column.key))) for column in columns]
 
     @contextmanager
     def _opened(self) -> Iterator[Any]:

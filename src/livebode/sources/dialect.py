@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from livebode.core import RecordingError
-from livebode.sources.cells import EMPTY, Kind, is_comment, is_value, kind_of, zoned
+from livebode.sources.cells import EMPTY, CellKind, is_comment, is_value, kind_of, zoned
 from livebode.sources.damage import oversized
 from livebode.sources.header import find_header, fits
 from livebode.sources.recording import COLUMNS_MAX
@@ -51,7 +51,7 @@ class Dialect:
     first_line: int = 1
     headings: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
-    kinds: tuple[Kind, ...] = ()
+    kinds: tuple[CellKind, ...] = ()
     zone: str | None = None
     commented: bool = False
 
@@ -197,13 +197,13 @@ def values_share(columns: list[list[str]], decimal: str) -> float:
     return sum(is_value(cell, decimal) or cell in EMPTY for cell in cells) / max(len(cells), 1)
 
 
-def fitting_share(rows: list[list[str]], kinds: tuple[Kind, ...], decimal: str) -> float:
+def fitting_share(rows: list[list[str]], kinds: tuple[CellKind, ...], decimal: str) -> float:
     """Share of lines that fit the table; a wrong delimiter fits only some of them."""
     return sum(fits(cells, kinds, decimal) for cells in rows) / max(len(rows), 1)
 
 
-def drop_trailing(kinds: tuple[Kind, ...], header: list[str], columns: list[list[str]]) -> tuple[Kind, ...]:
+def drop_trailing(kinds: tuple[CellKind, ...], header: list[str], columns: list[list[str]]) -> tuple[CellKind, ...]:
     """The kinds, with a last column that has neither heading nor values (a delimiter ends each line) as text."""
     if len(kinds) > 1 and not any(columns[-1]) and not (header and header[-1]):
-        return (*kinds[:-1], Kind.TEXT)
+        return (*kinds[:-1], CellKind.TEXT)
     return kinds

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from livebode.sources.cells import EMPTY, Kind, is_moment, is_number, is_value
+from livebode.sources.cells import EMPTY, CellKind, is_moment, is_number, is_value
 
 
 def find_header(
-    table: list[list[str]], kinds: tuple[Kind, ...], decimal: str, *, trailing: bool
+    table: list[list[str]], kinds: tuple[CellKind, ...], decimal: str, *, trailing: bool
 ) -> tuple[int, list[str], list[str]]:
     """Index of the first row of values, the header above it and the units between them (each empty without).
 
@@ -42,20 +42,20 @@ def no_values(cells: list[str], decimal: str) -> bool:
     return any(cells) and not any(is_value(cell, decimal) for cell in cells)
 
 
-def fits_at(table: list[list[str]], at: int, kinds: tuple[Kind, ...], decimal: str) -> bool:
+def fits_at(table: list[list[str]], at: int, kinds: tuple[CellKind, ...], decimal: str) -> bool:
     return at < len(table) and fits(table[at], kinds, decimal)
 
 
-def fits(cells: list[str], kinds: tuple[Kind, ...], decimal: str) -> bool:
+def fits(cells: list[str], kinds: tuple[CellKind, ...], decimal: str) -> bool:
     if len(cells) != len(kinds):
         return False
     return all(cell in EMPTY or fits_kind(cell, kind, decimal) for cell, kind in zip(cells, kinds))
 
 
-def fits_kind(cell: str, kind: Kind, decimal: str) -> bool:
-    if kind is Kind.NUMBER:
+def fits_kind(cell: str, kind: CellKind, decimal: str) -> bool:
+    if kind is CellKind.NUMBER:
         return is_number(cell, decimal)
-    return kind is Kind.TEXT or is_moment(cell)
+    return kind is CellKind.TEXT or is_moment(cell)
 
 
 def padded(cells: list[str], width: int) -> list[str]:

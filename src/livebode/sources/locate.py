@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from livebode.core import RecordingError
-from livebode.sources.cells import EMPTY, Kind, is_comment, is_moment, is_number
+from livebode.sources.cells import EMPTY, CellKind, is_comment, is_moment, is_number
 from livebode.sources.dialect import Dialect
 
 
@@ -49,7 +49,7 @@ def check_line(path: Path, dialect: Dialect, columns: Sequence[int], number: int
         )
     for at in columns:
         cell = cells[at].strip()
-        fits = is_moment(cell) if dialect.kinds[at] is Kind.MOMENT else is_number(cell, dialect.decimal)
+        fits = is_moment(cell) if dialect.kinds[at] is CellKind.MOMENT else is_number(cell, dialect.decimal)
         if cell not in EMPTY and not fits:
             name = dialect.headings[at]
             return RecordingError(

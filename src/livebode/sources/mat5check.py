@@ -83,12 +83,12 @@ def check_top(path: Path, file: BinaryIO, at: int, size: int, order: str) -> tup
     inner = length
     if kind == COMPRESSED:
         source = Unpacked(file, length)
-        kind, inner = Walk(source, order).tag(UNPACKED_MAX)
+        kind, inner = MatlabWalk(source, order).tag(UNPACKED_MAX)
     if kind != MATRIX:
         raise damaged(
             f"{path} has an element of type {kind} at byte {at}, which is not a variable", path=str(path), byte=at
         )
-    variable = Walk(source, order).matrix(inner, 0)
+    variable = MatlabWalk(source, order).matrix(inner, 0)
     source.rest()
     return variable, at + 8 + length
 
@@ -158,7 +158,7 @@ def too_short(declared: int, left: int) -> RecordingError:
 
 
 @dataclass
-class Walk:
+class MatlabWalk:
     """A walk through the matrices of one variable."""
 
     source: Plain | Unpacked

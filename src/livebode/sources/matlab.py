@@ -30,7 +30,7 @@ class MatlabRecording(Recording):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        walk = Walk()
+        walk = MatlabCollector()
         singles: list[str] = []
         for variable in list_variables(path):
             name = variable.name
@@ -60,7 +60,7 @@ def load(path: Path, names: list[str]) -> dict[str, Any]:
     return variables
 
 
-class Walk:
+class MatlabCollector:
     """Collects columns, texts and scalars from variables and the fields of structs."""
 
     def __init__(self) -> None:

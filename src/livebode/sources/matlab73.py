@@ -23,7 +23,7 @@ class Matlab73Recording(Recording):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        walk = Walk(path)
+        walk = Hdf5Collector(path)
         with import_h5py(path).File(path, "r") as file:
             walk.file = file
             for name in file:
@@ -37,7 +37,7 @@ class Matlab73Recording(Recording):
             yield from dataset_chunks([file[column.key.array] for column in columns], columns, rows)
 
 
-class Walk:
+class Hdf5Collector:
     """Collects columns, texts and scalars from the groups of a file."""
 
     def __init__(self, path: Path) -> None:

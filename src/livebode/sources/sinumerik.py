@@ -120,21 +120,22 @@ def measured_nodes(root: Element) -> dict[str, Element]:
             signals=len(nodes),
         )
     roles = child(root, "m_listPrimaryFreqRespSigNodeData")
-    wanted = {
+    required = {
         number(roles, "m_iInputSigNodeUniqueInstanceID", deep=True): "input",
         number(roles, "m_iOutputSigNodeUniqueInstanceID", deep=True): "output",
     }
     named = {
-        wanted.get(number(node, "m_iUniqueInstanceId"), f"node_{number(node, 'm_uNodeId'):.0f}"): node for node in nodes
+        required.get(number(node, "m_iUniqueInstanceId"), f"node_{number(node, 'm_uNodeId'):.0f}"): node
+        for node in nodes
     }
     if not {"input", "output"} <= named.keys():
         raise RecordingError(
             "incomplete",
-            f"the XML names input and output {sorted(wanted)}, but has only {sorted(named)}",
+            f"the XML names input and output {sorted(required)}, but has only {sorted(named)}",
             "check that the file is complete",
             part="PlatformSignalNode",
         )
-    return {name: named[name] for name in sorted(named, key=lambda name: (name not in wanted.values(), name))}
+    return {name: named[name] for name in sorted(named, key=lambda name: (name not in required.values(), name))}
 
 
 def records(node: Element) -> Iterator[NDArray[np.float64]]:

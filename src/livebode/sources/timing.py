@@ -84,9 +84,9 @@ def find_time(columns: Sequence[Column], time: str | None) -> tuple[Column | Non
     if time.casefold() == "none":
         return None, ""
     bare, unit = split_unit(time)
-    for wanted, given in ((time, ""), (bare, unit)):
+    for required, given in ((time, ""), (bare, unit)):
         for column in columns:
-            if wanted == column.name or wanted in column.aliases:
+            if required == column.name or required in column.aliases:
                 return column, given
     names = [column.name for column in columns]
     raise RecordingError(
@@ -162,8 +162,8 @@ def clock_from_time(
                 samples=steps.rows,
             )
         return Clock(rate_hz, "given", steps.rows)
-    told = (rate_hz, "the given rate") if rate_hz is not None else stated
-    unit, scale, guessed = (unit, SECONDS[unit.casefold()], "") if unit else guess_unit(column, steps.mean, told)
+    known_rate = (rate_hz, "the given rate") if rate_hz is not None else stated
+    unit, scale, guessed = (unit, SECONDS[unit.casefold()], "") if unit else guess_unit(column, steps.mean, known_rate)
     refuse_jitter(column.name, steps)
     measured_hz = exact_rate_hz(steps.mean * scale, uncertainty(steps))
     check_rate(column.name, measured_hz, rate_hz)
@@ -215,13 +215,13 @@ def stated_unit(column: Column, given: str) -> str:
     return unit
 
 
-def guess_unit(column: Column, mean: float, told: tuple[float, str] | None) -> tuple[str, float, str]:
+def guess_unit(column: Column, mean: float, known_rate: tuple[float, str] | None) -> tuple[str, float, str]:
     """Unit of a time column that states none, its length in seconds, and its origin (empty for seconds).
 
     The unit is seconds, except if a rate from elsewhere differs by a power of 1000. Seconds that give 1 Hz or less
     are not accepted without such a rate.
     """
-    if told is None:
+    if known_rate is None:
         if mean < 1.0:
             return "s", 1.0, ""
         raise RecordingError(
@@ -231,7 +231,7 @@ def guess_unit(column: Column, mean: float, told: tuple[float, str] | None) -> t
             channel=column.name,
             step=mean,
         )
-    rate_hz, where = told
+    rate_hz, where = known_rate
     for unit in ("s", "ms", "us", "ns"):
         if abs(mean * SECONDS[unit] * rate_hz - 1.0) <= RATE_TOLERANCE:
             return unit, SECONDS[unit], "" if unit == "s" else f" (unit from {where})"

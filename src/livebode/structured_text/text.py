@@ -36,7 +36,7 @@ def section(kind: str, declared: Iterable[Declared]) -> str:
     rows = list(declared)
     width = min(max(len(name) for name, _, _ in rows), 14)
     types = max(len(of) for _, of, _ in rows) + 1
-    lines = [f"    {name:<{width}} : {f'{of};':<{types}}  // {said}".rstrip(" /") for name, of, said in rows]
+    lines = [f"    {name:<{width}} : {f'{of};':<{types}}  // {comment}".rstrip(" /") for name, of, comment in rows]
     return "\n".join([kind, *lines, "END_VAR", ""])
 
 

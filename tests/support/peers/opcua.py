@@ -42,10 +42,10 @@ class OpcUaPeer(Peer):
 
     def _expect(self, word: str) -> None:
         assert self._process.stdout is not None
-        said = self._process.stdout.readline().strip()
-        if said != word:
+        fields = self._process.stdout.readline().strip()
+        if fields != word:
             self.__exit__()
-        assert said == word
+        assert fields == word
 
     def __exit__(self, *_: object) -> None:
         self._process.kill()
@@ -54,16 +54,16 @@ class OpcUaPeer(Peer):
     def wait_ready(self) -> None:
         self._expect("ready")
 
-    def _tell(self, said: dict) -> None:
+    def _write(self, fields: dict) -> None:
         assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps(said) + "\n")
+        self._process.stdin.write(json.dumps(fields) + "\n")
         self._process.stdin.flush()
 
     def send(self, batch: Batch) -> None:
-        self._tell({"sample": batch.first_sample, "data": batch.data.tolist(), "stamp_s": batch.stamp_s})
+        self._write({"sample": batch.first_sample, "data": batch.data.tolist(), "stamp_s": batch.stamp_s})
 
     def send_rubbish(self) -> None:
-        self._tell({"sample": 0, "data": [[1.0, 2.0, 3.0], [1.0]], "stamp_s": next(self._stamps)})
+        self._write({"sample": 0, "data": [[1.0, 2.0, 3.0], [1.0]], "stamp_s": next(self._stamps)})
 
     def interrupt(self) -> None:
         self.__exit__()

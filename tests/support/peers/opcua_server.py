@@ -44,25 +44,25 @@ async def serve(port: int, folder: str | None, login: list[str]) -> None:
         variables[name] = await axis.add_variable(ua.NodeId(f"axis.{name}", 2), name, empty)
     async with server:
         print("serving", flush=True)
-        await asyncio.gather(obey(server, variables), tell_ready(server))
+        await asyncio.gather(obey(server, variables), report_ready(server))
 
 
 async def obey(server: Server, variables: dict) -> None:
     loop = asyncio.get_running_loop()
     while line := await loop.run_in_executor(None, sys.stdin.readline):
-        said = json.loads(line)
-        stamp = datetime.fromtimestamp(said["stamp_s"], UTC).replace(tzinfo=None)
+        fields = json.loads(line)
+        stamp = datetime.fromtimestamp(fields["stamp_s"], UTC).replace(tzinfo=None)
         values = {
-            "w": ua.Variant(said["data"][0], ua.VariantType.Double),
-            "y": ua.Variant(said["data"][1], ua.VariantType.Double),
-            "sample": ua.Variant(said["sample"], ua.VariantType.Int64),
+            "w": ua.Variant(fields["data"][0], ua.VariantType.Double),
+            "y": ua.Variant(fields["data"][1], ua.VariantType.Double),
+            "sample": ua.Variant(fields["sample"], ua.VariantType.Int64),
         }
         for name, value in values.items():
             await server.write_attribute_value(variables[name].nodeid, ua.DataValue(value, SourceTimestamp=stamp))
     sys.exit(0)
 
 
-async def tell_ready(server: Server) -> None:
+async def report_ready(server: Server) -> None:
     service = server.iserver.subscription_service
     while True:
         for subscription in service.subscriptions.values():

@@ -36,11 +36,15 @@ const SPANS = [
  * @param {(quantity: Quantity, why?: string) => void} actions.watch
  * @param {() => void} actions.freeze
  * @param {() => void} actions.fill
- * @param {() => void} actions.say
+ * @param {() => void} actions.watchShown
  * @param {() => void} actions.clear
  * @param {(text: string) => void} actions.complain
  */
-export function controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, clear, complain }) {
+export function controls(
+  page,
+  { bode, tracking, map, timeline },
+  { watch, freeze, fill, watchShown, clear, complain },
+) {
   /** @param {string} name */
   function tab(name) {
     page.tab = name;
@@ -178,7 +182,7 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     if (page.frozen) freeze();
     timeline.atS = null;
     clear();
-    say();
+    watchShown();
   });
   $("freeze").addEventListener("click", freeze);
   $("theme").addEventListener("click", nextTheme);

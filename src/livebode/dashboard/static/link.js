@@ -2,7 +2,7 @@
 // The web socket: reconnects with increasing delay, sends requests of the page, distributes the messages.
 import { framesOf } from "./frames.js";
 
-/** @import { Frame, News, Wish } from "./messages.js" */
+/** @import { Frame, News, ClientRequest } from "./messages.js" */
 
 const PAUSE_MS_MAX = 8000;
 
@@ -17,8 +17,8 @@ export class Link {
     this.onNews = onNews;
     this.onFrame = onFrame;
     this.onState = onState;
-    /** @type {Map<string, Wish>} requests to repeat after a reconnection, by kind */
-    this.wishes = new Map();
+    /** @type {Map<string, ClientRequest>} requests to repeat after a reconnection, by kind */
+    this.repeated = new Map();
     this.pauseMs = 250;
     this.socket = this.connect();
   }
@@ -28,7 +28,7 @@ export class Link {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.pauseMs = 250;
-      for (const wish of this.wishes.values()) socket.send(JSON.stringify(wish));
+      for (const request of this.repeated.values()) socket.send(JSON.stringify(request));
       this.onState(true);
     };
     socket.onmessage = ({ data }) => {
@@ -51,17 +51,17 @@ export class Link {
   }
 
   /**
-   * @param {Wish} wish
+   * @param {ClientRequest} request
    * @param {string} [keep] name under which the request is repeated after a reconnection; a later one replaces it
    */
-  wish(wish, keep) {
-    if (keep) this.wishes.set(keep, wish);
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(wish));
+  request(request, keep) {
+    if (keep) this.repeated.set(keep, request);
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(request));
   }
 
   /** @param {string} keep */
   forget(keep) {
-    this.wishes.delete(keep);
+    this.repeated.delete(keep);
   }
 }
 

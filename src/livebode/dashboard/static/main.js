@@ -197,7 +197,7 @@ function begin({ facts, axes, trends }) {
   const remarks = [gone ? REFERENCE_GONE : "", facts.remark].filter(Boolean);
   if (remarks.length) complain(remarks.join(" "));
   if (timeline.atS !== null) showMoment(timeline.atS);
-  if (facts.watched !== page.quantity) say();
+  if (facts.watched !== page.quantity) watchShown();
 }
 
 // Another axis was chosen, whose machine may not have sent anything: clear the page.
@@ -228,7 +228,7 @@ const whyNoMargins = (facts) =>
     ? tr("Margins need the loop: describe its controllers under [loop].")
     : tr("Margins need a fitted model: add [fit] to the configuration.");
 
-const say = () => link.wish({ kind: "watch", axis: page.axis, quantity: page.quantity }, "watch");
+const watchShown = () => link.request({ kind: "watch", axis: page.axis, quantity: page.quantity }, "watch");
 
 /**
  * @param {Quantity} quantity
@@ -243,7 +243,7 @@ function watch(quantity, why) {
   page.quantity = quantity;
   choose($("quantities"), quantity);
   page.key = null;
-  say();
+  watchShown();
 }
 
 function status() {
@@ -297,13 +297,13 @@ function freeze() {
   }
   const timeS = bode.curves.measured?.frame.timeS[0];
   if (timeS === undefined) return;
-  link.wish({ kind: "freeze", time_s: timeS }, "freeze");
+  link.request({ kind: "freeze", time_s: timeS }, "freeze");
   frozen(true);
 }
 
 function letGo() {
   link.forget("freeze");
-  link.wish({ kind: "unfreeze" });
+  link.request({ kind: "unfreeze" });
   bode.drop("reference");
   page.dirty.add("bode");
   frozen(false);
@@ -342,6 +342,6 @@ function draw(now) {
 }
 
 const { fill, showMoment, goLive, drawRows } = past(page, { bode, tracking, timeline, link }, { complain, status });
-controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, clear, complain });
+controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, watchShown, clear, complain });
 window.livebode = { page, bode, tracking, map, parameters, margins, events, timeline };
 requestAnimationFrame(draw);

@@ -146,7 +146,7 @@ export type News = (Beginning | { facts?: undefined }) & {
 };
 
 /** A request on the web socket; see queries.py. */
-export type Wish =
+export type ClientRequest =
   | { kind: "watch"; axis: number; quantity: Quantity | null }
   | { kind: "freeze"; time_s: number }
   | { kind: "unfreeze" | "pause" | "resume" };

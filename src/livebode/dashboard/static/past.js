@@ -48,7 +48,7 @@ export function past(page, { bode, tracking, timeline, link }, { complain, statu
 
   /** @param {number} timeS */
   async function showMoment(timeS) {
-    link.wish({ kind: "pause" }, "pause");
+    link.request({ kind: "pause" }, "pause");
     page.dirty.add("trends");
     status();
     tracking.marked = timeS;
@@ -82,7 +82,7 @@ export function past(page, { bode, tracking, timeline, link }, { complain, statu
   function goLive() {
     tracking.marked = NaN;
     link.forget("pause");
-    link.wish({ kind: "resume" });
+    link.request({ kind: "resume" });
     page.rows.clear();
     page.dirty.add("trends");
     fill();

@@ -21,10 +21,10 @@ def write_c_header(path: Path, waveform: Waveform, name: str) -> None:
     big = word.upper()
     lines = waveform.lines
     # Facts may contain the end of a comment.
-    said = "\n".join(f" * {line}".replace("*/", "* /") for line in as_lines(facts(waveform)))
+    comment = "\n".join(f" * {line}".replace("*/", "* /") for line in as_lines(facts(waveform)))
     values = [float(value).hex() for value in waveform.samples]
     text = f"""/* One period of an excitation, N m.
-{said}
+{comment}
  */
 #ifndef {big}_H
 #define {big}_H

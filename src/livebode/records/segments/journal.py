@@ -20,7 +20,7 @@ from livebode.records.segments.damage import Damage
 from livebode.records.segments.disk import sync_directory
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE, Frame, frames, to_frame
 from livebode.records.segments.plain_batch import check_schema, plain_batch
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 from livebode.records.versions import check_version, format_of
 
 FOLDER, ASIDE = "open", "damaged"
@@ -244,7 +244,7 @@ def _count(batches: Mapping[str, list[pa.RecordBatch]]) -> dict[str, int]:
     return {name: sum(batch.num_rows for batch in of) for name, of in batches.items()}
 
 
-def head(tables: Mapping[str, Table], commit: Commit) -> bytes:
+def head(tables: Mapping[str, ColumnTable], commit: Commit) -> bytes:
     """Beginning of a journal: its format, names and schemas of its tables, and the commit from which it continues.
 
     It is written twice, because nothing after a damaged schema could be read.

@@ -9,7 +9,7 @@ JOURNALS = 3
 
 
 @dataclass(frozen=True)
-class Limits:
+class SegmentLimits:
     """Sizes of a record in segments.
 
     Attributes

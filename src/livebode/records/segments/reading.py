@@ -19,7 +19,7 @@ from livebode.records.segments.manifest import NAME, Manifest, Segment
 from livebode.records.segments.segment_file import open_segment
 
 _ROWS = 1 << 14
-Tell = Callable[[Event], None]
+Report = Callable[[Event], None]
 
 
 def in_segments(run: Path) -> bool:
@@ -30,7 +30,7 @@ def in_segments(run: Path) -> bool:
 Rows = dict[str, list[pa.RecordBatch]]
 
 
-def parts(run: Path, report: Tell, *, finished: bool) -> tuple[list[Segment], Rows]:
+def parts(run: Path, report: Report, *, finished: bool) -> tuple[list[Segment], Rows]:
     """Closed segments of all tables, by age, and later rows of each that are still in a journal."""
     # The newest first: everything before an existing journal is complete. And before the manifest: a journal that is
     # closed in between is then in both instead of in neither.
@@ -64,7 +64,7 @@ def waiting_events(run: Path) -> list[Any]:
 def tables(
     run: Path,
     table: str,
-    report: Tell,
+    report: Report,
     size_bytes_max: int | None,
     span_s: tuple[float, float] | None = None,
     *,
@@ -89,7 +89,7 @@ def tables(
         yield pa.Table.from_batches(rows[table])
 
 
-def _joined(run: Path, segments: list[Segment], report: Tell) -> Iterator[pa.Table]:
+def _joined(run: Path, segments: list[Segment], report: Report) -> Iterator[pa.Table]:
     """The rows of segments, small ones combined, because the overhead per part is larger than that of its rows."""
     held: list[pa.Table] = []
     for segment in segments:
@@ -104,7 +104,7 @@ def _joined(run: Path, segments: list[Segment], report: Tell) -> Iterator[pa.Tab
         yield pa.concat_tables(held)
 
 
-def whole(run: Path, segment: Segment, report: Tell) -> pq.ParquetFile | None:
+def whole(run: Path, segment: Segment, report: Report) -> pq.ParquetFile | None:
     """The file of a segment; None if it is damaged, which is reported, or was removed to meet the budget."""
     try:
         return open_segment(run, segment)
@@ -133,7 +133,7 @@ def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:
     return segments[at:]
 
 
-def _read(run: Path, number: int, following: Journal | None, report: Tell) -> Journal:
+def _read(run: Path, number: int, following: Journal | None, report: Report) -> Journal:
     try:
         return Journal.read(run, number, lambda: None if following is None else following.first)
     except FileNotFoundError:  # it was closed in the meantime
@@ -145,7 +145,7 @@ def _read(run: Path, number: int, following: Journal | None, report: Tell) -> Jo
         return Journal()
 
 
-def _tell_of(found: Manifest, finished: bool, report: Tell) -> None:
+def _tell_of(found: Manifest, finished: bool, report: Report) -> None:
     if not found.broken and not (finished and found.torn):
         return
     lines = ", ".join(map(str, found.broken)) or "the last"

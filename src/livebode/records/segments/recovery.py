@@ -18,7 +18,7 @@ EVENTS = "events.jsonl"
 
 
 @dataclass(frozen=True)
-class Found:
+class UnfinishedRun:
     """State of an unfinished run.
 
     `commit` is the last intact one. The run continues in journal `number` after `length`; if that is None, in a new
@@ -34,7 +34,7 @@ class Found:
     torn_bytes: int
 
 
-def recover(run: Path) -> Found | None:
+def recover(run: Path) -> UnfinishedRun | None:
     """State to continue from; None if no run was begun in this directory.
 
     Raises
@@ -74,8 +74,8 @@ def recover(run: Path) -> Found | None:
         torn += max(0, (run / EVENTS).stat().st_size - read.commit.events_bytes)
         if damaged or read.damages:
             sealed = [*left, number, *damaged]
-            return Found(found, sealed[-1] + 1, None, read.commit, sealed, torn)
-        return Found(found, number, read.length, read.commit, left, torn)
+            return UnfinishedRun(found, sealed[-1] + 1, None, read.commit, sealed, torn)
+        return UnfinishedRun(found, number, read.length, read.commit, left, torn)
     raise RecordError(
         "not-continuable",
         f"the run in {str(run)!r} has no intact journal to continue from",

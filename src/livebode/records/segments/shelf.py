@@ -17,7 +17,7 @@ from livebode.records.inside import check_folder, is_folder
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.disk import AppendFile, put_whole, sync_directory
 from livebode.records.segments.manifest import Manifest, Retained, Segment
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 
 FIRST_TO_GO = "samples"
 _logger = logging.getLogger(__name__)
@@ -41,7 +41,7 @@ class Shelf:
         Numbers of journals that are complete and not closed yet.
     """
 
-    def __init__(self, run: Path, tables: Mapping[str, Table], found: Manifest, sealed: list[int]) -> None:
+    def __init__(self, run: Path, tables: Mapping[str, ColumnTable], found: Manifest, sealed: list[int]) -> None:
         self._run, self._tables = run, tables
         self._file = AppendFile(run, manifest.NAME, found.length)
         self._segments = list(found.segments)

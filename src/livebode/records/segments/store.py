@@ -21,15 +21,15 @@ from livebode.records.segments.damage import total
 from livebode.records.segments.disk import AppendFile, put_whole, sync_directory, why
 from livebode.records.segments.event_log import EventLog
 from livebode.records.segments.journal import Commit
-from livebode.records.segments.limits import JOURNALS, Limits
+from livebode.records.segments.limits import JOURNALS, SegmentLimits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
-from livebode.records.segments.recovery import EVENTS, Found, recover
+from livebode.records.segments.recovery import EVENTS, UnfinishedRun, recover
 from livebode.records.segments.shelf import Shelf
 from livebode.records.segments.syncing import Syncing
-from livebode.records.segments.waiting import Waiting
+from livebode.records.segments.waiting import UnsyncedRows
 from livebode.records.summary_file import COPY, RUN, to_document
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 
 _logger = logging.getLogger(__name__)
 
@@ -64,11 +64,13 @@ class Store:
         damaged.
     """
 
-    def __init__(self, path: Path, tables: Mapping[str, Table], limits: Limits, emit: Emit = ignore) -> None:
+    def __init__(
+        self, path: Path, tables: Mapping[str, ColumnTable], limits: SegmentLimits, emit: Emit = ignore
+    ) -> None:
         self.path, self.limits = path, limits
         self.last: Commit | None = None
         self._tables = dict(tables)
-        self._waiting = Waiting(tuple(self._tables))
+        self._waiting = UnsyncedRows(tuple(self._tables))
         self._log = EventLog(path, emit)
         self._pause: Event | None = None
         self._attempts = 0  # failed attempts to close a segment since the last closed one
@@ -195,7 +197,7 @@ class Store:
         limits = self.limits
         return self._journal.length >= limits.journal_bytes_max or sample - self._began >= limits.segment_samples
 
-    def _go_on(self, found: Found) -> None:
+    def _go_on(self, found: UnfinishedRun) -> None:
         self.last = found.commit
         self._waiting.rows |= found.commit.rows
         self._open_files(found.manifest, found.sealed, found.commit.events_bytes)

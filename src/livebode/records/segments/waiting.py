@@ -11,7 +11,7 @@ from livebode.records.segments.frames import ROWS, to_frame
 
 
 @dataclass(frozen=True)
-class _Part:
+class _UnsyncedFrame:
     table: str
     frame: bytes
     rows: int
@@ -19,7 +19,7 @@ class _Part:
     last_sample: int
 
 
-class Waiting:
+class UnsyncedRows:
     """Rows since the journal was last synced. After a failure they are written again, or dropped and counted.
 
     Parameters
@@ -39,7 +39,7 @@ class Waiting:
         self._tables = tables
         self.rows = dict.fromkeys(tables, 0)
         self._new: dict[str, list[pa.RecordBatch]] = {}
-        self._parts: list[_Part] = []
+        self._parts: list[_UnsyncedFrame] = []
         self._written = 0
         self.lost: dict[str, dict[str, int]] = {}
 
@@ -54,7 +54,7 @@ class Waiting:
             sample = to_numpy(batch["sample"])
             frame = to_frame(ROWS, memoryview(batch.serialize()), table=self._tables.index(table))
             self.rows[table] += batch.num_rows
-            self._parts.append(_Part(table, frame, batch.num_rows, int(sample.min()), int(sample.max())))
+            self._parts.append(_UnsyncedFrame(table, frame, batch.num_rows, int(sample.min()), int(sample.max())))
         self._new.clear()
 
     @property

@@ -114,7 +114,7 @@ class AdsSource(LiveSource):
             try:
                 ring, dtype = read_ring(read(0, HEADER.size), size)
                 if not self._connected:
-                    self._stands()
+                    self._established()
                 have = None if ring.epoch != epoch else have
                 for first, last in new_rows(ring, have):
                     width = ring.channels * dtype.itemsize
@@ -156,7 +156,7 @@ class AdsSource(LiveSource):
             size, pyads.ADSTRANS_SERVERCYCLE, max_delay=1e3 * settings.poll_s, cycle_time=1e3 / settings.rate_hz
         )
         handles = plc.add_device_notification((group, offset), attributes, notified)
-        self._stands()
+        self._established()
         try:
             heard = time.monotonic()
             while not self._stop.wait(self.settings.poll_s):

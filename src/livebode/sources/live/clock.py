@@ -17,7 +17,7 @@ _INTERVALS = 15
 _INTERVALS_MIN = 4
 
 
-class ClockWatch:
+class ClockMonitor:
     """Compares stamps with sample numbers of batches in order. Sample numbers define time; stamps only check it.
 
     A single step in the stamps means that the clock was set (``clock-jump``). Successive intervals that disagree with
@@ -25,8 +25,8 @@ class ClockWatch:
     judged when the next one is known.
     """
 
-    def __init__(self, said: SourceEvents, rate_hz: float) -> None:
-        self._events, self._rate_hz = said, rate_hz
+    def __init__(self, source_events: SourceEvents, rate_hz: float) -> None:
+        self._events, self._rate_hz = source_events, rate_hz
         self._wrong = False
         self.restart()
 

@@ -9,8 +9,8 @@ from livebode.sources.live.spectra_batch import AnyBatch
 class Dropped:
     """Counts the samples dropped until the queue accepts a batch again; numbers are the sender's."""
 
-    def __init__(self, said: SourceEvents) -> None:
-        self._events = said
+    def __init__(self, source_events: SourceEvents) -> None:
+        self._events = source_events
         self._samples = self._first = self._last = 0
 
     def take(self, batch: AnyBatch) -> None:

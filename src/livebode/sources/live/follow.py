@@ -34,7 +34,7 @@ REPLACED = {
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """A text table at its first inspection: how to read more of it."""
 
     recording: DelimitedRecording
@@ -86,7 +86,7 @@ class FollowSource(LiveSource):
             self._stop.wait(TICK_S)
         return False
 
-    def _looked_at(self, path: Path) -> Table | None:
+    def _looked_at(self, path: Path) -> TextTable | None:
         """The table, as soon as it has enough rows to detect its layout."""
         try:
             if not path.exists():
@@ -99,13 +99,13 @@ class FollowSource(LiveSource):
             self._trouble = error
             return None
 
-    def _follow_file(self, path: Path, table: Table) -> None:
+    def _follow_file(self, path: Path, table: TextTable) -> None:
         """Batches of the present rows and of those that are added, until the file is replaced."""
         with path.open("rb") as file:
             begin, again = self._begin(path, file, table)
             self._announce(table.channels, table.rate_hz)
             lines = FileLines(file, begin, table.recording.encoding)
-            self._stands()
+            self._established()
             while not self._stop.is_set():
                 piece = lines.read(again)
                 if piece is None:
@@ -120,7 +120,7 @@ class FollowSource(LiveSource):
                         self._deliver(batch)
                 self._mark = piece.after.as_plain()
 
-    def _begin(self, path: Path, file: BinaryIO, table: Table) -> tuple[FileMark, int]:
+    def _begin(self, path: Path, file: BinaryIO, table: TextTable) -> tuple[FileMark, int]:
         """Where to begin to read, and the byte up to which the rows were already read."""
         start = FileMark.start(file, table.recording.offset)
         if not self._mark:
@@ -135,13 +135,13 @@ class FollowSource(LiveSource):
         self._epoch, self._due = self._epoch + 1, -1
         return start, start.end
 
-    def _batches(self, table: Table, lines: bytes, row: int, mark: Mark) -> Iterator[Batch]:
+    def _batches(self, table: TextTable, lines: bytes, row: int, mark: Mark) -> Iterator[Batch]:
         """Batches of these lines; a line that does not fit the table is skipped."""
         if not lines.strip():
             return
-        wanted = [*table.columns, *([table.time] if table.time else [])]
+        required = [*table.columns, *([table.time] if table.time else [])]
         try:
-            values = table.recording.parsed(lines, wanted)
+            values = table.recording.parsed(lines, required)
         except LivebodeError as error:
             middle = lines.rfind(b"\n", 0, max(len(lines) // 2, 1)) + 1 or lines.find(b"\n") + 1
             if middle >= len(lines):
@@ -162,7 +162,7 @@ class FollowSource(LiveSource):
 
     def _follow_directory(self, folder: Path) -> None:
         self._behind = self._behind or self._begin_folder(folder)
-        self._stands()
+        self._established()
         while not self._stop.is_set():
             seen, counted = self._behind
             names = sorted(name for name in os.listdir(folder) if name > seen and not name.startswith("."))
@@ -224,7 +224,7 @@ class FollowSource(LiveSource):
             self._due = batch.stop
 
 
-def table_of(log: Log, time: str | None, inode: int) -> Table:
+def table_of(log: Log, time: str | None, inode: int) -> TextTable:
     """How to continue reading the table of a log; SourceError if it is not a table."""
     recording: Recording = log._recording
     if not isinstance(recording, DelimitedRecording):
@@ -240,7 +240,7 @@ def table_of(log: Log, time: str | None, inode: int) -> Table:
     if column is not None:
         scale_s = 1e-9 if column.temporal else SECONDS[log.timing.unit.casefold()] if log.timing else 1.0
     columns = tuple(c for c in recording.columns if not c.temporal)
-    return Table(recording, columns, column, scale_s, log.rate_hz, inode)
+    return TextTable(recording, columns, column, scale_s, log.rate_hz, inode)
 
 
 def numbered(

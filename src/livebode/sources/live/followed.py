@@ -68,7 +68,7 @@ class FolderMark(_Plain):
 
 
 @dataclass(frozen=True)
-class Piece:
+class CompleteLines:
     """Complete lines, and their position."""
 
     raw: bytes
@@ -91,7 +91,7 @@ class FileLines:
         """Whether a line of the last piece was skipped because it is too long."""
         file.seek(begin.offset)
 
-    def read(self, until: int) -> Piece | None:
+    def read(self, until: int) -> CompleteLines | None:
         """The next lines, which do not cross byte `until`; None if nothing was added."""
         before = until - self._file.tell()
         read = self._file.read(min(PIECE_BYTES, before) if before > 0 else PIECE_BYTES)
@@ -99,7 +99,7 @@ class FileLines:
             return None
         lines, self._begun = whole_lines(self._begun + read, self._encoding)
         at = self._at
-        piece = Piece(lines, replace(at, end=at.offset + len(lines), end_crc=zlib.crc32(lines, at.crc)))
+        piece = CompleteLines(lines, replace(at, end=at.offset + len(lines), end_crc=zlib.crc32(lines, at.crc)))
         self._at = piece.after
         self.cut = len(self._begun) > LINE_BYTES_MAX
         if self.cut:

@@ -23,7 +23,7 @@ class StdinSource(LiveSource):
     def _receive(self) -> bool:
         decoder, splitter = LineDecoder(self.settings.rate_hz), LineSplitter()
         number = sys.stdin.fileno()
-        self._stands()
+        self._established()
         while not self._stop.is_set():
             if not select.select([number], [], [], TICK_S)[0]:
                 continue

@@ -144,7 +144,7 @@ class MqttSource(LiveSource):
                 topic=self.address.path,
             )
         else:
-            self._stands()
+            self._established()
 
     def _on_message(self, _client: Any, _data: Any, message: Any) -> None:
         payload = message.payload

@@ -22,7 +22,7 @@ def encode_line(batch: Batch) -> bytes:
     >>> encode_line(Batch(3, np.array([[1.0, 2.5]]), (Channel("w", "N m"),), 4000.0))
     b'{"sample":3,"rate_hz":4000.0,"channels":["w [N m]"],"data":[[1.0,2.5]]}\n'
     """
-    said: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "sample": batch.first_sample,
         "rate_hz": batch.rate_hz,
         "channels": [
@@ -30,9 +30,9 @@ def encode_line(batch: Batch) -> bytes:
         ],
         "data": batch.data.tolist(),
     }
-    said |= {"epoch": batch.epoch} if batch.epoch else {}
-    said |= {"stamp_s": batch.stamp_s} if batch.stamp_s is not None else {}
-    return json.dumps(said, separators=(",", ":")).encode() + b"\n"
+    fields |= {"epoch": batch.epoch} if batch.epoch else {}
+    fields |= {"stamp_s": batch.stamp_s} if batch.stamp_s is not None else {}
+    return json.dumps(fields, separators=(",", ":")).encode() + b"\n"
 
 
 class LineDecoder:
@@ -65,29 +65,29 @@ class LineDecoder:
                 "send fewer samples in a line",
                 limit_bytes=LINE_BYTES_MAX,
             )
-        said = _object(line)
-        channels = _channels(said["channels"]) if "channels" in said else self._channels
-        rate_hz = _number(said, "rate_hz") if "rate_hz" in said else self._rate_hz
-        epoch = _whole(said, "epoch") if "epoch" in said else self._epoch
-        stamp_s = _number(said, "stamp_s") if said.get("stamp_s") is not None else None
+        fields = _object(line)
+        channels = _channels(fields["channels"]) if "channels" in fields else self._channels
+        rate_hz = _number(fields, "rate_hz") if "rate_hz" in fields else self._rate_hz
+        epoch = _whole(fields, "epoch") if "epoch" in fields else self._epoch
+        stamp_s = _number(fields, "stamp_s") if fields.get("stamp_s") is not None else None
         if not channels or rate_hz is None:
             key = "rate_hz" if channels else "channels"
             raise SourceError("key-missing", f"the first line has no {key!r}", "add it", key=key)
-        batch = Batch(_whole(said, "sample"), _data(said), channels, rate_hz, epoch, stamp_s, arrived_s)
+        batch = Batch(_whole(fields, "sample"), _data(fields), channels, rate_hz, epoch, stamp_s, arrived_s)
         self._channels, self._rate_hz, self._epoch = channels, rate_hz, epoch
         return batch
 
 
 def _object(line: bytes) -> dict[str, Any]:
     try:
-        said = json.loads(line)
+        fields = json.loads(line)
     except (ValueError, RecursionError) as error:
         raise SourceError(
             "line-not-json", f"a line is not JSON: {type(error).__name__}", "send one JSON object in each line"
         ) from None
-    if not isinstance(said, dict):
+    if not isinstance(fields, dict):
         raise SourceError("line-not-json", "a line is JSON but not an object", "send one JSON object in each line")
-    if unknown := sorted(said.keys() - KEYS):
+    if unknown := sorted(fields.keys() - KEYS):
         raise SourceError(
             "key-unknown",
             f"a line has the unknown key {unknown[0][:40]!r}",
@@ -95,9 +95,9 @@ def _object(line: bytes) -> dict[str, Any]:
             key=unknown[0][:40],
             allowed=sorted(KEYS),
         )
-    if missing := {"sample", "data"} - said.keys():
+    if missing := {"sample", "data"} - fields.keys():
         raise SourceError("key-missing", f"a line has no {min(missing)!r}", "add it", key=min(missing))
-    return said
+    return fields
 
 
 def _invalid(key: str, wrong: str) -> SourceError:
@@ -110,8 +110,8 @@ def _channels(names: object) -> tuple[Channel, ...]:
     return named_channels(names)
 
 
-def _number(said: dict[str, Any], key: str) -> float:
-    value = said[key]
+def _number(fields: dict[str, Any], key: str) -> float:
+    value = fields[key]
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise _invalid(key, "is not a number")
     try:
@@ -120,15 +120,15 @@ def _number(said: dict[str, Any], key: str) -> float:
         raise _invalid(key, "is larger than any float") from None
 
 
-def _whole(said: dict[str, Any], key: str) -> int:
-    value = said[key]
+def _whole(fields: dict[str, Any], key: str) -> int:
+    value = fields[key]
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1 << 64:
         raise _invalid(key, "is not a whole number from 0 to 2^64")
     return value
 
 
-def _data(said: dict[str, Any]) -> NDArray[np.float64]:
-    rows = said["data"]
+def _data(fields: dict[str, Any]) -> NDArray[np.float64]:
+    rows = fields["data"]
     if not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
         raise _invalid("data", "is not a list of one list for each channel")
     if sum(map(len, rows)) > VALUES_MAX or len({len(row) for row in rows}) != 1:

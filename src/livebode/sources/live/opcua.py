@@ -41,7 +41,7 @@ class Gathered:
         self._keys = list(nodes.values())
         self._channels = named_channels(list(nodes))
         self._rate_hz, self._sample_node = rate_hz, sample_node
-        self._wanted = {*self._keys, *([sample_node] if sample_node else [])}
+        self._required = {*self._keys, *([sample_node] if sample_node else [])}
         self._numbered = Numbered(self._channels, rate_hz)
         self._moments: OrderedDict[datetime, dict[str, Any]] = OrderedDict()
 
@@ -58,7 +58,7 @@ class Gathered:
         found = whole(value) if key == self._sample_node else numbers(value)
         moment = self._moments.setdefault(stamp, {})
         moment[key] = found
-        if moment.keys() != self._wanted:
+        if moment.keys() != self._required:
             while len(self._moments) > INCOMPLETE_MAX:
                 self._moments.popitem(last=False)
             return None
@@ -197,9 +197,9 @@ class OpcUaSource(LiveSource):
             await self._secure(client, *self._files)
         assert settings.rate_hz is not None
         gathered = Gathered(settings.nodes, settings.rate_hz, settings.sample_node)
-        wanted = [*settings.nodes.values(), *([settings.sample_node] if settings.sample_node else [])]
+        required = [*settings.nodes.values(), *([settings.sample_node] if settings.sample_node else [])]
         async with client:
-            by_node = {client.get_node(text): text for text in wanted}
+            by_node = {client.get_node(text): text for text in required}
             subscription: Any = await client.create_subscription(PUBLISH_MS, Handler(self, gathered, by_node))
             items = await subscription.subscribe_data_change(list(by_node), queuesize=QUEUE, sampling_interval=0)
             for text, item in zip(by_node.values(), items):
@@ -211,7 +211,7 @@ class OpcUaSource(LiveSource):
                         node=text,
                         status=item.name,
                     )
-            self._stands()
+            self._established()
             while not self._stop.is_set():
                 await asyncio.sleep(TICK_S)
                 await client.check_connection()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from livebode.sources.live.batch import LiveBlock
-from livebode.sources.live.clock import ClockWatch
+from livebode.sources.live.clock import ClockMonitor
 from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.position import Position
 from livebode.sources.live.source_events import SourceEvents
@@ -33,7 +33,7 @@ class Sequencer:
 
     Parameters
     ----------
-    said
+    source_events
         Collector of Events; receives losses, repeats, reordering and restarts.
     reorder
         Number of batches to wait for a missing one, and to collect before the stream begins.
@@ -47,18 +47,18 @@ class Sequencer:
 
     def __init__(
         self,
-        said: SourceEvents,
+        source_events: SourceEvents,
         *,
         reorder: int = 8,
         wait_s: float = 1.0,
         rate_hz: float | None = None,
         confirmed: int = CONFIRMED,
     ) -> None:
-        self._events, self._reorder, self._wait_s = said, reorder, wait_s
-        self._unconfirmed = UnconfirmedBatches(said, confirmed, reorder)
+        self._events, self._reorder, self._wait_s = source_events, reorder, wait_s
+        self._unconfirmed = UnconfirmedBatches(source_events, confirmed, reorder)
         self._jump_s = JUMP_S if confirmed > 1 else FAR_AHEAD_S
-        self.schema = StreamSchema(said, rate_hz)
-        self.clock: ClockWatch | None = None
+        self.schema = StreamSchema(source_events, rate_hz)
+        self.clock: ClockMonitor | None = None
         self._epoch: int | None = None
         self._left: dict[int, int] = {}
         self._next: int | None = None
@@ -171,7 +171,7 @@ class Sequencer:
     def _emit(self, batch: AnyBatch, start: int) -> LiveBlock:
         block = batch.block(self._number, start, self._gap)
         if batch.stamp_s is not None:
-            self.clock = self.clock or ClockWatch(self._events, batch.rate_hz)
+            self.clock = self.clock or ClockMonitor(self._events, batch.rate_hz)
             self.clock.take(start, batch.stamp_s + (start - batch.first_sample) / batch.rate_hz, self._number)
         self._gap, self._resumed = False, None
         self._next, self._number = batch.stop, block.stop

@@ -295,7 +295,7 @@ class LiveSource(ABC):
         address = str(self.address)
         self._logger.log(level, "%s", message if address in message else f"{address}: {message}")
 
-    def _stands(self) -> None:
+    def _established(self) -> None:
         """The connection is established."""
         self._connected, self._outage = True, False
         self._events.report("connected", f"connected to {self.address}")

@@ -21,14 +21,14 @@ class StreamSchema:
 
     Parameters
     ----------
-    said
+    source_events
         Collector of Events; receives each change once.
     rate_hz
         Required rate, if it is known in advance.
     """
 
-    def __init__(self, said: SourceEvents, rate_hz: float | None = None) -> None:
-        self._events = said
+    def __init__(self, source_events: SourceEvents, rate_hz: float | None = None) -> None:
+        self._events = source_events
         self.channels: tuple[Channel, ...] = ()
         self.rate_hz = rate_hz
         self.spectra: SpectraLayout | None = None

@@ -27,7 +27,7 @@ class TcpSource(LiveSource):
         with socket.create_connection((self.address.host, self.address.port), CONNECT_S) as link:
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             link.settimeout(TICK_S)
-            self._stands()
+            self._established()
             while not self._stop.is_set():
                 try:
                     piece = link.recv(PIECE_BYTES)

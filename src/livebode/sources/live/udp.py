@@ -43,7 +43,7 @@ class UdpSource(LiveSource):
             port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
             port.bind((self.address.host, self.address.port))
             port.settimeout(TICK_S)
-            self._stands()
+            self._established()
             while not self._stop.is_set():
                 try:
                     datagram, (host, *_) = port.recvfrom(_DATAGRAM_BYTES_MAX)

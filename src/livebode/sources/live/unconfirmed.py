@@ -18,7 +18,7 @@ class UnconfirmedBatches:
 
     Parameters
     ----------
-    said
+    source_events
         Collector of Events; receives those of rejected batches.
     confirmed
         Batches of a new epoch that must arrive before it is accepted.
@@ -26,8 +26,8 @@ class UnconfirmedBatches:
         Number of batches that may be late: a replaced epoch needs more than this to be accepted again.
     """
 
-    def __init__(self, said: SourceEvents, confirmed: int, reorder: int) -> None:
-        self._events, self._confirmed = said, confirmed
+    def __init__(self, source_events: SourceEvents, confirmed: int, reorder: int) -> None:
+        self._events, self._confirmed = source_events, confirmed
         self._confirmed_again = max(CONFIRMED, reorder + 1)
         self._batches: list[AnyBatch] = []
 
