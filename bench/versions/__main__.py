@@ -65,7 +65,11 @@ def environment() -> dict[str, str]:
 
 def opened(python: Path, folder: Path, name: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [python, folder / SCRIPT, folder, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment()
+        [python, folder / SCRIPT, folder, name],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment(),
     )
 
 
