@@ -90,8 +90,10 @@ def store(path: Path, seconds: float, sets: list[str]) -> None:
     """Measure what a release's figures are, and write them."""
     from bench import job
 
-    kernel, command = speed(seconds, sets), job.measure()
+    # First the command: the peak memory of a child includes that of the process it was forked from.
+    command = job.measure()
     job.report(command)
+    kernel = speed(seconds, sets)
     document = history.document([*history.of_kernel(kernel), *history.of_job(command)], processor())
     path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     print(f"written to {path}")
