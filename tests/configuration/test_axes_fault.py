@@ -59,11 +59,11 @@ entry_gain = 1.0
 gain = 0.2308
 integral_time_s = 0.2
 rate_hz = 4000
-held_ticks = 1
+rate_divider = 1
 [loop.position]
 gain = 1.0
 rate_hz = 2000
-held_ticks = 2
+rate_divider = 2
 [fit]
 model = "two-mass"
 radius_m = 0.019

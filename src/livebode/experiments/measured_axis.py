@@ -25,7 +25,32 @@ _UNCHECKED = "the loop is not that of the run: its stability is not checked"
 
 
 class MeasuredSection(BaseModel):
-    """[measured]: a plant that a run measured, and the effect of its motion alone."""
+    """[measured]: a plant that a run measured, and the extremes of its motion alone.
+
+    Parameters
+    ----------
+    run
+        Directory of the run, relative to this file: the mean response of the plant. Its loop, signal names and
+        differenced channels are used also.
+    output
+        What the output of the run is. Default: by its unit, otherwise by its loop.
+    radius_m
+        Metres of travel per radian; of a rotary axis the metres are radians.
+    noise
+        Standard deviation of white noise on the output, in its unit; 0: not known.
+    encoder_counts_per_turn
+        Counts of the encoder per turn of the motor; 0: not known.
+    stroke_s
+        Seconds in which the motion passes each place once. Default: the axis is at standstill.
+    torque_n_m
+        Lowest and highest torque in the motion alone, in N m. Default: not known; 0 at standstill.
+    speed_m_per_s
+        Lowest and highest speed in the motion alone, in m/s. Default: not known; 0 at standstill.
+    position_m
+        Lowest and highest position in the motion alone, in metres. Default: not known.
+    following_error_m
+        Lowest and highest following error in the motion alone, in metres. Default: not known; 0 at standstill.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

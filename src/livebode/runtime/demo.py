@@ -104,7 +104,7 @@ def _described(drive: Drive) -> LoopSection:
         gain=drive.velocity_gain_n_m_s, integral_time_s=drive.integral_time_s, rate_hz=drive.velocity_rate_hz
     )
     held = round(drive.rate_hz / drive.position_rate_hz)
-    position = PIDSection(gain=drive.position_gain_per_s, rate_hz=drive.position_rate_hz, held_ticks=held)
+    position = PIDSection(gain=drive.position_gain_per_s, rate_hz=drive.position_rate_hz, rate_divider=held)
     return LoopSection(velocity=velocity, position=position)
 
 

@@ -28,9 +28,63 @@ LOG = {"log", "time", "rate_hz", "follow"}
 
 
 class SourceSettings(BaseModel):
-    """[source]: a recording (`log`), one that grows (`follow`), or a machine (`url`); docs/how-to/live.md has its keys.
+    """[source]: a recording (`log`), one that grows (`follow`), or a live source (`url`).
 
-    Relative paths are relative to the file that contains them.
+    Parameters
+    ----------
+    log
+        The recording, relative to this file.
+    time
+        Time column of the recording, with its unit if the file does not state it: "clock [us]". "none" ignores it.
+        Default: found by name.
+    follow
+        The recording grows: a text table, or a directory of recordings.
+    url
+        Address of a live source, instead of log: kind://host:port; without user and password. Its scheme is the kind.
+    rate_hz
+        Samples per second, in Hz. Default: from the recording or the sender.
+    timeout_s
+        Time to the first samples after which a live source is reported as silent, in seconds.
+    reorder_batches
+        Number of batches by which a batch may be late (UDP, MQTT).
+    sender
+        The only permitted IP address of the sender (UDP). Default: any.
+    username
+        User name at the broker or server (MQTT, OPC UA).
+    password_env
+        Environment variable with the password (MQTT, OPC UA).
+    password_file
+        File with the password, relative to this file (MQTT, OPC UA).
+    ca_file
+        Certificate of the authority that signed the broker's certificate, relative to this file (mqtts).
+    certificate_file
+        Certificate of livebode, relative to this file (mqtts, OPC UA).
+    key_file
+        Private key of livebode, relative to this file (mqtts, OPC UA).
+    server_certificate_file
+        Certificate of the server, relative to this file (OPC UA).
+    security
+        Security policy; messages are signed and encrypted (OPC UA). Default: no security.
+    client_id
+        Name of the client, for which the broker stores messages while livebode is disconnected (MQTT).
+    nodes
+        Node id of each channel: "w [N m]" = "ns=2;s=axis.w" (OPC UA).
+    sample_node
+        Node id of the number of the batch's first sample (OPC UA). Default: from the time stamps.
+    symbol
+        Symbol of the ring, or of the array that is notified (ADS).
+    channels
+        Channels in the order of the symbol, each with its unit: "w [N m]" (ADS).
+    mode
+        "ring": reads a ring in the PLC program, without losses. "notify": the PLC sends each sample (ADS).
+    net_id
+        AMS net id of the PLC (ADS).
+    local_net_id
+        AMS net id of this computer, for which the PLC has a route (ADS).
+    ams_port
+        AMS port of the PLC runtime (ADS).
+    poll_s
+        Time between reads of the ring, in seconds (ADS).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
