@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tools.command_line import page as command_page
+from tools.configuration import page as configuration_page
 from tools.error_codes import page as error_page
 from tools.release.__main__ import run
 from tools.release.builds import metadata_fault, wheel_fault
@@ -34,6 +35,7 @@ FILES = {
     "requirements-docs.lock": LOCK,
     "docs/reference/formats.md": FORMATS.format(2), "tests/records/stored/2/expected.json": "{}",
     "docs/reference/command-line.md": command_page(), "docs/reference/errors.md": error_page(),
+    "docs/reference/configuration.md": configuration_page(),
     "bench/history/1.2.0.json": json.dumps({"livebode": "1.2.0"}),
 }  # fmt: skip
 
@@ -99,6 +101,7 @@ FAULTS: list[tuple[str, Callable[[Path], None]]] = [
     ("hosts in locks", edited("package-lock.json", "{}", '{"resolved": "https://example.org/a.tgz"}')),
     ("page of commands", edited("docs/reference/command-line.md", "## livebode run", "## livebode track")),
     ("page of errors", edited("docs/reference/errors.md", "usage.missing", "usage.lacking")),
+    ("page of configuration", edited("docs/reference/configuration.md", "# Configuration", "# Keys")),
     ("formats", newer_format),
     ("stored run", removed("tests/records/stored/2")),
     ("benchmark history", removed("bench/history/1.2.0.json")),

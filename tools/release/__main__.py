@@ -26,9 +26,9 @@ def run(checks: Iterable[Check], root: Path) -> list[str]:
             fault = check.fault(root)
         except (OSError, LookupError, ValueError) as error:
             fault = f"the check failed: {error}"
-        print(f"{check.name:20}{'missed  ' + fault if fault else 'ok'}", flush=True)
+        print(f"{check.name:24}{'missed  ' + fault if fault else 'ok'}", flush=True)
         if fault:
-            print(f"{'':20}→ {check.remedy}", flush=True)
+            print(f"{'':24}→ {check.remedy}", flush=True)
             missed.append(check.name)
     return missed
 

@@ -12,6 +12,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from tools.command_line import page as command_page
+from tools.configuration import page as configuration_page
 from tools.error_codes import page as error_page
 from tools.release.files import (
     citation,
@@ -103,13 +104,10 @@ def hosts(root: Path) -> str:
     return f"{', '.join(named)} names a host" if named else ""
 
 
-def commands(root: Path) -> str:
-    current = text(root, "docs/reference/command-line.md") == command_page()
-    return "" if current else "docs/reference/command-line.md is not what the command line prints"
-
-
-def errors(root: Path) -> str:
-    return "" if text(root, "docs/reference/errors.md") == error_page() else "docs/reference/errors.md is not current"
+def generated(name: str, page: Callable[[], str]) -> Callable[[Path], str]:
+    """Whether this page of the reference is what its program prints."""
+    path = f"docs/reference/{name}.md"
+    return lambda root: "" if text(root, path) == page() else f"{path} is not current"
 
 
 def formats(root: Path) -> str:
@@ -160,8 +158,17 @@ CHECKS = (
     Check("citation", cited, "set version and date-released in CITATION.cff"),
     Check("locks", locked, "make lock"),
     Check("hosts in locks", hosts, "remove the addresses from the lock"),
-    Check("page of commands", commands, "python -m tools.command_line > docs/reference/command-line.md"),
-    Check("page of errors", errors, "python -m tools.error_codes > docs/reference/errors.md"),
+    Check(
+        "page of commands",
+        generated("command-line", command_page),
+        "python -m tools.command_line > docs/reference/command-line.md",
+    ),
+    Check("page of errors", generated("errors", error_page), "python -m tools.error_codes > docs/reference/errors.md"),
+    Check(
+        "page of configuration",
+        generated("configuration", configuration_page),
+        "python -m tools.configuration > docs/reference/configuration.md",
+    ),
     Check("formats", formats, "describe the new version of the format in CHANGELOG.md"),
     Check("stored run", stored, "python -m tests.support.stored tests/records/stored/N"),
     Check("benchmark history", measured, "python -m bench --json bench/history/VERSION.json"),
