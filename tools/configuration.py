@@ -40,7 +40,8 @@ never repeats the rejected value of `url`, `username`, or a password or token ke
 """
 Schema = dict[str, Any]
 MORE = {
-    "source": "`log` or `url` is required. [Live sources](../how-to/live.md) lists the keys of each kind of `url`.",
+    "source": "`log` or `url` is required. [Live sources](../how-to/live.md) lists the keys of each kind of `url`. "
+    "The conventions describe [`clock`](conventions.md#time) and [`kinds`](conventions.md#kinds-of-quantities).",
     "tracking": "[Estimators](../explanation/estimators.md) describes the estimators, the bounds, the check of the "
     "roles and transients; [torque ripple](../explanation/motion.md#torque-ripple) describes `ripple`.",
     "loop": "[The loop description](../how-to/loop.md) gives the formulas.",

@@ -19,7 +19,7 @@ from livebode.configuration.axes import axes_of
 from livebode.configuration.axis import Axis
 from livebode.configuration.fit_settings import chosen_model, fitter_of
 from livebode.configuration.toml_file import FILE_BYTES_MAX
-from livebode.core import ConfigError, LivebodeError
+from livebode.core import ConfigError, LivebodeError, PlantKinds
 from livebode.preparation.plan import live_follower
 from tests.support.errors import refused
 
@@ -138,8 +138,8 @@ def used(axis: Axis) -> None:
     """As far as a run uses it before its first sample."""
     follower = live_follower(axis, RATE_HZ)
     if axis.fit is not None:
-        chosen_model(axis.fit, "rad/s/(N m)")
-        fitter_of(axis.fit, "rad/s/(N m)")
+        chosen_model(axis.fit, PlantKinds("velocity", "torque"))
+        fitter_of(axis.fit, PlantKinds("velocity", "torque"))
     assert follower.settings.lines.window <= 1 << 24
 
 

@@ -400,9 +400,9 @@ class FitSection(_Section):
     Parameters
     ----------
     model
-        The model. "auto": two-mass if the unit of the input is N m or radius_m is given, otherwise two-mass-gain.
+        The model. "auto": two-mass if the input is a torque in N m or radius_m is given, otherwise two-mass-gain.
     output
-        What the output is. "auto": by the unit of the output, velocity if it has none.
+        What the output is. "auto": by its kind, velocity if it has neither a unit nor a kind.
     side
         Where the output is measured. Default: motor.
     radius_m

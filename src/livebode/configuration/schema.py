@@ -13,7 +13,7 @@ from livebode.configuration.axis import Axis
 from livebode.configuration.descriptions import descriptions, summary
 from livebode.fitting import MODELS
 from livebode.language import available
-from livebode.sources.live.settings import LOG, TAKEN, SourceSettings
+from livebode.sources.live.settings import EVERY, LOG, TAKEN, SourceSettings
 
 Schema = dict[str, Any]
 
@@ -99,13 +99,13 @@ def _source() -> Schema:
     kinds = [
         {
             "if": {"required": ["url"], "properties": {"url": {"pattern": f"^{kind.replace('.', '[.]')}:"}}},
-            "then": {"propertyNames": {"enum": sorted(taken | {"url", "timeout_s"})}},
+            "then": {"propertyNames": {"enum": sorted(taken | EVERY | {"url"})}},
         }
         for kind, taken in TAKEN.items()
     ]
     growing = {
         "if": {"required": ["follow", "log"], "properties": {"follow": {"const": True}}},
-        "then": {"propertyNames": {"enum": sorted(LOG | {"timeout_s"})}},
+        "then": {"propertyNames": {"enum": sorted(LOG | EVERY)}},
     }
     return {"not": {"required": ["log", "url"]}, "allOf": [*kinds, growing]}
 

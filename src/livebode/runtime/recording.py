@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from livebode.configuration.axis import Axis
 from livebode.core import Event
+from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
 from livebode.preparation.aligned import AlignedLog, slip_event, slips_of
 from livebode.preparation.early_spikes import early_spikes
@@ -23,8 +24,9 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
     assert axis.source.log is not None
-    log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
-    pipeline = Pipeline.of(axis, make_follower(axis, log))
+    given = axis.source
+    log = open_log(axis.source.log, rate_hz=given.rate_hz, time=given.time, kinds=given.kinds, clock=given.clock)
+    pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
     slips = slips_of(log, settings)
@@ -37,9 +39,10 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     if isinstance(pipeline.follower, Tracker):
         pipeline.follower.know_spikes(early_spikes(source, settings))
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
-    found["left_out_samples"] = source.first
+    found |= {"left_out_samples": source.first, "clock": log.clock_kind}
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
     loop = RunLoop(
         source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed
     )
-    return loop.run()
+    with moments_by(RunClock.of_kind(log.clock_kind)):
+        return loop.run()

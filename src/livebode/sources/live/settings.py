@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from livebode.core import Channel, ConfigError
+from livebode.core import Channel, ConfigError, QuantityKind
+from livebode.core.clock import ClockKind
 from livebode.sources.units import split_unit
 
 File = Annotated[Path, Field(strict=False)]
@@ -23,8 +24,9 @@ TAKEN: dict[str, set[str]] = {
     "opc.tcp": {"rate_hz", "nodes", "sample_node", "security", "server_certificate_file"} | LOGIN | TLS - {"ca_file"},
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
 }
-"""Keys of each kind of URL, in addition to `url` and `timeout_s`."""
+"""Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow"}
+EVERY = {"timeout_s", "kinds"}
 
 
 class SourceSettings(BaseModel):
@@ -37,6 +39,9 @@ class SourceSettings(BaseModel):
     time
         Time column of the recording, with its unit if the file does not state it: "clock [us]". "none" ignores it.
         Default: found by name.
+    clock
+        What the time column of a recording counts. "utc": seconds since 1970. "relative": seconds since any other
+        moment. Default: by its first value.
     follow
         The recording grows: a text table, or a directory of recordings.
     url
@@ -83,6 +88,9 @@ class SourceSettings(BaseModel):
         AMS net id of this computer, for which the PLC has a route (ADS).
     ams_port
         AMS port of the PLC runtime (ADS).
+    kinds
+        Kind of quantity of channels whose unit does not show it, or shows another: { speed = "velocity" }. Default: by
+        the unit.
     poll_s
         Time between reads of the ring, in seconds (ADS).
     """
@@ -91,6 +99,7 @@ class SourceSettings(BaseModel):
 
     log: File | None = None
     time: str | None = None
+    clock: ClockKind | None = None
     follow: bool = False
     url: str | None = None
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
@@ -114,6 +123,7 @@ class SourceSettings(BaseModel):
     net_id: str | None = None
     local_net_id: str | None = None
     ams_port: Annotated[int, Field(ge=1, le=65535)] = 851
+    kinds: dict[str, QuantityKind] = {}
     poll_s: Annotated[float, Field(gt=0, le=10)] = 0.05
 
     @property
@@ -137,7 +147,7 @@ class SourceSettings(BaseModel):
 def check_keys(settings: SourceSettings, kind: str) -> None:
     """ConfigError for a key that does not apply to this kind of source: the scheme of a URL, or "log"."""
     taken = LOG if kind == "log" else TAKEN[kind] | {"url"}
-    if stray := sorted(settings.model_fields_set - taken - {"timeout_s"}):
+    if stray := sorted(settings.model_fields_set - taken - EVERY):
         raise ConfigError(
             "key-unused",
             f"source.{stray[0]} does not apply to {kind}",
@@ -152,6 +162,6 @@ def named_channels(headings: list[str]) -> tuple[Channel, ...]:
     """Channels from their names, each with its unit in brackets.
 
     >>> named_channels(["w [N m]", "y"])
-    (Channel(name='w', unit='N m'), Channel(name='y', unit=''))
+    (Channel(name='w', unit='N m', kind='torque'), Channel(name='y', unit='', kind='other'))
     """
     return tuple(Channel(*split_unit(heading)) for heading in headings)
