@@ -91,7 +91,7 @@ class LineSpectra(StatefulBase):
         self._started = False
 
     def _fresh(self) -> SlidingDFT:
-        _check_instruction_set()
+        check_instruction_set()
         return SlidingDFT(self._window, self._bins, channels=self._differenced.size, dtype=self._dtype)
 
     def restart(self, sample: int) -> None:
@@ -191,7 +191,7 @@ def after(bins: NDArray[np.int64], window: int, differenced: NDArray[np.bool_], 
     return np.asarray(factor)
 
 
-def _check_instruction_set() -> None:
+def check_instruction_set() -> None:
     """UsageError if the environment names an instruction set that the kernel does not have."""
     try:
         instruction_set()
