@@ -13,6 +13,7 @@ from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
 from livebode.core import UsageError, counted
 from livebode.estimation.settings import default_hop
+from livebode.excitation.pattern import pattern
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -168,7 +169,10 @@ def _show_excitation(found: Inspection, console: Console) -> None:
             f"{'missing' if missing >= 0 else 'repeated'} in all without a gap; realigned here, and by a run",
             soft_wrap=True,
         )
-    console.print(f"{len(lines)} lines, {lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz")
+    console.print(
+        f"{counted(len(lines), 'line')} ({pattern(lines.bins)}), "
+        f"{lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz"
+    )
     hops = ((default_hop(excitation.period), "a run"), (found.live_hop, "live"))
     each = "; ".join(f"{who} {lines.rate_hz / hop:.4g} (hop {hop})" for hop, who in hops)
     console.print(f"responses/s by default, with this period as window: {each}", soft_wrap=True)
