@@ -7,16 +7,18 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_SINGLE = 2.0**-24  # of the largest value: the rounding of single precision, whose own grid is not a step
-_WHOLE = 0.02  # of a step: largest distance of a difference from a multiple of it
+_LEVELS_MAX = 2.0**23  # between the smallest and the largest value
+_SINGLE, _DOUBLE = 2.0**-24, 2.0**-50  # relative errors of a value, with room for a few operations in double precision
+_WHOLE = 0.02  # of a step: largest distance of a value from the grid
+_CANCELLED = 1e-5  # of a step: its own error, from the difference of larger ones
 _DIVISIONS_MAX = 64
 
 
 def step_of(samples: Floats) -> float:
     """Largest step of which all differences between the samples are multiples; 0 where there is none.
 
-    Euclid's algorithm on the differences between neighbouring values, with the rounding of single precision as
-    tolerance. No step is found below 2^-23 of the largest value.
+    Euclid's algorithm on the differences between neighbouring values; their rounding is tolerated. No step is found
+    below 2^-23 of the range, nor in values of single precision that were computed with afterwards.
 
     Parameters
     ----------
@@ -33,17 +35,19 @@ def step_of(samples: Floats) -> float:
     values = np.unique(samples)
     if values.size < 2:
         return 0.0
-    tolerance = _SINGLE * float(np.max(np.abs(values)))
+    with np.errstate(over="ignore", under="ignore"):
+        single = bool(np.all(values.astype(np.float32) == values))
+    error = (_SINGLE if single else _DOUBLE) * float(np.max(np.abs(values)))
     differences = np.diff(values)
-    differences = differences[differences > tolerance]
-    if not differences.size:
-        return 0.0
-    step = float(differences.min())
+    differences = differences[differences > 4 * error]
+    least = max(float(np.ptp(values)) / _LEVELS_MAX, 8 * error)
+    step = float(differences.min(initial=np.inf))
     for _ in range(_DIVISIONS_MAX):
-        rest = np.abs(differences - step * np.rint(differences / step))
-        rest = rest[rest > _WHOLE * step + tolerance]
-        if step <= 2 * tolerance:
+        if not least <= step < np.inf:
             return 0.0
+        multiples = np.rint(differences / step)
+        rest = np.abs(differences - step * multiples)
+        rest = rest[rest > 4 * error * (1 + multiples) + _CANCELLED * step]
         if not rest.size:
             return _refined(values, step)
         step = float(rest.min())
@@ -55,8 +59,4 @@ def _refined(values: Floats, step: float) -> float:
     above = values - values[0]
     multiples = np.rint(above / step)
     step = float(above[-1] / multiples[-1])
-    return (
-        step
-        if np.max(np.abs(above - step * multiples)) <= _WHOLE * step + 2 * _SINGLE * np.max(np.abs(values))
-        else 0.0
-    )
+    return step if np.all(np.abs(above - step * multiples) <= _WHOLE * step) else 0.0

@@ -19,6 +19,7 @@ _NEAR_BINS = 0.1  # the period is a multiple of the hum's, otherwise the recordi
 # multiples of 50 or 60 Hz would lose them.
 _POWER_MAX, _LEVEL_MAX = 0.1, 0.5
 _WEAK = 0.1  # of the strongest line
+_ORDER_MIN = 2  # of hum: 50 Hz, or 100 Hz of a rectifier
 _FAR_BELOW = 0.05  # 26 dB: few designs have lines that far apart, and then hardly at the mains alone
 
 
@@ -56,7 +57,8 @@ def separate_hum(found: BinClasses, resolution_hz: float) -> BinClasses:
         at = meets_mains(bins, resolution_hz, (mains_hz,), _NEAR_BINS + _MAINS_DRIFT * bins)
         level = found.amplitude[bins]
         weak = at & (level <= _FAR_BELOW * level.max())
-        if weak.any() and level[weak].max() <= _FAR_BELOW * level[~weak].min():
+        order = np.rint(bins[weak] * resolution_hz / mains_hz)
+        if np.any(order <= _ORDER_MIN) and level[weak].max() <= _FAR_BELOW * level[~weak].min():
             hum = np.isin(np.arange(found.excited.size), bins[weak])
             return replace(found, excited=found.excited & ~hum, distortion=found.distortion | hum)
     return found
