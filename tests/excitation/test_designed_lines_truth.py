@@ -22,7 +22,7 @@ RATE_HZ = 4000.0
 
 
 @given(
-    st.lists(st.integers(-5000, 5000), min_size=2, max_size=200),
+    st.lists(st.integers(-500, 500), min_size=40, max_size=300),
     st.floats(1e-6, 1e3),
     st.floats(-10.0, 10.0),
 )
