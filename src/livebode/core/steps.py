@@ -18,7 +18,8 @@ def step_of(samples: Floats) -> float:
     """Largest step of which all differences between the samples are multiples; 0 where there is none.
 
     Euclid's algorithm on the differences between neighbouring values; their rounding is tolerated. No step is found
-    below 2^-23 of the range, in a few values that are hundreds of steps apart, nor in values of single precision that were computed with afterwards.
+    below 2^-23 of the range, in a few values that are hundreds of steps apart, nor in values of single precision that
+    were computed with afterwards.
 
     Parameters
     ----------
