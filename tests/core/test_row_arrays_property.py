@@ -54,7 +54,7 @@ def bits(batch: RowArrays) -> dict[str, Any]:
 
 def test_the_batches_are_found() -> None:
     names = {kind.__name__ for kind in KINDS}
-    assert names >= {"Responses", "Parameters", "Margins", "Rows", "Evidence", "TrendRows", "Measured"}
+    assert names >= {"Responses", "Parameters", "Margins", "WindowRows", "Evidence", "TrendRows", "Measured"}
 
 
 @every_kind

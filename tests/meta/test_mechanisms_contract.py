@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -33,3 +34,13 @@ def test_a_mechanism_is_in_one_place(pattern: str, places: set[str]) -> None:
         if any(re.search(pattern, line + "\n") for line in path.read_text("utf-8").split("\n") if ">>>" not in line)
     }
     assert found == places
+
+
+def test_no_two_public_classes_share_a_name() -> None:
+    """A name in a traceback, a message or a review then means one thing."""
+    names = Counter(
+        name
+        for path in SOURCE.rglob("*.py")
+        for name in re.findall(r"^class ([A-Z]\w*)", path.read_text("utf-8"), re.MULTILINE)
+    )
+    assert [name for name, count in names.items() if count > 1] == []

@@ -18,7 +18,7 @@ from livebode.estimation.moments import Moments, PeriodMoments
 from livebode.estimation.movement import PLACES, Movement
 from livebode.estimation.settings import Settings
 from livebode.estimation.silence import SilentHum
-from livebode.estimation.spectra import Rows, after
+from livebode.estimation.spectra import SpectraRows, after
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -118,7 +118,7 @@ class RepeatingErrors(StatefulBase):
     def process(
         self,
         data: Floats,
-        rows: Rows,
+        rows: SpectraRows,
         schedule: Floats,
         block: Block,
     ) -> Repeating:

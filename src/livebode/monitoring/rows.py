@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Rows(RowArrays):
+class WindowRows(RowArrays):
     """One row for every window length, (rows, columns) for values.
 
     `variance` is the row's own estimate of E|error|²; `step` is the schedule's change since the previous row; `ok` is
@@ -65,7 +65,7 @@ class NonOverlappingWindows(StatefulBase):
         self._apart, self._place = apart, place
         self._sample, self._schedule = -2 * apart, np.nan  # no row is so far after it
 
-    def of_responses(self, responses: Responses) -> Rows:
+    def of_responses(self, responses: Responses) -> WindowRows:
         """Rows of complex values at the lines."""
         use = self._chosen(responses.sample)
         ok = np.all(responses.valid[use] & np.isfinite(responses.sigma[use]), axis=1)
@@ -74,7 +74,7 @@ class NonOverlappingWindows(StatefulBase):
             responses.sample[use], ok,
         )  # fmt: skip
 
-    def of_parameters(self, parameters: Parameters) -> Rows:
+    def of_parameters(self, parameters: Parameters) -> WindowRows:
         """Rows of parameters."""
         use = self._chosen(parameters.sample)
         variance = np.einsum("rii->ri", parameters.covariance[use])
@@ -89,11 +89,11 @@ class NonOverlappingWindows(StatefulBase):
     def _rows(
         self, value: NDArray[np.complex128], variance: Floats, schedule: Floats, time_s: Floats,
         sample: NDArray[np.int64], ok: NDArray[np.bool_],
-    ) -> Rows:  # fmt: skip
+    ) -> WindowRows:  # fmt: skip
         before = np.concatenate([[self._schedule], schedule])
         follows = np.diff(np.concatenate([[self._sample], sample])) == self._apart
         if len(sample):
             self._sample, self._schedule = int(sample[-1]), float(schedule[-1])
         step = np.diff(before)
         known = (follows & np.isfinite(step)) | ~np.isfinite(schedule)
-        return Rows(value, variance, schedule, np.where(follows, step, np.nan), time_s, sample, ok & known)
+        return WindowRows(value, variance, schedule, np.where(follows, step, np.nan), time_s, sample, ok & known)
