@@ -188,7 +188,7 @@ def _machine(
     try:
         return (
             learn_machine(
-                [_samples(axis) for axis in axes],
+                [_samples(run, axis) for run, axis in zip(runs, axes)],
                 runs[0].lines,
                 input=signals.input,
                 output=signals.output,
@@ -202,13 +202,13 @@ def _machine(
         return None, str(error)
 
 
-def _samples(axis: Axis) -> Callable[[], Iterator[Block]]:
+def _samples(run: RunRecord, axis: Axis) -> Callable[[], Iterator[Block]]:
     names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule, *axis.monitoring.covariates]
 
     def blocks() -> Iterator[Block]:
         assert axis.source.log is not None
-        return open_log(
-            axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time, kinds=axis.source.kinds
-        ).blocks(names)
+        log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time, kinds=axis.source.kinds)
+        part = run.found.get("part")
+        return (log if part is None else log.part(part["first"], part["stop"])).blocks(names)
 
     return blocks

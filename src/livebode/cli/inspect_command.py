@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from livebode.cli import terminal
-from livebode.cli.options import Excitation, Json, Output, Rate, Time
+from livebode.cli.options import Excitation, From, Json, Output, Rate, SkipPeriods, Time, To
 from livebode.core import UsageError, counted
 from livebode.estimation.settings import default_hop
 from livebode.excitation.pattern import pattern
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from livebode.preparation.quiet import Quiet
 
 _LINES_SHOWN = 24
+_STRETCHES_SHOWN = 16
 
 
 def inspect_command(
@@ -39,6 +40,9 @@ def inspect_command(
     ] = None,
     rate: Rate = None,
     time: Time = None,
+    from_: From = None,
+    to: To = None,
+    skip_periods: SkipPeriods = None,
     as_json: Json = False,
 ) -> None:
     """List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and SNR.
@@ -49,7 +53,18 @@ def inspect_command(
 
     _check(excitation, output, input_, lines, window)
     of_lines = None if lines is None or window is None else (lines, window)
-    found = inspect(log, rate_hz=rate, time=time, excitation=excitation, output=output, input=input_, lines=of_lines)
+    found = inspect(
+        log,
+        rate_hz=rate,
+        time=time,
+        excitation=excitation,
+        output=output,
+        input=input_,
+        lines=of_lines,
+        begin=from_,
+        end=to,
+        skip_periods=skip_periods or 0,
+    )
     if as_json:
         print(to_json(found.plain()))
         return
@@ -107,6 +122,10 @@ def _show_recording(found: Inspection, console: Console) -> None:
     if log.timing is not None:
         jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"
     console.print(f"{found.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
+    if log.is_part:
+        stop = log.first + found.samples + found.missing
+        span = " … ".join(f"{log.origin_s + sample / log.rate_hz:.6g}" for sample in (log.first, stop))
+        console.print(f"part: samples {log.first} to {stop - 1} of the recording ({span} s)", soft_wrap=True)
     table = Table(box=None, header_style="bold")
     for heading in ("channel", "unit", "kind", "from", "to", "not finite"):
         table.add_column(heading, justify="left" if heading in ("channel", "unit", "kind") else "right")
@@ -147,25 +166,45 @@ def _show_hum(quiet: Quiet, console: Console) -> None:
         )
 
 
+def _show_stretches(found: Inspection, console: Console) -> None:
+    """What a run takes of the recording, if that is not all of it."""
+    shown, log = found.stretches, found.log
+    if all(stretch.taken for stretch in shown):
+        return
+    table = Table(box=None, header_style="bold")
+    for heading in ("stretch", "samples", "s", "periods", "a run"):
+        table.add_column(heading, justify="left" if heading in ("stretch", "a run") else "right")
+    for stretch in shown[:_STRETCHES_SHOWN]:
+        first, stop = (f"{log.origin_s + sample / log.rate_hz:.6g}" for sample in (stretch.first, stretch.stop))
+        periods = "" if stretch.periods is None else " … ".join(map(str, sorted(set(stretch.periods))))
+        samples = f"{stretch.first} … {stretch.stop - 1}"
+        taken = "takes it" if stretch.taken else "leaves it out"
+        table.add_row(stretch.kind, samples, f"{first} … {stop}", periods, taken)
+    console.print(table)
+    if (more := len(shown) - _STRETCHES_SHOWN) > 0:
+        console.print(f"({counted(more, 'row')} more; --json has all)", style="dim")
+
+
 def _show_excitation(found: Inspection, console: Console) -> None:
     excitation = found.excitation
     assert excitation is not None
-    lines = excitation.lines
+    lines, first = excitation.lines, found.log.first
     console.print(
         f"excitation repeats every {excitation.period} samples "
-        f"({excitation.period / lines.rate_hz:.6g} s), {excitation.periods} periods from sample {excitation.start} on; "
-        f"crest factor {excitation.crest_factor:.2f}, "
-        f"rms {excitation.rms:.4g}, peak {excitation.peak:.4g}"
+        f"({excitation.period / lines.rate_hz:.6g} s), "
+        f"{excitation.periods} periods from sample {first + excitation.start} on; "
+        f"crest factor {excitation.crest_factor:.2f}, rms {excitation.rms:.4g}, peak {excitation.peak:.4g}"
     )
     if excitation.transient:
-        first = "period differs" if len(excitation.transient) == 1 else f"{len(excitation.transient)} periods differ"
-        console.print(f"transient: the first {first} from the steady state")
+        many = "period differs" if len(excitation.transient) == 1 else f"{len(excitation.transient)} periods differ"
+        console.print(f"transient: the first {many} from the steady state")
     if excitation.outlying:
         console.print(f"outlying (spikes, pauses): periods {', '.join(map(str, excitation.outlying))}")
+    _show_stretches(found, console)
     if slips := excitation.slips:
         missing = sum(slip.missing for slip in slips)
         console.print(
-            f"phase slips: {len(slips)}, first at sample {slips[0].sample}; {abs(missing)} samples "
+            f"phase slips: {len(slips)}, first at sample {first + slips[0].sample}; {abs(missing)} samples "
             f"{'missing' if missing >= 0 else 'repeated'} in all without a gap; realigned here, and by a run",
             soft_wrap=True,
         )

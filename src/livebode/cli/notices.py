@@ -8,8 +8,8 @@ from livebode.core import Event
 from livebode.runtime import Document
 
 _KINDS = {
-    "roles-doubtful", "transient", "phase-slip", "phase-slips", "restart", "replaced", "computer-clock", "foreign",
-    "backlog", "backlog-cleared", "waiting", "window-doubtful",
+    "roles-doubtful", "transient", "outlying-periods", "phase-slip", "phase-slips", "restart", "replaced",
+    "computer-clock", "foreign", "backlog", "backlog-cleared", "waiting", "window-doubtful",
 }  # fmt: skip
 _ONCE = {"foreign"}
 

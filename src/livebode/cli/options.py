@@ -19,6 +19,19 @@ Time = Annotated[
         help="Time column, if it is not detected by its name; unit in brackets behind the name. none: no time column.",
     ),
 ]
+From = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="MOMENT",
+        help="Beginning of the part to use: seconds in the time of the recording, '5000 samples' or '3 periods'.",
+    ),
+]
+To = Annotated[str | None, typer.Option("--to", metavar="MOMENT", help="End of the part to use, in the same form.")]
+SkipPeriods = Annotated[
+    int | None,
+    typer.Option(metavar="N", min=0, help="Leave out N periods at the beginning of the excitation."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result, or the error, as JSON.")]
 Port = Annotated[
     int | None,

@@ -71,8 +71,11 @@ _REASONS = {
 
 
 def _judged(found: dict[str, Any]) -> list[str]:
-    """The source of the noise if it is not the scatter between periods, and the invalid lines with reasons."""
+    """The part that was used, noise that is not the scatter between periods, and the invalid lines with reasons."""
     lines = []
+    if (part := found.get("part")) is not None:
+        end = "the end" if part["stop"] is None else f"sample {part['stop'] - 1}"
+        lines.append(f"part of the recording: from sample {part['first']} to {end}")
     judged = found.get("judged", {})
     if moved := judged.get("noise_from_detection_lines"):
         lines.append(

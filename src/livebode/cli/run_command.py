@@ -10,7 +10,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.notices import NoticePrinter
-from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
+from livebode.cli.options import Excitation, From, Json, Output, Port, Rate, Serve, SkipPeriods, Time, To
 from livebode.cli.pictures import drawing, show, tracked_amount
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
@@ -31,6 +31,9 @@ def run_command(
     ] = None,
     rate: Rate = None,
     time: Time = None,
+    from_: From = None,
+    to: To = None,
+    skip_periods: SkipPeriods = None,
     lines: Annotated[
         str | None,
         typer.Option(
@@ -82,7 +85,8 @@ def run_command(
         typer.Option("--accept-roles", help="Use the channels as specified, even if the recording contradicts."),
     ] = False,
     all_periods: Annotated[
-        bool, typer.Option("--all-periods", help="Use all periods, also a transient at the beginning.")
+        bool,
+        typer.Option("--all-periods", help="Use all periods, also a transient at the beginning and outlying ones."),
     ] = False,
     go_on: Annotated[
         bool,
@@ -97,7 +101,7 @@ def run_command(
     Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png.
     """
     given: dict[str, dict[str, Any]] = {
-        "source": {"rate_hz": rate, "time": time},
+        "source": {"rate_hz": rate, "time": time, "from": from_, "to": to, "skip_periods": skip_periods},
         "signals": {"output": output, "input": input, "excitation": excitation, "schedule": schedule},
         "lines": {"frequencies": lines, "window": _window(window)},
         "tracking": {

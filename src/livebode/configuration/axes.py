@@ -64,7 +64,7 @@ def axes_of(data: bytes, path: Path, over: Mapping[str, Mapping[str, Any]]) -> d
         origin = f"{path}, axis {name}" if name else str(path)
         axis = Axis.of(table, origin).beside(path.parent)
         if over:
-            axis = Axis.of(merged(axis.model_dump(exclude_unset=True), over), origin)
+            axis = Axis.of(merged(axis.model_dump(exclude_unset=True, by_alias=True), over), origin)
         if axis.fit is not None:
             try:
                 check_fit(axis.fit)

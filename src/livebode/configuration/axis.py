@@ -109,7 +109,7 @@ class TrackingSection(_Section):
     accept_roles
         Accept the roles in [signals] whatever the recording shows.
     all_periods
-        Include a transient at the start of a recording.
+        Include a transient at the start of a recording, and periods that differ from those around them.
     """
 
     estimator: Literal["direct", "joint", "indirect"] = "joint"
@@ -537,4 +537,5 @@ def nearest(loc: tuple[int | str, ...]) -> str:
             for c in (annotation, *getattr(annotation, "__args__", ()))
             if isinstance(c, type) and issubclass(c, BaseModel)
         )
-    return nearest_name(str(loc[-1]), section.model_fields, "Settings")
+    names = [field.alias or name for name, field in section.model_fields.items()]
+    return nearest_name(str(loc[-1]), names, "Settings")

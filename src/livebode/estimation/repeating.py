@@ -135,7 +135,7 @@ class RepeatingErrors(StatefulBase):
         block
             The Block of the samples: their numbers, times and channels.
         """
-        left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes])
+        left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes, rows.left_out])
         known, edges, done, window = [self._now], [0], 0, self._settings.lines.window
         while done < data.shape[1]:
             n = min(data.shape[1] - done, window - self._at)

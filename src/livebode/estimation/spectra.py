@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import gcd
 from typing import Any, Literal
 
@@ -29,7 +29,8 @@ class SpectraRows:
     `spectrum` is (channels, rows, bins) with the phase of a fixed grid of period N, so that rows compare with each
     other and channels divide; `sample` (rows,) the newest sample of each; `whole` (rows,) False where the window holds
     a start, a gap, or a non-finite or implausibly large sample, `clean` (rows,) False also where it contains a
-    spike; `not_finite`, `implausible` and `spikes` are the positions of such samples in the stretch.
+    spike or a sample that is left out; `not_finite`, `implausible`, `spikes` and `left_out` are the positions of such
+    samples in the stretch.
     """
 
     spectrum: Complex
@@ -39,6 +40,7 @@ class SpectraRows:
     not_finite: NDArray[np.intp]
     implausible: NDArray[np.intp]
     spikes: NDArray[np.intp]
+    left_out: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
 
 
 class LineSpectra(StatefulBase):
@@ -86,6 +88,7 @@ class LineSpectra(StatefulBase):
         self._dft = self._fresh()
         self._next = -1
         self.known_spikes = np.zeros(0, dtype=np.int64)
+        self.left_out = np.zeros(0, dtype=np.int64)
         self._last_bad = [-1, -1]  # numbers of the last sample that was not finite, and of the last spike
         self._before = np.zeros(differenced.size)
         self._started = False
@@ -124,19 +127,23 @@ class LineSpectra(StatefulBase):
         # The substitute for a missing sample may differ, but is not a spike of the signal.
         spikes = _NONE
         if self._spikes is not None:
-            known = self.known_spikes[
-                (self.known_spikes >= self._next) & (self.known_spikes < self._next + data.shape[1])
-            ]
-            spikes = np.setdiff1d(np.union1d(self._spikes.process(finite), known - self._next), missing)
+            known = self._positions(self.known_spikes, data.shape[1])
+            spikes = np.setdiff1d(np.union1d(self._spikes.process(finite), known), missing)
+        left_out = self._positions(self.left_out, data.shape[1])
         step = max(self._step, _ROW_VALUES_MAX // (self._after.size or 1) * self._step)
         parts = [self._spectra(finite[:, i : i + step], i) for i in range(0, finite.shape[1], step)]
         spectrum = np.concatenate([p[0] for p in parts], axis=1)
         position = np.concatenate([p[1] for p in parts])
         whole = self._without(missing, 0, data.shape[1], position)
-        clean = whole & self._without(spikes, 1, data.shape[1], position)
-        rows = SpectraRows(spectrum, self._next + position, whole, clean, not_finite, implausible, spikes)
+        clean = whole & self._without(np.concatenate([spikes, left_out]), 1, data.shape[1], position)
+        rows = SpectraRows(spectrum, self._next + position, whole, clean, not_finite, implausible, spikes, left_out)
         self._next += data.shape[1]
         return rows
+
+    def _positions(self, samples: NDArray[np.int64], count: int) -> NDArray[np.intp]:
+        """Positions of these samples, by number and ascending, in the next `count` ones."""
+        first, stop = np.searchsorted(samples, (self._next, self._next + count))
+        return np.asarray(samples[first:stop] - self._next, dtype=np.intp)
 
     def _prepare(self, data: Floats) -> tuple[Floats, NDArray[np.intp]]:
         if self._dtype != data.dtype:

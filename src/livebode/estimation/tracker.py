@@ -94,6 +94,10 @@ class Tracker(StreamEstimator[InputStatistics]):
         """Numbers of further samples to exclude as spikes; no effect where no channel is checked."""
         self._spectra.known_spikes = samples
 
+    def leave_out(self, samples: NDArray[np.int64]) -> None:
+        """Numbers of samples, ascending: no window that contains one of them counts."""
+        self._spectra.left_out = samples
+
     def process(self, block: Block, emit: Emit = ignore) -> Responses:
         """Responses at the hops of this Block, which follows the previous one.
 

@@ -22,7 +22,7 @@ def slips_of(log: Log, settings: Settings) -> tuple[Slip, ...]:
     name, period = settings.excitation, settings.lines.window
     if settings.method.reference != "excitation" or name is None:
         return ()
-    search, size = SlipSearch(period), max(_PART // period, 4 * _OVERLAP) * period
+    search, size = SlipSearch(period, log.first), max(_PART // period, 4 * _OVERLAP) * period
     return tuple(slip for part in _whole_parts(log, name, size) for slip in search.take(bridged(part)))
 
 
@@ -37,11 +37,11 @@ class SlipSearch:
     Attributes
     ----------
     begins_at
-        Number of its first sample; default 0.
+        Number of its first sample; None until it is known.
     """
 
-    def __init__(self, period: int) -> None:
-        self.begins_at: int | None = None
+    def __init__(self, period: int, begins_at: int | None = None) -> None:
+        self.begins_at = begins_at
         self._period, self._held = period, np.zeros(0)
         self._first = 0
         self._newest = -2 * period
@@ -64,7 +64,7 @@ class SlipSearch:
 def _whole_parts(log: Log, channel: str, size: int) -> Iterator[np.ndarray]:
     """The samples of a channel in parts of about this size, NaN for missing ones."""
     parts: list[np.ndarray] = []
-    held, stop = 0, 0
+    held, stop = 0, log.first
     for block in log.blocks([channel]):
         parts += [np.full(block.start - stop, np.nan), block[channel]]
         held, stop = held + block.stop - stop, block.stop
@@ -82,7 +82,7 @@ def bridged(x: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class AlignedLog:
-    """A recording from a given sample, with phase slips as gaps: numbers count missing samples, not repeated ones."""
+    """A recording from one sample on, with phase slips as gaps: numbers count missing samples, not repeated ones."""
 
     log: Log
     slips: tuple[Slip, ...]
@@ -95,7 +95,8 @@ class AlignedLog:
     @property
     def samples(self) -> int | None:
         known = self.log.samples
-        return None if known is None else known - self.first - sum(max(-slip.missing, 0) for slip in self.slips)
+        left_out = self.first - self.log.first
+        return None if known is None else known - left_out - sum(max(-slip.missing, 0) for slip in self.slips)
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]:
         """The Blocks of the recording after its first samples, cut at the phase slips."""

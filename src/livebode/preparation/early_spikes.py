@@ -23,7 +23,7 @@ def early_spikes(log: AlignedLog, settings: Settings) -> NDArray[np.int64]:
     window, none = settings.lines.window, np.zeros(0, dtype=np.int64)
     if not settings.spikes:
         return none
-    held = beginnings(log, settings.spikes, log.first + _PERIODS * window)[:, log.first :]
+    held = beginnings(log, settings.spikes, _PERIODS * window)
     count = held.shape[1] // window
     if count < _PERIODS_MIN or not np.isfinite(held).any(axis=1).all():
         return none

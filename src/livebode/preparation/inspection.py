@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import Block, Lines, LivebodeError, QuantityKind
+from livebode.core import Block, Lines, LivebodeError, QuantityKind, UsageError
 from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, pattern, recognise
-from livebode.preparation.plan import LIVE_RESPONSES_PER_S, beginning
+from livebode.preparation.part import chosen_part
+from livebode.preparation.plan import LIVE_RESPONSES_PER_S, SEARCHED, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
+from livebode.preparation.stretches import Stretch, stretches
 from livebode.sources import Log, open_log
 
 
@@ -55,6 +57,13 @@ class Inspection:
         assert self.excitation is not None
         return nearest_hop(self.excitation.period, self.log.rate_hz / LIVE_RESPONSES_PER_S)
 
+    @property
+    def stretches(self) -> list[Stretch]:
+        """Parts of the recording by what a run does with them; of the searched beginning of a long recording."""
+        assert self.excitation is not None
+        searched = min(self.samples + self.missing, SEARCHED)
+        return stretches(self.excitation, self.log.first, searched)
+
     def plain(self) -> dict[str, Any]:
         """As plain data, for JSON."""
         log, found = self.log, self.excitation
@@ -67,6 +76,7 @@ class Inspection:
             "duration_s": self.samples / log.rate_hz,
             "gaps": self.gaps,
             "missing_samples": self.missing,
+            "part": {"first": log.first, "stop": log.stop},
             "timing": asdict(log.timing) if log.timing else None,
             "channels": [asdict(channel) for channel in self.channels],
             "skipped": [asdict(skipped) for skipped in log.skipped],
@@ -77,7 +87,7 @@ class Inspection:
             plain["excitation"] = {
                 "period": found.period,
                 "periods": found.periods,
-                "start": found.start,
+                "start": log.first + found.start,
                 "crest_factor": found.crest_factor,
                 "rms": found.rms,
                 "peak": found.peak,
@@ -88,7 +98,8 @@ class Inspection:
                 "snr_db": None if found.snr_db is None else found.snr_db.tolist(),
                 "transient_periods": list(found.transient),
                 "outlying_periods": list(found.outlying),
-                "phase_slips": [[slip.sample, slip.missing] for slip in found.slips],
+                "stretches": [asdict(stretch) for stretch in self.stretches],
+                "phase_slips": [[log.first + slip.sample, slip.missing] for slip in found.slips],
             }
         if self.unrecognised:
             plain["unrecognised"] = self.unrecognised
@@ -104,12 +115,21 @@ def inspect(
     output: str | None = None,
     input: str | None = None,
     lines: tuple[str, int] | None = None,
+    begin: float | str | None = None,
+    end: float | str | None = None,
+    skip_periods: int = 0,
 ) -> Inspection:
-    """Read and describe a recording; LivebodeError if it cannot be read or has no periodic signal.
+    """Read and describe a recording, or the part of it from `begin` to `end`, as in [source].
 
     With lines (a text and the window), hum is searched in `output` and `input` where there is no excitation.
+
+    Raises
+    ------
+    LivebodeError
+        If it cannot be read, has no periodic signal, or the part has no samples.
     """
     log = open_log(path, rate_hz=rate_hz, time=time)
+    log = chosen_part(log, begin, end, skip_periods, lambda part: _periods_in(part, excitation))
     required = [name for name in (excitation, output, input) if name is not None]
     known = {channel.name for channel in log.channels}
     # A channel given by a path or an alias is listed by that name.
@@ -138,3 +158,16 @@ def inspect(
                 raise
             unrecognised = str(error)
     return Inspection(log, samples, list(summaries.values()), gaps, missing, found, quiet, unrecognised)
+
+
+def _periods_in(log: Log, excitation: str | None) -> tuple[int, int]:
+    """Where the excitation begins, and its period."""
+    if excitation is None:
+        raise UsageError(
+            "missing",
+            "a limit in periods needs the channel of the excitation",
+            "name the excitation, or give the limit in seconds or samples",
+            argument="excitation",
+        )
+    found = recognise(beginning(log, excitation), log.rate_hz)
+    return log.first + found.start, found.period

@@ -20,12 +20,16 @@ from livebode.sources import Log
 
 LIVE_RESPONSES_PER_S = 20.0
 """Default for a live source: sufficient for display, with a tenth of the work of a hop of a twentieth of the window."""
-_LOOKED_AT = 1 << 22  # samples that "auto" uses: half an hour at 2 kHz, and 100 MB of work
+SEARCHED = 1 << 22
+"""Samples that "auto" and `inspect` use: half an hour at 2 kHz, and 100 MB of work."""
 _ROLES_SAMPLES, _ROLES_WINDOWS = 1 << 17, 32  # to judge the roles, whichever is longer
 
 
 class RecordedSource(Protocol):
-    """A source of Blocks that begins at the first sample."""
+    """A source of Blocks that begins at its sample `first`."""
+
+    @property
+    def first(self) -> int: ...
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
 
@@ -77,7 +81,7 @@ def _follower(axis: Axis, settings: Settings) -> Follower:
 
 def make_settings(axis: Axis, log: Log) -> Settings:
     """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
-    return _settings(axis, log.rate_hz, _lines(axis, log))
+    return _settings(axis, log.rate_hz, make_lines(axis, log))
 
 
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
@@ -127,13 +131,19 @@ def _ripple(axis: Axis) -> tuple[RippleOrder, ...]:
     return tuple(RippleOrder(float(k), float(a)) for k, a in zip(machine.ripple.cycles_per_m, amplitudes) if a > 0)
 
 
-def _lines(axis: Axis, log: Log) -> Lines:
+def reference_of(axis: Axis) -> str | None:
+    """Channel whose periods count: the excitation, or the input of a direct estimate."""
+    return axis.signals.input if axis.tracking.estimator == "direct" else axis.signals.excitation
+
+
+def make_lines(axis: Axis, log: Log) -> Lines:
+    """The lines of the configuration, or those of the recording; LivebodeError if there are none."""
     frequencies, window = axis.lines.frequencies, axis.lines.window
     if window != "auto":
         check_length(log.samples, window)
     if frequencies != "auto" and window != "auto":
         return Lines.parse(frequencies, log.rate_hz, window)
-    reference = axis.signals.input if axis.tracking.estimator == "direct" else axis.signals.excitation
+    reference = reference_of(axis)
     if reference is None:
         raise ConfigError(
             "auto-needs-recording",
@@ -151,8 +161,8 @@ def _lines(axis: Axis, log: Log) -> Lines:
     return found.lines if frequencies == "auto" else Lines.parse(frequencies, log.rate_hz, found.period)
 
 
-def beginning(log: Log, channel: str, samples: int = _LOOKED_AT) -> np.ndarray:
-    """The first samples of a channel, with NaN where some are missing."""
+def beginning(log: Log, channel: str, samples: int = SEARCHED) -> np.ndarray:
+    """The first samples of a channel, from `log.first` on, with NaN where some are missing."""
     return np.asarray(beginnings(log, [channel], samples)[0])
 
 
@@ -161,9 +171,9 @@ def beginnings(log: RecordedSource, channels: Sequence[str], samples: int) -> np
     parts: list[np.ndarray] = []
     size = 0
     for block in log.blocks(list(channels)):
-        missing = block.start - size
+        missing = block.start - log.first - size
         parts += [np.full((len(channels), missing), np.nan), np.array([block[name] for name in channels])]
-        size = block.stop
+        size = block.stop - log.first
         if size >= samples:
             break
     return np.concatenate(parts, axis=1)[:, :samples] if parts else np.zeros((len(channels), 0))
@@ -172,7 +182,7 @@ def beginnings(log: RecordedSource, channels: Sequence[str], samples: int) -> np
 def roles_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[str]:
     """Doubts about the roles of the channels, as sentences; SignalError if one is certain and not accepted."""
     names = {role: name for role in ROLES if (name := settings.channel(role))}
-    samples = min(_LOOKED_AT, max(_ROLES_SAMPLES, _ROLES_WINDOWS * settings.lines.window)) + 1
+    samples = min(SEARCHED, max(_ROLES_SAMPLES, _ROLES_WINDOWS * settings.lines.window)) + 1
     channels = list(dict.fromkeys(names.values()))
     rows = dict(zip(channels, beginnings(log, channels, samples)))
     signals = {role: rows[name] for role, name in names.items()}

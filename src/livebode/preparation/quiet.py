@@ -84,7 +84,7 @@ def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines
     near = [f[np.abs(f - hum.frequency_hz) <= lines.resolution_hz / 2].tolist() for hum in found]
     known = {channel.name: channel.unit for channel in log.channels}
     units = {name: known.get(name, "") for name in signals}
-    return Quiet(lines, first, stop - first, list(zip(found, near)), units, constant)
+    return Quiet(lines, log.first + first, stop - first, list(zip(found, near)), units, constant)
 
 
 def _longest(flags: np.ndarray) -> tuple[int, int]:

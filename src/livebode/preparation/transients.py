@@ -19,9 +19,11 @@ from livebode.preparation.roles import ROLES
 
 Floats = NDArray[np.float64]
 
-_PERIODS, _SAMPLES_MAX = 64, 1 << 20  # that are searched, at most
-_PERIODS_MIN = 8
-_SHARE_MAX = 1 / 4  # of the examined periods; more is not a transient, but another state of the machine
+EXAMINED, EXAMINED_SAMPLES_MAX = 64, 1 << 20
+"""Periods that are compared with each other, and samples in them, at most."""
+EXAMINED_MIN = 8
+SHARE_MAX = 1 / 4
+"""Of the examined periods: more that differ are not a disturbance, but another state of the machine."""
 
 
 def leading_transient(log: AlignedLog, settings: Settings) -> int:
@@ -34,38 +36,49 @@ def leading_transient(log: AlignedLog, settings: Settings) -> int:
     names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
     channels = list(dict.fromkeys(names + ([settings.schedule] if settings.schedule else [])))
     return transient_periods(
-        dict(zip(channels, beginnings(log, channels, min(_PERIODS * window, _SAMPLES_MAX)))), settings
+        dict(zip(channels, beginnings(log, channels, min(EXAMINED * window, EXAMINED_SAMPLES_MAX)))), settings
     )
 
 
 def transient_periods(signals: Mapping[str, Floats], settings: Settings) -> int:
     """The same in signals by the names of their channels, of which the first 64 periods count."""
     window = settings.lines.window
-    size = min(_PERIODS * window, _SAMPLES_MAX)
+    size = min(EXAMINED * window, EXAMINED_SAMPLES_MAX)
     found = {name: x[:size] for name, x in signals.items()}
     names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
     count = found[names[0]].size // window
-    if count < _PERIODS_MIN or (settings.schedule and _moves(found[settings.schedule], window)):
+    if count < EXAMINED_MIN or (settings.schedule and moves(found[settings.schedule], window)):
         return 0
-    excited = np.zeros((window + 1) // 2, dtype=np.bool_)
-    excited[list(settings.lines.bins)] = True
-    first = max(_transient(found[name], window, excited) for name in names)
-    return first if first <= _SHARE_MAX * count else 0
+    first = max(_transient(found[name], window, excited_bins(settings)) for name in names)
+    return first if first <= SHARE_MAX * count else 0
 
 
-def _transient(x: np.ndarray, window: int, excited: np.ndarray) -> int:
+def compared(x: Floats, window: int, excited: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Numbers of the periods without missing samples, and which of these differ from the others."""
     if np.count_nonzero(np.isfinite(x)) < window:
-        return 0
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.bool_)
     blocks = cut(filled(x), window)
     # An interpolated period differs from the others, but not because of the machine.
     whole = np.flatnonzero(np.isfinite(x[: blocks.size]).reshape(blocks.shape).all(axis=1))
-    count = leading(unlike(blocks[whole], spectra(blocks[whole]), excited))
+    return whole, unlike(blocks[whole], spectra(blocks[whole]), excited)
+
+
+def _transient(x: Floats, window: int, excited: NDArray[np.bool_]) -> int:
+    whole, strange = compared(x, window, excited)
+    count = leading(strange) if whole.size else 0
     return int(whole[count - 1]) + 1 if count else 0
 
 
-def _moves(schedule: np.ndarray, window: int) -> bool:
+def excited_bins(settings: Settings) -> NDArray[np.bool_]:
+    """Which bins of a period are lines, shape (bins,)."""
+    excited = np.zeros((settings.lines.window + 1) // 2, dtype=np.bool_)
+    excited[list(settings.lines.bins)] = True
+    return excited
+
+
+def moves(schedule: np.ndarray, window: int) -> bool:
     """Whether the machine moves after the longest possible transient, in which it may settle."""
-    settled = schedule[int(_SHARE_MAX * schedule.size) // window * window :]
+    settled = schedule[int(SHARE_MAX * schedule.size) // window * window :]
     step = max(1, window // PLACES)
     periods = settled[: settled.size // window * window].reshape(-1, window)[:, : window // step * step : step]
     return bool(Movement(periods.shape[1]).process(0, periods.ravel()).any())

@@ -28,6 +28,11 @@ class _Kinds(BaseModel):
     output_factor: Annotated[float, Field(gt=0)] = 1.0
 
 
+class _Samples(_Part):
+    first: Count
+    stop: Count | None
+
+
 class _Found(_Part):
     rate_hz: Annotated[float, Field(gt=0)]
     window: Positive
@@ -42,6 +47,7 @@ class _Found(_Part):
     schedule: Text | None = None
     format: Text | None = None
     rate_from: Text | None = None
+    part: _Samples | None = None
 
 
 class _Speed(_Part):

@@ -101,8 +101,8 @@ class _Succession:
         assert axis is not None
         about = {
             # Most keys of a source apply to other kinds of source.
-            "configuration": axis.model_dump(mode="json", exclude={"serve", "source"})
-            | {"source": axis.source.model_dump(mode="json", exclude_defaults=True)},
+            "configuration": axis.model_dump(mode="json", exclude={"serve", "source"}, by_alias=True)
+            | {"source": axis.source.model_dump(mode="json", exclude_defaults=True, by_alias=True)},
             "found": {"format": self._source.format, "rate_from": "the sender", "clock": "relative"},
         }
         return RunLoop(

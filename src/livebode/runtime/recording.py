@@ -9,8 +9,11 @@ from livebode.configuration.axis import Axis
 from livebode.core import Event
 from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
+from livebode.estimation.stream_estimator import Follower
 from livebode.preparation.aligned import AlignedLog, slip_event, slips_of
 from livebode.preparation.early_spikes import early_spikes
+from livebode.preparation.outlying import outlying_event, outlying_periods, outlying_samples
+from livebode.preparation.part import configured_part
 from livebode.preparation.plan import make_follower, roles_in_doubt, window_in_doubt
 from livebode.preparation.transients import leading_transient, transient_event
 from livebode.runtime.destination import Destination
@@ -26,6 +29,7 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     assert axis.source.log is not None
     given = axis.source
     log = open_log(axis.source.log, rate_hz=given.rate_hz, time=given.time, kinds=given.kinds, clock=given.clock)
+    log = configured_part(axis, log)
     pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
@@ -33,17 +37,30 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     slips = slips_of(log, settings)
     if slips:
         noticed.append(slip_event(slips, settings))
-    source = AlignedLog(log, slips)
-    if not axis.tracking.all_periods and axis.motion is None and (transient := leading_transient(source, settings)):
-        source = replace(source, first=transient * settings.lines.window)
-        noticed.append(transient_event(transient, settings))
+    source = AlignedLog(log, slips, log.first)
+    if not axis.tracking.all_periods and axis.motion is None:
+        source = _steady(source, pipeline.follower, noticed)
     if isinstance(pipeline.follower, Tracker):
         pipeline.follower.know_spikes(early_spikes(source, settings))
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
-    found |= {"left_out_samples": source.first, "clock": log.clock_kind}
-    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
+    found |= {"left_out_samples": source.first - log.first, "clock": log.clock_kind}
+    if log.is_part:
+        found["part"] = {"first": log.first, "stop": log.stop}
+    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": found}
     loop = RunLoop(
         source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed
     )
     with moments_by(RunClock.of_kind(log.clock_kind)):
         return loop.run()
+
+
+def _steady(source: AlignedLog, follower: Follower, noticed: list[Event]) -> AlignedLog:
+    """The recording after its transient, whose outlying periods the follower leaves out; events for both."""
+    settings, window, begins = follower.settings, follower.settings.lines.window, source.first
+    if transient := leading_transient(source, settings):
+        noticed.append(replace(transient_event(transient, settings), sample=begins))
+    outlying = [m for m in outlying_periods(source, settings) if m >= transient]
+    if outlying and isinstance(follower, Tracker):
+        follower.leave_out(outlying_samples(outlying, window, begins))
+        noticed.append(outlying_event(outlying, settings, begins))
+    return replace(source, first=begins + transient * window)

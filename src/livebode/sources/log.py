@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,9 @@ class Log:
         self._clock = clock
         self._block_samples = block_samples
         self._kinds = kinds
+        self.first = 0
+        """Number of the first sample that `blocks` reads."""
+        self._stop: int | None = None
 
     @property
     def path(self) -> Path:
@@ -114,9 +118,67 @@ class Log:
 
     @property
     def samples(self) -> int | None:
-        """Samples in the file (without missing ones); None if only reading gives the number."""
+        """Samples in the file, or in the `part` (without missing ones); None if only reading gives the number."""
+        rows = self._rows
+        return None if rows is None else self._row(self._stop, rows) - self._row(self.first, rows)
+
+    @property
+    def stop(self) -> int | None:
+        """Number of the sample after the last one; None if only reading gives it."""
+        if self._stop is not None or self._rows is None:
+            return self._stop
+        return self._rows + int(self._clock.gap_missing.sum())
+
+    @property
+    def is_part(self) -> bool:
+        """Whether it is a `part` of the recording."""
+        return self.first > 0 or self._stop is not None
+
+    @property
+    def origin_s(self) -> float:
+        """Time of sample number 0 in seconds, in the clock of the recording."""
+        return self._clock.origin_s
+
+    @property
+    def _rows(self) -> int | None:
         known = [column.samples for column in self._columns if column.samples is not None]
         return known[0] if known else self._clock.samples
+
+    def _row(self, sample: int | None, rows: int) -> int:
+        """Rows before a sample number; all of them for None."""
+        if sample is None:
+            return rows
+        clock = self._clock
+        missing = np.cumsum(clock.gap_missing)
+        passed = int(np.searchsorted(clock.gap_rows + missing, sample, side="right"))
+        before = sample - (int(missing[passed - 1]) if passed else 0)
+        # A number in a gap belongs to the row after it.
+        return min([before, rows, *map(int, clock.gap_rows[passed : passed + 1])])
+
+    def part(self, first: int, stop: int | None = None) -> Log:
+        """The same recording from sample `first` up to `stop`, which is excluded; samples keep numbers and times.
+
+        Parameters
+        ----------
+        first
+            Number of the first sample, ≥ 0.
+        stop
+            Number of the sample after the last one. Default: the whole rest.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from livebode import open_log
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = Path(folder) / "log.csv"
+        ...     _ = path.write_text("t [s],iq [A]\\n0.000,1.5\\n0.001,1.6\\n0.002,1.7\\n")
+        ...     part = open_log(path).part(1)
+        ...     [(block.start, block["iq"]) for block in part.blocks()]
+        [(1, array([1.6, 1.7]))]
+        """
+        chosen = copy(self)
+        chosen.first, chosen._stop = first, self._stop if stop is None else stop
+        return chosen
 
     def blocks(self, channels: Sequence[str] | None = None, block_samples: int | None = None) -> Iterator[Block]:
         """The samples of `channels` from the first to the last.
@@ -158,7 +220,17 @@ class Log:
         with located(self.path):
             columns = [resolve(name, self._columns, self._recording.columns) for name in names]
         labels = tuple(self._label(column, name) for name, column in zip(names, columns))
-        return self._cut(self._read(columns, limit), labels, limit)
+        return self._within(self._cut(self._read(columns, limit), labels, limit))
+
+    def _within(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """The blocks of the part."""
+        for block in blocks:
+            if self._stop is not None and block.start >= self._stop:
+                return
+            first = max(self.first - block.start, 0)
+            stop = len(block) if self._stop is None else min(self._stop - block.start, len(block))
+            if first < stop:
+                yield block.cut(first, stop)
 
     def _label(self, column: Column, name: str) -> Channel:
         kind = self._kinds.get(column.name)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from livebode.core import Channel, ConfigError, QuantityKind
 from livebode.core.clock import ClockKind
+from livebode.sources.part_limit import PATTERN, part_limit
 from livebode.sources.units import split_unit
 
 File = Annotated[Path, Field(strict=False)]
@@ -27,6 +28,16 @@ TAKEN: dict[str, set[str]] = {
 """Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow"}
 EVERY = {"timeout_s", "kinds"}
+PART = {"from_": "from", "to": "to", "skip_periods": "skip_periods"}
+"""Keys that choose a part of a finished recording."""
+
+
+def _checked_limit(given: float | str) -> float | str:
+    part_limit(given)
+    return given
+
+
+Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PATTERN})], AfterValidator(_checked_limit)]
 
 
 class SourceSettings(BaseModel):
@@ -42,6 +53,13 @@ class SourceSettings(BaseModel):
     clock
         What the time column of a recording counts. "utc": seconds since 1970. "relative": seconds since any other
         moment. Default: by its first value.
+    from
+        Beginning of the part of a recording that is used: seconds in its time (2.5), "5000 samples" or "3 periods".
+        Periods count from the beginning of the excitation. Default: its first sample.
+    to
+        End of that part, in the same form; the sample at this moment is excluded. Default: its last sample.
+    skip_periods
+        Number of periods that are left out at the beginning of the excitation in that part.
     follow
         The recording grows: a text table, or a directory of recordings.
     url
@@ -100,6 +118,9 @@ class SourceSettings(BaseModel):
     log: File | None = None
     time: str | None = None
     clock: ClockKind | None = None
+    from_: Limit | None = Field(default=None, alias="from")
+    to: Limit | None = None
+    skip_periods: Annotated[int, Field(ge=0, le=1 << 40)] = 0
     follow: bool = False
     url: str | None = None
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
@@ -146,6 +167,15 @@ class SourceSettings(BaseModel):
 
 def check_keys(settings: SourceSettings, kind: str) -> None:
     """ConfigError for a key that does not apply to this kind of source: the scheme of a URL, or "log"."""
+    if part := [name for key, name in PART.items() if key in settings.model_fields_set]:
+        why = "this one grows" if kind == "log" else f"{kind} is a live source"
+        raise ConfigError(
+            "key-unused",
+            f"source.{part[0]} chooses a part of a finished recording, but {why}",
+            "remove it; tracking begins with the first sample that arrives",
+            key=f"source.{part[0]}",
+            source=kind,
+        )
     taken = LOG if kind == "log" else TAKEN[kind] | {"url"}
     if stray := sorted(settings.model_fields_set - taken - EVERY):
         raise ConfigError(

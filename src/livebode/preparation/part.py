@@ -1,0 +1,81 @@
+"""The part of a recording that a person chose, in seconds, samples or periods of the excitation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from livebode.configuration.axis import Axis
+from livebode.core import UsageError
+from livebode.preparation.plan import beginning, make_lines, reference_of
+from livebode.sources import Log
+from livebode.sources.part_limit import PartLimit, part_limit
+
+FindPeriods = Callable[[Log], tuple[int, int]]
+"""Number of the sample at which the excitation of a recording begins, and its period in samples."""
+
+
+def configured_part(axis: Axis, log: Log) -> Log:
+    """The part in [source]; the recording itself without these keys."""
+
+    def periods_in(part: Log) -> tuple[int, int]:
+        from livebode.excitation.extent import extent
+        from livebode.excitation.prepare import checked, clipped, filled
+
+        window, name = make_lines(axis, part).window, reference_of(axis)
+        if name is None:
+            return part.first, window
+        start, _ = extent(clipped(filled(checked(beginning(part, name), repr(name)))), window)
+        return part.first + start, window
+
+    source = axis.source
+    return chosen_part(log, source.from_, source.to, source.skip_periods, periods_in)
+
+
+def chosen_part(
+    log: Log, begin: float | str | None, end: float | str | None, skip_periods: int, periods_in: FindPeriods
+) -> Log:
+    """The part of a recording from `begin` to `end`; the recording itself if none is chosen.
+
+    Limits in periods count from the beginning of the excitation behind a `begin` in seconds or samples.
+
+    Raises
+    ------
+    UsageError
+        If no sample would remain.
+    """
+    limits = [None if given is None else part_limit(given) for given in (begin, end)]
+    first, stop = (_fixed(limit, log) for limit in limits)
+    part = log if first is None and stop is None else _checked(log, log.first if first is None else first, stop)
+    if not skip_periods and not any(limit and limit.unit == "periods" for limit in limits):
+        return part
+    start, period = periods_in(part)
+    before, last = (_periods(limit) for limit in limits)
+    begins = start + round(((before or 0) + skip_periods) * period)
+    stop = part.stop if last is None else start + round(last * period)
+    return _checked(log, begins, stop if part.stop is None or stop is None else min(stop, part.stop))
+
+
+def _fixed(limit: PartLimit | None, log: Log) -> int | None:
+    return None if limit is None or limit.unit == "periods" else limit.sample(log.rate_hz, log.origin_s)
+
+
+def _periods(limit: PartLimit | None) -> float | None:
+    return limit.value if limit is not None and limit.unit == "periods" else None
+
+
+def _checked(log: Log, first: int, stop: int | None) -> Log:
+    end = log.stop
+    if stop is not None and end is not None:
+        stop = min(stop, end)
+    if (stop is not None and first >= stop) or (end is not None and first >= end):
+        last_s = "" if end is None else f" and {log.origin_s + end / log.rate_hz:.9g} s"
+        many = "" if end is None else f" (samples 0 to {end})"
+        raise UsageError(
+            "out-of-range",
+            f"the chosen part from sample {first} to {end if stop is None else stop} has no samples; the recording is "
+            f"between {log.origin_s:.9g} s{last_s}{many}",
+            "choose other limits",
+            first=first,
+            stop=stop,
+        )
+    return log.part(first, stop)
