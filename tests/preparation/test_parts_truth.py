@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from livebode.configuration import Axis
@@ -14,8 +15,8 @@ from livebode.records import RunRecord
 from livebode.runtime import Destination, run
 from livebode.sources import open_log
 from livebode.sources.live import make_source
-from tests.support.command import RATE_HZ, WINDOW, livebode, signals, write_parquet
 from tests.preparation.test_outlying_periods_truth import recorded
+from tests.support.command import RATE_HZ, WINDOW, livebode, signals, write_csv, write_parquet
 from tests.support.errors import refused
 
 BEGINS = 230  # sample at which the excitation begins, 10 s in the time of the recording
@@ -33,10 +34,13 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_parquet(tmp_path_factory.mktemp("part") / "log.parquet", time | columns)
 
 
-def ran(log: Path, out: Path, **part: object) -> RunRecord:
+ROLES_OF_RUN = {"excitation": "w", "input": "u", "output": "y"}
+
+
+def ran(log: Path, out: Path, roles: dict[str, str] = ROLES_OF_RUN, **part: object) -> RunRecord:
     """Without pictures, which take most of the time."""
-    lines, roles = {"frequencies": "50,100,200", "window": WINDOW}, {"excitation": "w", "input": "u", "output": "y"}
-    tracking = {"all_periods": not part}
+    lines = {"frequencies": "50,100,200", "window": WINDOW}
+    tracking = {"all_periods": not part, "accept_roles": True}
     axis = Axis.of({"source": {"log": log} | part, "signals": roles, "lines": lines, "tracking": tracking}, "the test")
     run(axis, Destination(out, lambda *_: None))
     return RunRecord.open(out)
@@ -90,6 +94,21 @@ def test_inspect_describes_the_part_in_the_numbers_of_the_recording(log: Path) -
     assert "part: samples 500 to 1199 of the recording (10.5 … 11.2 s)" in done.out
     assert "35 periods from sample 500 on" in done.out
     assert livebode("inspect", log, "--from", "3 periods").err.endswith("(option --excitation)\n")
+
+
+def test_a_run_takes_computed_channels_and_aliases(log: Path, whole: RunRecord, tmp_path: Path) -> None:
+    roles = {"excitation": "w + 0*u", "input": "-u", "output": "-(y + y)/2"}
+    inverted = ran(log, tmp_path / "computed", roles)
+    same = np.isin(inverted.responses().sample, whole.responses().sample)
+    assert same.all()
+    assert np.allclose(inverted.responses().value, whole.responses().value, rtol=1e-12, atol=0, equal_nan=True)
+    table = pq.read_table(log)
+    headed = write_csv(
+        tmp_path / "headed.csv", {"t": table["t"], "w": table["w"], "u [N m]": table["u"], "y [m]": table["y"]}
+    )
+    by_alias = ran(headed, tmp_path / "alias", roles | {"input": "u [N m]", "output": "diff(y)"})
+    assert by_alias.found["unit"] == "m/s/(N m)"
+    assert by_alias.found["kinds"]["output"] == "velocity"
 
 
 def test_inspect_names_the_stretches_that_a_run_takes(tmp_path: Path) -> None:

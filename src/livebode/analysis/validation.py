@@ -61,8 +61,7 @@ def validate_run(
         )
     notes = _freshness(own_words["source"].get("log"), log)
     opened = open_log(log, rate_hz=axis.source.rate_hz, time=axis.source.time)
-    there = {c.name for c in opened.channels} | set(opened.aliases)
-    if signals.excitation and "excitation" not in named and signals.excitation not in there:
+    if signals.excitation and "excitation" not in named and not opened.has(signals.excitation):
         notes.append(f"{log.name} has no channel {signals.excitation!r}: judged without the excitation w")
         signals = signals.model_copy(update={"excitation": None})
     names = [name for name in (signals.input, signals.output, signals.excitation) if name]

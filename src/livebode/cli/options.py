@@ -9,8 +9,15 @@ import typer
 from livebode.core import UsageError
 from livebode.language import available
 
-Excitation = Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the excitation w.")]
-Output = Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the measured output y.")]
+Excitation = Annotated[
+    str | None, typer.Option(metavar="CHANNEL", help="Channel of the excitation w, or an expression.")
+]
+Output = Annotated[
+    str | None,
+    typer.Option(
+        metavar="CHANNEL", help="Channel of the measured output y, or an expression: -y, pos + 0.35*angle, diff(pos)."
+    ),
+]
 Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Sample rate, if the recording does not contain it.")]
 Time = Annotated[
     str | None,

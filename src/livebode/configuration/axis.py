@@ -38,7 +38,7 @@ class _Section(BaseModel):
 
 
 class SignalsSection(_Section):
-    """[signals]: names of the channels.
+    """[signals]: names of the channels; in a recording also expressions, such as "-enc1" or "pos + 0.35*angle".
 
     Parameters
     ----------

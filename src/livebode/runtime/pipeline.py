@@ -51,9 +51,10 @@ class Pipeline:
         names = [channel.name for channel in source.channels]
         for name in pipeline.channels:
             if name not in names:
+                computed = ", and a live source computes no expressions" if set(name) & set("+-*/(") else ""
                 raise SignalError(
                     "channel-unknown",
-                    f"there is no channel {name!r}",
+                    f"there is no channel {name!r}{computed}",
                     nearest_name(name, names),
                     channel=name,
                     allowed=names,

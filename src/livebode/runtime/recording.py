@@ -30,7 +30,10 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     given = axis.source
     log = open_log(axis.source.log, rate_hz=given.rate_hz, time=given.time, kinds=given.kinds, clock=given.clock)
     log = configured_part(axis, log)
-    pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
+    follower = make_follower(axis, log)
+    log = log.naming([name for name in axis.signals.model_dump().values() if name])
+    pipeline = Pipeline.of(axis, follower, log.channels)
+    log = log.naming(pipeline.channels)  # with the covariates of a baseline
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
     noticed += window_in_doubt(axis, log, settings)

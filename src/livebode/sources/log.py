@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, QuantityKind, RecordingError, UsageError
 from livebode.core.clock import ClockKind
-from livebode.sources.naming import resolve
+from livebode.sources.computed import computed_blocks
+from livebode.sources.expressions import Expression
+from livebode.sources.naming import found_channel, resolve
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
 
@@ -54,6 +56,7 @@ class Log:
         self.first = 0
         """Number of the first sample that `blocks` reads."""
         self._stop: int | None = None
+        self._named: tuple[Channel, ...] = ()
 
     @property
     def path(self) -> Path:
@@ -66,8 +69,9 @@ class Log:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Everything that `blocks` can read, in the order of the file."""
-        return tuple(self._label(column, column.name) for column in self._columns if not column.temporal)
+        """Everything that `blocks` can read, in the order of the file; then the names of `naming`."""
+        own = tuple(self._label(column, column.name) for column in self._columns if not column.temporal)
+        return own + self._named
 
     @property
     def aliases(self) -> Mapping[str, str]:
@@ -186,8 +190,8 @@ class Log:
         Parameters
         ----------
         channels
-            Names, paths or aliases; the Blocks use the given names. Default: those given to `open_log`, or all
-            except the time column.
+            Names, paths, aliases or expressions such as "pos + 0.35*angle"; the Blocks use the given names. Default:
+            those given to `open_log`, or all except the time column.
         block_samples
             Largest length of a Block; they are shorter at gaps and where the file's own pieces end.
 
@@ -201,7 +205,8 @@ class Log:
         RecordingError
             At once for a channel that is not in the file; while iterating for damage later in it.
         UsageError
-            For no channel, a duplicated channel, or a length that is out of range.
+            For an expression that adds different units, no channel, a duplicated channel, or a length that is out of
+            range.
         """
         limit = checked_block_samples(self._block_samples if block_samples is None else block_samples)
         names = list(self._chosen if channels is None else channels)
@@ -217,10 +222,54 @@ class Log:
                 argument="channels",
                 value=repeated[0],
             )
-        with located(self.path):
-            columns = [resolve(name, self._columns, self._recording.columns) for name in names]
+        found = self._found(names)
+        if any(isinstance(one, Expression) for one in found.values()):
+            return self._computed(found, limit)
+        columns = [one for one in found.values() if isinstance(one, Column)]
         labels = tuple(self._label(column, name) for name, column in zip(names, columns))
         return self._within(self._cut(self._read(columns, limit), labels, limit))
+
+    def has(self, name: str) -> bool:
+        """Whether `blocks` can read or compute a channel of this name."""
+        try:
+            return bool(self._found([name]))
+        except RecordingError:
+            return False
+
+    def naming(self, names: Sequence[str]) -> Log:
+        """The same recording, whose `channels` also list these names: paths, aliases and expressions."""
+        known = {column.name for column in self._columns}
+        chosen = copy(self)
+        chosen._named = self._labels(self._found([name for name in names if name not in known]))
+        return chosen
+
+    def _found(self, names: Sequence[str]) -> dict[str, Column | Expression]:
+        with located(self.path):
+            return {name: found_channel(name, self._columns, self._recording.columns) for name in names}
+
+    def _labels(self, found: Mapping[str, Column | Expression]) -> tuple[Channel, ...]:
+        """Name, unit and kind of each."""
+        with located(self.path):
+            return tuple(
+                one.channel({part: self._label(column, part) for part, column in self._columns_of(one).items()})
+                if isinstance(one, Expression)
+                else self._label(one, name)
+                for name, one in found.items()
+            )
+
+    def _columns_of(self, expression: Expression) -> dict[str, Column]:
+        return {name: resolve(name, self._columns, self._recording.columns) for name in expression.names}
+
+    def _computed(self, found: Mapping[str, Column | Expression], limit: int) -> Iterator[Block]:
+        """Blocks with computed channels; a part is computed with the samples before it."""
+        expressions = {name: one for name, one in found.items() if isinstance(one, Expression)}
+        needed = [
+            part for name, one in found.items() for part in (one.names if isinstance(one, Expression) else [name])
+        ]
+        before = max(expression.before for expression in expressions.values())
+        whole = self.part(max(self.first - before, 0), self._stop)
+        blocks = whole.blocks(list(dict.fromkeys(needed)), limit)
+        return self._within(computed_blocks(blocks, list(found), expressions, self._labels(found)))
 
     def _within(self, blocks: Iterator[Block]) -> Iterator[Block]:
         """The blocks of the part."""

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from livebode.core import RecordingError, nearest_name
+from livebode.sources.expressions import Expression, ExpressionSyntaxError, parse_expression
 from livebode.sources.recording import Column
+
+_WORD = re.compile(r"[\w.]+")  # without anything that computes
 
 
 def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) -> Column:
@@ -38,3 +42,24 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
     raise RecordingError(
         "channel-unknown", f"there is no channel {name!r}", nearest_name(name, names), channel=name, channels=names
     )
+
+
+def found_channel(name: str, columns: Sequence[Column], everything: Sequence[Column]) -> Column | Expression:
+    """The column with this name; if there is none, the expression of this text, whose channels exist."""
+    try:
+        return resolve(name, columns, everything)
+    except RecordingError as error:
+        if error.code != "recording.channel-unknown" or _WORD.fullmatch(name):
+            raise
+        unknown = error
+    try:
+        expression = parse_expression(name)
+    except ExpressionSyntaxError as why:
+        message = f"{unknown.message}, and it is not an expression of channels: {why}"
+        raise RecordingError("channel-unknown", message, unknown.remedy, **unknown.facts) from None
+    for part in expression.names:
+        try:
+            resolve(part, columns, everything)
+        except RecordingError as error:
+            raise error.at(f"expression {name!r}") from None
+    return expression

@@ -1,0 +1,189 @@
+"""A channel that is computed from others: names, numbers, + - * /, a sign, parentheses and diff; nothing else."""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import Channel
+from livebode.sources.quantities import Quantity, derivative, product, quotient, sum_of
+from livebode.sources.units import SQUARE
+
+Floats = NDArray[np.float64]
+
+TEXT_MAX, DEPTH_MAX = 200, 16
+_QUOTED = re.compile("`([^`]*)`")
+_STAND_IN = "quoted_{}_"
+
+
+class ExpressionSyntaxError(ValueError):
+    """The text is not in the grammar; the argument says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """A computed channel.
+
+    Attributes
+    ----------
+    text
+        As a person wrote it; also the name of the channel.
+    names
+        Names of the channels in it, each once.
+    before
+        Samples before the first computed one: how often it differentiates.
+    unit
+        Unit behind it in brackets; empty if its unit follows from the channels.
+    """
+
+    text: str
+    tree: ast.expr
+    quoted: Mapping[str, str]
+    names: tuple[str, ...]
+    before: int
+    unit: str = ""
+
+    def values(self, data: Mapping[str, Floats], rate_hz: float) -> Floats:
+        """Its samples from those of its channels, shape (samples,); the first `before` ones are NaN."""
+        with np.errstate(all="ignore"):  # a division by 0 gives a sample that is not finite, as in a file
+            found = _walk(self.tree, lambda node: data[_name(node, self.quoted)], _Arithmetic(rate_hz))
+        return np.asarray(found, dtype=np.float64)
+
+    def channel(self, channels: Mapping[str, Channel]) -> Channel:
+        """Its name, unit and kind, from those of its channels.
+
+        Raises
+        ------
+        UsageError
+            If it adds channels of different units without a factor between them.
+        """
+
+        def of(node: ast.expr) -> Quantity:
+            return Quantity.of(channels[_name(node, self.quoted)])
+
+        found = _walk(self.tree, of, _Units())
+        if self.unit:
+            return Channel(self.text, self.unit)
+        return Channel(self.text, found.unit, found.kind) if found.kind else Channel(self.text, found.unit)
+
+
+def parse_expression(text: str) -> Expression:
+    """The expression in a text.
+
+    Names with other characters than letters, digits, points and _ are in backticks. The result may end with its unit.
+
+    >>> parse_expression("pos + 0.35*`angle (rad)`").names, parse_expression("diff(x) [m/s]").unit
+    (('pos', 'angle (rad)'), 'm/s')
+
+    Raises
+    ------
+    ExpressionSyntaxError
+        If the text is too long, nested too deeply, or anything else is in it.
+    """
+    if len(text) > TEXT_MAX:
+        raise ExpressionSyntaxError(f"it is longer than {TEXT_MAX} characters")
+    unit = SQUARE.match(text)
+    bare = unit["name"] if unit else text
+    quoted = {_STAND_IN.format(i): name for i, name in enumerate(dict.fromkeys(_QUOTED.findall(bare)))}
+    stand_in = {name: key for key, name in quoted.items()}
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree = ast.parse(_QUOTED.sub(lambda match: f" {stand_in[match[1]]} ", bare).strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ExpressionSyntaxError("it is not of the form a - 0.5*b") from None
+    names: dict[str, None] = {}
+    before = _check(tree, quoted, names, 0)
+    if not names:
+        raise ExpressionSyntaxError("there is no channel in it")
+    return Expression(text, tree, quoted, tuple(names), before, unit["unit"].strip() if unit else "")
+
+
+def _check(node: ast.expr, quoted: Mapping[str, str], names: dict[str, None], depth: int) -> int:
+    """The number of samples that it needs before the first; collects the names."""
+    if depth > DEPTH_MAX:
+        raise ExpressionSyntaxError(f"it is nested more than {DEPTH_MAX} deep")
+    match node:
+        case ast.Name() | ast.Attribute():
+            names.setdefault(_name(node, quoted))
+            return 0
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            if not math.isfinite(_number(value)):
+                raise ExpressionSyntaxError("a number in it is too large")
+            return 0
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=inner):
+            return _check(inner, quoted, names, depth + 1)
+        case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div(), left=left, right=right):
+            return max(_check(part, quoted, names, depth + 1) for part in (left, right))
+        case ast.Call(func=ast.Name(id="diff"), args=[inner], keywords=[]):
+            return _check(inner, quoted, names, depth + 1) + 1
+    raise ExpressionSyntaxError("only names, numbers, + - * / and diff(…) are possible, and other names need backticks")
+
+
+def _name(node: ast.expr, quoted: Mapping[str, str]) -> str:
+    """A name, or names joined by points."""
+    if isinstance(node, ast.Attribute):
+        return f"{_name(node.value, {})}.{node.attr}"
+    if not isinstance(node, ast.Name):
+        raise ExpressionSyntaxError("names that are no words need backticks")
+    return quoted.get(node.id, node.id)
+
+
+def _number(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+class _Arithmetic:
+    """Operations on samples."""
+
+    add, subtract, multiply, divide, negative = (
+        staticmethod(f) for f in (np.add, np.subtract, np.multiply, np.divide, np.negative)
+    )
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+
+    def number(self, value: float) -> Any:
+        return np.float64(value)
+
+    def diff(self, x: Any) -> Any:
+        return np.diff(x, prepend=np.nan) * self._rate_hz if np.ndim(x) else np.float64(0.0)
+
+
+class _Units:
+    """The same operations on quantities."""
+
+    add, subtract, multiply, divide = (staticmethod(f) for f in (sum_of, sum_of, product, quotient))
+    diff = staticmethod(derivative)
+
+    def number(self, value: float) -> Any:
+        return Quantity(number=value)
+
+    def negative(self, x: Any) -> Any:
+        return x
+
+
+def _walk(node: ast.expr, of_name: Callable[[ast.expr], Any], by: _Arithmetic | _Units) -> Any:
+    match node:
+        case ast.Constant(value=value):
+            return by.number(float(value))  # type: ignore[arg-type]
+        case ast.UnaryOp(op=op, operand=inner):
+            x = _walk(inner, of_name, by)
+            return by.negative(x) if isinstance(op, ast.USub) else x
+        case ast.BinOp(op=op, left=left, right=right):
+            operation = {ast.Add: by.add, ast.Sub: by.subtract, ast.Mult: by.multiply, ast.Div: by.divide}[type(op)]
+            return operation(_walk(left, of_name, by), _walk(right, of_name, by))
+        case ast.Call(args=[inner]):
+            return by.diff(_walk(inner, of_name, by))
+    return of_name(node)
