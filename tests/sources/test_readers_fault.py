@@ -25,7 +25,7 @@ from livebode.core import ExtraError, LivebodeError, RecordingError, UsageError
 from livebode.sources import open_log, sinumerik_spectra
 from livebode.sources.safexml import parse
 from tests.support.errors import refused
-from tests.support.recordings import WRITERS, dspace, signals, with_time, write, write_dspace73
+from tests.support.recordings import OWN_RATE, WRITERS, dspace, signals, with_time, write, write_dspace73
 
 MODULES = sorted(WRITERS)
 ROUNDS = int(os.environ.get("LIVEBODE_FUZZ_ROUNDS", "150"))
@@ -182,7 +182,7 @@ def test_a_file_that_cannot_be_opened_is_refused(tmp_path, monkeypatch, number, 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_a_file_truncated_anywhere_is_read_or_refused(module, tmp_path):
-    given = signals(200) if module == "sinumerik" else with_time(signals(200))
+    given = signals(200) if module in OWN_RATE else with_time(signals(200))
     whole = write(module, tmp_path, given).read_bytes()
     for keep in range(1, len(whole) - 3, max(1, len(whole) // 40)):
         path = text(tmp_path, whole[:keep], f"cut{Path(WRITERS[module][0]).suffix}")
@@ -342,7 +342,7 @@ def seeds(module: str, folder: Path) -> bytes:
     if module == "struct73":
         write_dspace73(folder / "a.mat", 50)
         return (folder / "a.mat").read_bytes()
-    return write(module, folder, signals(50) if module == "sinumerik" else with_time(signals(50))).read_bytes()
+    return write(module, folder, signals(50) if module in OWN_RATE else with_time(signals(50))).read_bytes()
 
 
 @pytest.mark.parametrize("module", [*MODULES, "struct", "struct73"])

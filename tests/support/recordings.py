@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import scipy.io
+import scipy.io.wavfile
 from numpy.typing import NDArray
 
 RATE_HZ = 4000.0
@@ -116,6 +117,11 @@ def write_sinumerik(path: Path, signals: Signals) -> None:
     )
 
 
+def write_wav(path: Path, signals: Signals) -> None:
+    """As float64; the format has no names."""
+    scipy.io.wavfile.write(path, int(RATE_HZ), np.column_stack(list(signals.values())))
+
+
 WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "delimited": (".csv", write_csv),
     "parquet": (".parquet", write_parquet),
@@ -127,8 +133,17 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "tdms": (".tdms", write_tdms),
     "mdf": (".mf4", write_mdf),
     "sinumerik": (".xml", write_sinumerik),
+    "wav": (".wav", write_wav),
 }
 """Ending and writer for each module of `livebode.sources` that reads a format."""
+NAMES = {"wav": ("c1", "c2")}
+"""What the signals input and output are called where the format does not keep these names."""
+OWN_RATE = "sinumerik", "wav"
+"""Formats that define a rate and have no time column."""
+
+
+def names(module: str) -> tuple[str, str]:
+    return NAMES.get(module, ("input", "output"))
 
 
 def signals(samples: int = 1000, seed: int = 0) -> dict[str, NDArray[np.float64]]:

@@ -48,6 +48,10 @@ def is_xml(head: bytes) -> bool:
     return head.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<")
 
 
+def is_wav(head: bytes) -> bool:
+    return head.startswith((b"RIFF", b"RIFX", b"RF64")) and head[8:12] == b"WAVE"
+
+
 ARROW_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
 
 FORMATS = (
@@ -59,6 +63,7 @@ FORMATS = (
     Format("NPZ", (".npz",), lambda head: head.startswith(b"PK\x03\x04"), "npz"),
     Format("TDMS", (".tdms",), lambda head: head.startswith(b"TDSm"), "tdms"),
     Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith((b"MDF     ", b"UnFinMF ")), "mdf"),
+    Format("WAV", (".wav",), is_wav, "wav"),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
     Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, "delimited"),
 )  # fmt: skip
