@@ -13,7 +13,7 @@ from livebode.core import RecordingError
 from livebode.sources import open_log
 from livebode.sources.formats import FORMATS
 from tests.support.errors import refused
-from tests.support.recordings import OWN_RATE, RATE_HZ, WRITERS, names, signals, with_time, write
+from tests.support.recordings import CLOCKS, OWN_RATE, RATE_HZ, WRITERS, names, signals, with_time, write
 
 MODULES = sorted(WRITERS)
 TIMED = [module for module in MODULES if module not in OWN_RATE]
@@ -43,10 +43,11 @@ def test_the_same_signals_come_back_bit_for_bit(module, tmp_path):
 def test_the_rate_comes_from_the_time_column(module, tmp_path):
     log = open_log(write(module, tmp_path, with_time(signals())))
     assert log.rate_hz == RATE_HZ
-    assert "'t'" in log.rate_origin
+    clock = CLOCKS.get(module, "t")
+    assert repr(clock) in log.rate_origin
     assert log.timing.gaps == 0
     assert log.samples == 1000
-    assert [channel.name for channel in log.channels if channel.name != "t"] == ["input", "output"]
+    assert [channel.name for channel in log.channels if channel.name != clock] == list(names(module))
 
 
 @pytest.mark.parametrize("module", TIMED)
@@ -55,10 +56,11 @@ def test_a_gap_is_counted_and_marked(module, tmp_path):
     kept = np.delete(np.arange(1003), [400, 401, 402])
     log = open_log(write(module, tmp_path, {name: values[kept] for name, values in truth.items()}))
     assert (log.timing.gaps, log.timing.missing, log.timing.first_gaps[0].sample) == (1, 3, 403)
-    blocks = list(log.blocks(["output"]))
+    (output,) = names(module)[1:]
+    blocks = list(log.blocks([output]))
     assert [block.start for block in blocks if block.gap] == [403]
     for block in blocks:
-        np.testing.assert_array_equal(block["output"], truth["output"][block.start : block.stop])
+        np.testing.assert_array_equal(block[output], truth["output"][block.start : block.stop])
         np.testing.assert_allclose(block.time_s, truth["t"][block.start : block.stop], rtol=1e-12)
 
 
@@ -100,7 +102,7 @@ def test_a_misspelt_channel_names_the_nearest(module, tmp_path):
     assert caught.value.remedy.startswith(f"did you mean {name!r}?")
 
 
-@pytest.mark.parametrize("module", [module for module in TIMED if module != "mdf"])  # which always has time
+@pytest.mark.parametrize("module", [module for module in TIMED if module not in CLOCKS])
 def test_a_recording_without_time_and_rate_is_refused(module, tmp_path):
     path = write(module, tmp_path, signals())
     with refused(RecordingError, "rate-missing", argument="rate_hz", path=str(path)):

@@ -17,6 +17,8 @@ import scipy.io
 import scipy.io.wavfile
 from numpy.typing import NDArray
 
+from tests.support.ulog_file import ulog_file
+
 RATE_HZ = 4000.0
 Signals = Mapping[str, NDArray[np.float64]]
 SINUMERIK_ALPHABET = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"
@@ -73,10 +75,8 @@ def write_tdms(path: Path, signals: Signals) -> None:
 
 
 def write_mdf(path: Path, signals: Signals) -> None:
-    """The format has time beside its signals; where none is given it is that of the rate."""
-    time = signals.get("t", np.arange(len(next(iter(signals.values())))) / RATE_HZ)
     given = [
-        asammdf.Signal(values, time, name=name, master_metadata=("t", 1))
+        asammdf.Signal(values, clock_s(signals), name=name, master_metadata=("t", 1))
         for name, values in signals.items()
         if name != "t"
     ]
@@ -122,6 +122,18 @@ def write_wav(path: Path, signals: Signals) -> None:
     scipy.io.wavfile.write(path, int(RATE_HZ), np.column_stack(list(signals.values())))
 
 
+def clock_s(signals: Signals) -> NDArray[np.float64]:
+    """Time of the samples in formats that always have it; where none is given it is that of the rate."""
+    return signals.get("t", np.arange(len(next(iter(signals.values())))) / RATE_HZ)
+
+
+def write_ulog(path: Path, signals: Signals) -> None:
+    """One topic, log."""
+    time_us = np.rint(clock_s(signals) * 1e6).astype(np.uint64)
+    given = {name: values.astype("<f8") for name, values in signals.items() if name != "t"}
+    path.write_bytes(ulog_file({"log": {"timestamp": time_us, **given}}))
+
+
 WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "delimited": (".csv", write_csv),
     "parquet": (".parquet", write_parquet),
@@ -133,13 +145,16 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "tdms": (".tdms", write_tdms),
     "mdf": (".mf4", write_mdf),
     "sinumerik": (".xml", write_sinumerik),
+    "ulog": (".ulg", write_ulog),
     "wav": (".wav", write_wav),
 }
 """Ending and writer for each module of `livebode.sources` that reads a format."""
-NAMES = {"wav": ("c1", "c2")}
+NAMES = {"ulog": ("log.input", "log.output"), "wav": ("c1", "c2")}
 """What the signals input and output are called where the format does not keep these names."""
 OWN_RATE = "sinumerik", "wav"
 """Formats that define a rate and have no time column."""
+CLOCKS = {"mdf": "t", "ulog": "log.timestamp"}
+"""The time column of formats that always have one."""
 
 
 def names(module: str) -> tuple[str, str]:

@@ -206,7 +206,8 @@ def _samples(axis: Axis) -> Callable[[], Iterator[Block]]:
     names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule, *axis.monitoring.covariates]
 
     def blocks() -> Iterator[Block]:
-        assert axis.source.log is not None
-        return open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time).blocks(names)
+        source, output = axis.source, axis.signals.output
+        assert source.log is not None
+        return open_log(source.log, rate_hz=source.rate_hz, time=source.time, channels=[output]).blocks(names)
 
     return blocks

@@ -23,7 +23,7 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
     assert axis.source.log is not None
-    log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
+    log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time, channels=[axis.signals.output])
     pipeline = Pipeline.of(axis, make_follower(axis, log))
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]

@@ -12,6 +12,7 @@ from livebode.core import LivebodeError, RecordingError
 from livebode.sources.recording import Recording, contained
 
 HEAD_BYTES = 1024
+ULOG_MAGIC = b"ULog\x01\x12\x35"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -63,6 +64,7 @@ FORMATS = (
     Format("NPZ", (".npz",), lambda head: head.startswith(b"PK\x03\x04"), "npz"),
     Format("TDMS", (".tdms",), lambda head: head.startswith(b"TDSm"), "tdms"),
     Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith((b"MDF     ", b"UnFinMF ")), "mdf"),
+    Format("ULog", (".ulg", ".ulog"), lambda head: head.startswith(ULOG_MAGIC), "ulog"),
     Format("WAV", (".wav",), is_wav, "wav"),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
     Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, "delimited"),

@@ -74,11 +74,16 @@ class Log:
         """What else is in the file, and why it is not a channel."""
         listed = {column.name for column in self._columns}
         other = [
-            Skipped(column.name, f"it has {column.samples} samples, not {self.samples}")
+            Skipped(column.name, self._why_not(column))
             for column in self._recording.columns
             if column.name not in listed and column.name not in self.scalars
         ]
         return (*self._recording.skipped, *other)
+
+    def _why_not(self, column: Column) -> str:
+        if column.group != self._columns[0].group:
+            return f"it is sampled by the clock of {column.group!r}"
+        return f"it has {column.samples} samples, not {self.samples}"
 
     @property
     def scalars(self) -> Mapping[str, float]:

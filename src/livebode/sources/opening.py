@@ -130,10 +130,11 @@ def find_clock(recording: Recording, column: Column | None, unit: str, rate_hz: 
 
 
 def together(recording: Recording, channels: Sequence[str] | None) -> list[Column]:
-    """The columns of one length: that of `channels`, or the one with most of the file's values."""
+    """The columns of one group and length: those of `channels`, or the ones with most of the file's values."""
     everything = recording.columns
     if channels:
         asked = [resolve(name, everything, everything) for name in channels]
+        check_groups(channels, asked)
         if len({column.samples for column in asked}) > 1:
             lengths = ", ".join(f"{name!r} {column.samples}" for name, column in zip(channels, asked))
             raise RecordingError(
@@ -144,12 +145,12 @@ def together(recording: Recording, channels: Sequence[str] | None) -> list[Colum
                 argument="channels",
                 samples=[column.samples for column in asked],
             )
-        length = asked[0].samples
+        group, length = asked[0].group, asked[0].samples
     else:
-        values: Counter[int | None] = Counter()
+        values: Counter[tuple[str, int | None]] = Counter()
         for column in everything:
-            values[column.samples] += 1 if column.samples is None else column.samples
-        length = max(values, key=lambda samples: values[samples], default=0)
+            values[column.group, column.samples] += 1 if column.samples is None else column.samples
+        group, length = max(values, key=lambda shared: values[shared], default=("", 0))
     if length is not None and length < 2:
         raise RecordingError(
             "channel-missing",
@@ -157,7 +158,21 @@ def together(recording: Recording, channels: Sequence[str] | None) -> list[Colum
             "check that the recording is complete",
             path=str(recording.path),
         )
-    return [column for column in everything if column.samples == length]
+    return [column for column in everything if (column.group, column.samples) == (group, length)]
+
+
+def check_groups(names: Sequence[str], columns: Sequence[Column]) -> None:
+    """RecordingError if the columns do not share their clock."""
+    groups = [column.group for column in columns]
+    if len(set(groups)) > 1:
+        listed = ", ".join(f"{name!r} in {group!r}" for name, group in zip(names, groups))
+        raise RecordingError(
+            "clocks-differ",
+            f"the channels are sampled by different clocks ({listed})",
+            "name channels of one group",
+            argument="channels",
+            groups=groups,
+        )
 
 
 def reasons(recording: Recording) -> str:

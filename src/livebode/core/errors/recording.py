@@ -28,6 +28,7 @@ class RecordingError(LivebodeError):
         "channel-duplicated": "Two columns of the file have the same name.",
         "channel-missing": "The file has no channel with samples.",
         "channel-unknown": "The file has no channel of this name.",
+        "clocks-differ": "Channels that are read together are sampled by different clocks.",
         "damaged": "The content of the file contradicts its format.",
         "declaration-refused": "The XML declares a document type or entities, which are never read.",
         "empty": "The file has no samples.",
