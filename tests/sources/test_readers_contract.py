@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from livebode.core import RecordingError
-from livebode.sources import open_log
 from livebode.sources.formats import FORMATS
 from tests.support.errors import refused
-from tests.support.recordings import CLOCKS, OWN_RATE, RATE_HZ, WRITERS, names, signals, with_time, write
+from tests.support.recordings import CLOCKS, OWN_RATE, RATE_HZ, WRITERS, names, open_log, signals, with_time, write
 
 MODULES = sorted(WRITERS)
 TIMED = [module for module in MODULES if module not in OWN_RATE]

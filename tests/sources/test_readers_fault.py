@@ -10,8 +10,10 @@ import struct
 import subprocess
 import sys
 import zipfile
+from functools import partial
 from pathlib import Path
 
+import can
 import h5py
 import numpy as np
 import pyarrow as pa
@@ -22,13 +24,23 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import ExtraError, LivebodeError, RecordingError, UsageError
-from livebode.sources import open_log, sinumerik_spectra
+from livebode.sources import sinumerik_spectra
 from livebode.sources.safexml import parse
 from tests.support.errors import refused
-from tests.support.recordings import OWN_RATE, WRITERS, dspace, signals, with_time, write, write_dspace73
+from tests.support.recordings import (
+    OWN_RATE,
+    WRITERS,
+    dspace,
+    open_log,
+    signals,
+    with_time,
+    write,
+    write_dspace73,
+    write_frames,
+)
 
 MODULES = sorted(WRITERS)
-MAY_END_ANYWHERE = "delimited", "ulog"
+MAY_END_ANYWHERE = "asc", "delimited", "ulog"
 """A table may end after any row, and a flight recorder when its battery is removed."""
 ROUNDS = int(os.environ.get("LIVEBODE_FUZZ_ROUNDS", "150"))
 """Damaged files of each kind; raise it for a campaign."""
@@ -344,10 +356,13 @@ def seeds(module: str, folder: Path) -> bytes:
     if module == "struct73":
         write_dspace73(folder / "a.mat", 50)
         return (folder / "a.mat").read_bytes()
+    if module == "blf_plain":  # damage reaches the frames
+        write_frames(partial(can.BLFWriter, compression_level=0), folder / "log.blf", with_time(signals(50)))
+        return (folder / "log.blf").read_bytes()
     return write(module, folder, signals(50) if module in OWN_RATE else with_time(signals(50))).read_bytes()
 
 
-@pytest.mark.parametrize("module", [*MODULES, "struct", "struct73"])
+@pytest.mark.parametrize("module", [*MODULES, "struct", "struct73", "blf_plain"])
 def test_damaged_files_are_read_or_refused(module, tmp_path):
     whole = seeds(module, tmp_path)
     for round_ in range(ROUNDS):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import asammdf
+import can
 import h5py
 import nptdms
 import numpy as np
@@ -17,6 +19,8 @@ import scipy.io
 import scipy.io.wavfile
 from numpy.typing import NDArray
 
+from livebode.sources import Log
+from livebode.sources import open_log as open_alone
 from tests.support.ulog_file import ulog_file
 
 RATE_HZ = 4000.0
@@ -134,6 +138,38 @@ def write_ulog(path: Path, signals: Signals) -> None:
     path.write_bytes(ulog_file({"log": {"timestamp": time_us, **given}}))
 
 
+FD_LENGTHS = 8, 12, 16, 20, 24, 32, 48, 64
+DBC = "frames.dbc"
+
+
+def write_dbc(path: Path, names: Sequence[str], length: int) -> None:
+    """A message Log, number 0x123, whose signals are doubles."""
+    signals = [f' SG_ {name} : {64 * at}|64@1- (1,0) [0|0] "" X' for at, name in enumerate(names)]
+    kinds = [f"SIG_VALTYPE_ 291 {name} : 2;" for name in names]
+    lines = ['VERSION ""', "NS_ :", "BS_:", "BU_: X", f"BO_ 291 Log: {length} X", *signals, *kinds]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def write_frames(writer: type, path: Path, signals: Signals) -> None:
+    """One message, Log, in frames of CAN FD with the DBC beside them."""
+    given = {name: values for name, values in signals.items() if name != "t"}
+    length = next(length for length in FD_LENGTHS if length >= 8 * len(given))
+    write_dbc(path.with_name(DBC), list(given), length)
+    rows = np.column_stack(list(given.values())).astype("<f8")
+    with writer(path) as file:
+        for time_s, row in zip(clock_s(signals).tolist(), rows):
+            data = row.tobytes().ljust(length, b"\0")
+            # BLF has whole nanoseconds, and its writer rounds down.
+            frame = can.Message(time_s + 5e-10, 291, is_extended_id=False, is_fd=True, data=data, channel=0)
+            file.on_message_received(frame)
+
+
+def open_log(path: Path, **options: object) -> Log:
+    """The recording, with the DBC that a writer here left beside it."""
+    dbc = path.with_name(DBC)
+    return open_alone(path, **({"dbc": dbc} if dbc.exists() else {}), **options)
+
+
 WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "delimited": (".csv", write_csv),
     "parquet": (".parquet", write_parquet),
@@ -147,13 +183,20 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "sinumerik": (".xml", write_sinumerik),
     "ulog": (".ulg", write_ulog),
     "wav": (".wav", write_wav),
+    "blf": (".blf", partial(write_frames, can.BLFWriter)),
+    "asc": (".asc", partial(write_frames, can.ASCWriter)),
 }
 """Ending and writer for each module of `livebode.sources` that reads a format."""
-NAMES = {"ulog": ("log.input", "log.output"), "wav": ("c1", "c2")}
+NAMES = {
+    "asc": ("Log.input", "Log.output"),
+    "blf": ("Log.input", "Log.output"),
+    "ulog": ("log.input", "log.output"),
+    "wav": ("c1", "c2"),
+}
 """What the signals input and output are called where the format does not keep these names."""
 OWN_RATE = "sinumerik", "wav"
 """Formats that define a rate and have no time column."""
-CLOCKS = {"mdf": "t", "ulog": "log.timestamp"}
+CLOCKS = {"asc": "Log.time", "blf": "Log.time", "mdf": "t", "ulog": "log.timestamp"}
 """The time column of formats that always have one."""
 
 

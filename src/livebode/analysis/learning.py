@@ -208,6 +208,7 @@ def _samples(axis: Axis) -> Callable[[], Iterator[Block]]:
     def blocks() -> Iterator[Block]:
         source, output = axis.source, axis.signals.output
         assert source.log is not None
-        return open_log(source.log, rate_hz=source.rate_hz, time=source.time, channels=[output]).blocks(names)
+        log = open_log(source.log, rate_hz=source.rate_hz, time=source.time, dbc=source.dbc, channels=[output])
+        return log.blocks(names)
 
     return blocks

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from livebode.cli import terminal
-from livebode.cli.options import Excitation, Json, Output, Rate, Time
+from livebode.cli.options import Dbc, Excitation, Json, Output, Rate, Time
 from livebode.core import UsageError
 from livebode.estimation.settings import default_hop
 from livebode.records import to_json
@@ -38,6 +38,7 @@ def inspect_command(
     ] = None,
     rate: Rate = None,
     time: Time = None,
+    dbc: Dbc = None,
     as_json: Json = False,
 ) -> None:
     """List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and SNR.
@@ -48,7 +49,9 @@ def inspect_command(
 
     _check(excitation, output, input_, lines, window)
     of_lines = None if lines is None or window is None else (lines, window)
-    found = inspect(log, rate_hz=rate, time=time, excitation=excitation, output=output, input=input_, lines=of_lines)
+    found = inspect(
+        log, rate_hz=rate, time=time, dbc=dbc, excitation=excitation, output=output, input=input_, lines=of_lines
+    )
     if as_json:
         print(to_json(found.plain()))
         return

@@ -98,6 +98,7 @@ def inspect(
     *,
     rate_hz: float | None = None,
     time: str | None = None,
+    dbc: Path | None = None,
     excitation: str | None = None,
     output: str | None = None,
     input: str | None = None,
@@ -108,7 +109,7 @@ def inspect(
     With lines (a text and the window), hum is searched in `output` and `input` where there is no excitation.
     """
     required = [name for name in (excitation, output, input) if name is not None]
-    log = open_log(path, rate_hz=rate_hz, time=time, channels=required[:1] or None)
+    log = open_log(path, rate_hz=rate_hz, time=time, dbc=dbc, channels=required[:1] or None)
     known = {channel.name for channel in log.channels}
     # A channel given by a path or an alias is listed by that name.
     extra = [name for name in dict.fromkeys(required) if name not in known]

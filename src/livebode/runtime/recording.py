@@ -22,8 +22,9 @@ from livebode.sources import open_log
 def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
-    assert axis.source.log is not None
-    log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time, channels=[axis.signals.output])
+    given = axis.source
+    assert given.log is not None
+    log = open_log(given.log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=[axis.signals.output])
     pipeline = Pipeline.of(axis, make_follower(axis, log))
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]

@@ -26,6 +26,7 @@ def open_log(
     rate_hz: float | None = None,
     time: str | None = None,
     channels: Sequence[str] | None = None,
+    dbc: str | os.PathLike[str] | None = None,
     block_samples: int = 65536,
 ) -> Log:
     """Open a recording of any format that `docs/reference/readers.md` lists.
@@ -40,14 +41,17 @@ def open_log(
         Name of the time column, with its unit if the file does not contain it: "clock [us]". Default: found by
         name; "none" ignores the time column.
     channels
-        Channels to read; selects the series that belong together if the file has series of several lengths.
+        Channels to read; selects the series that belong together if the file has series of several lengths or clocks.
+    dbc
+        File that defines the signals in CAN frames, for BLF and ASC.
     block_samples
         Largest length of a Block.
 
     Raises
     ------
     RecordingError
-        Where the file cannot be read, lacks a channel, or has no usable time or rate.
+        Where the file cannot be read, lacks a channel, has no usable time or rate, or needs a `dbc` or has no use
+        for it.
     UsageError
         Where `rate_hz` or `block_samples` is out of range.
     ExtraError
@@ -74,7 +78,7 @@ def open_log(
             value=rate_hz,
         )
     checked_block_samples(block_samples)
-    recording = open_recording(Path(path))
+    recording = open_recording(Path(path), None if dbc is None else Path(dbc))
     with located(recording.path):
         log = log_of(recording, rate_hz, time, channels, block_samples)
     _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)

@@ -24,7 +24,7 @@ TAKEN: dict[str, set[str]] = {
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
 }
 """Keys of each kind of URL, in addition to `url` and `timeout_s`."""
-LOG = {"log", "time", "rate_hz", "follow"}
+LOG = {"log", "time", "rate_hz", "follow", "dbc"}
 
 
 class SourceSettings(BaseModel):
@@ -37,6 +37,7 @@ class SourceSettings(BaseModel):
 
     log: File | None = None
     time: str | None = None
+    dbc: File | None = None
     follow: bool = False
     url: str | None = None
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None

@@ -1,0 +1,185 @@
+"""BLF and ASC: what cantools encoded is decoded, each message on its own clock; hostile containers and definitions."""
+
+from __future__ import annotations
+
+import struct
+import sys
+import zlib
+from pathlib import Path
+
+import can
+import cantools
+import numpy as np
+import pytest
+
+from livebode.core import ExtraError, RecordingError
+from livebode.sources import open_log
+from tests.support.command import livebode
+from tests.support.errors import refused
+
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: X
+BO_ 256 Drive: 8 X
+ SG_ Torque : 0|16@1- (0.1,-5) [0|0] "N m" X
+ SG_ Speed : 23|16@0- (0.25,0) [0|0] "rad/s" X
+ SG_ Enabled : 32|1@1+ (1,0) [0|0] "" X
+BO_ 2566848512 Position: 8 X
+ SG_ Angle : 0|64@1- (1,0) [0|0] "rad" X
+BO_ 512 Diagnosis: 8 X
+ SG_ Page M : 0|8@1+ (1,0) [0|0] "" X
+ SG_ Voltage m0 : 8|16@1+ (1,0) [0|0] "V" X
+SIG_VALTYPE_ 2566848512 Angle : 2;
+VAL_ 256 Enabled 1 "on" 0 "off" ;
+"""
+WRITERS = {"a.blf": can.BLFWriter, "a.asc": can.ASCWriter}
+RNG = np.random.default_rng(0)
+SPEED = RNG.integers(-400, 400, 500) / 4
+TORQUE = RNG.integers(-100, 100, 500) / 10
+ANGLE = RNG.standard_normal(500)
+
+
+def frames(positions: int = 1) -> list[can.Message]:
+    """Drive every 2 ms, Position 0.3 ms later on so many buses, and frames that are not signals."""
+    database = cantools.database.load_string(DBC, "dbc")
+    found = [can.Message(0.0, 0x7FF, is_extended_id=False, data=b"x", channel=0)]
+    for k in range(500):
+        drive = {"Torque": TORQUE[k], "Speed": SPEED[k], "Enabled": k % 2}
+        data = database.encode_message("Drive", drive)
+        found.append(can.Message(0.002 * k + 5e-10, 256, is_extended_id=False, data=data, channel=0))
+        data = struct.pack("<d", ANGLE[k])
+        found += [
+            can.Message(0.002 * k + 0.0003 + 5e-10, 0x18FF0000, is_extended_id=True, data=data, channel=bus)
+            for bus in range(positions)
+        ]
+    found.append(can.Message(1.0, 256, is_extended_id=False, is_remote_frame=True, dlc=8, channel=0))
+    found.append(can.Message(1.0, 512, is_extended_id=False, data=bytes(8), channel=0))
+    return found
+
+
+def written(folder: Path, name: str, messages: list[can.Message], dbc: str = DBC) -> tuple[Path, Path]:
+    (folder / "x.dbc").write_text(dbc)
+    with WRITERS[name](folder / name) as writer:
+        for message in messages:
+            writer.on_message_received(message)
+    return folder / name, folder / "x.dbc"
+
+
+@pytest.mark.parametrize("name", sorted(WRITERS))
+def test_signals_are_physical_and_each_message_has_its_clock(tmp_path, name):
+    path, dbc = written(tmp_path, name, frames())
+    log = open_log(path, dbc=dbc)
+    listed = [("Drive.time", "s"), ("Drive.Torque", "N m"), ("Drive.Speed", "rad/s"), ("Drive.Enabled", "")]
+    assert [(channel.name, channel.unit) for channel in log.channels] == listed
+    (block,) = log.blocks(["Drive.Torque", "Speed", "Drive.Enabled"])
+    np.testing.assert_allclose(block.data, [TORQUE, SPEED, np.arange(500) % 2], rtol=0, atol=1e-12)
+    position = open_log(path, dbc=dbc, channels=["Position.Angle"])
+    (angles,) = position.blocks()
+    np.testing.assert_array_equal(angles.data, [ANGLE])
+    np.testing.assert_allclose(angles.time_s - block.time_s, 0.0003, rtol=0, atol=1e-12)
+    assert (log.rate_hz, position.rate_hz, position.channels[1].unit) == (500, 500, "rad")
+    reasons = {one.name: one.reason for one in log.skipped}
+    assert reasons["1/0x7FF"] == "the DBC does not define this frame"
+    assert reasons["Diagnosis"] == "its signals are multiplexed"
+    with refused(RecordingError, "clocks-differ", groups=["Drive", "Position"]):
+        open_log(path, dbc=dbc, channels=["Drive.Torque", "Position.Angle"])
+
+
+@pytest.mark.parametrize("name", sorted(WRITERS))
+def test_a_message_on_two_buses_is_two_groups(tmp_path, name):
+    path, dbc = written(tmp_path, name, frames(positions=2))
+    (block,) = open_log(path, dbc=dbc, channels=["2/Position.Angle"]).blocks()
+    np.testing.assert_array_equal(block.data, [ANGLE])
+
+
+@pytest.mark.parametrize("name", sorted(WRITERS))
+def test_without_a_dbc_the_command_says_that_it_is_needed(tmp_path, name):
+    path, dbc = written(tmp_path, name, frames())
+    with refused(RecordingError, "dbc-missing", path=str(path), argument="dbc"):
+        open_log(path)
+    result = livebode("inspect", path)
+    assert (result.code, result.err.count("\n")) == (2, 1)
+    assert "give --dbc FILE, or dbc in [source]" in result.err
+    result = livebode("inspect", path, "--dbc", dbc)
+    assert (result.code, "Drive.Torque" in result.out) == (0, True)
+    with refused(RecordingError, "no-frames", path=str(dbc)):
+        open_log(dbc, dbc=dbc)
+    with refused(RecordingError, "not-found", path=str(tmp_path / "none.dbc")):
+        open_log(path, dbc=tmp_path / "none.dbc")
+
+
+def test_a_frame_shorter_than_its_message_is_refused(tmp_path):
+    short = [can.Message(0.001 * k, 256, is_extended_id=False, data=bytes(3), channel=0) for k in range(9)]
+    path, dbc = written(tmp_path, "a.blf", short)
+    with refused(RecordingError, "damaged", part="Drive"):
+        list(open_log(path, dbc=dbc).blocks(["Drive.Torque"]))
+
+
+def test_relative_times_and_endless_lines_of_asc_are_refused(tmp_path):
+    path, dbc = written(tmp_path, "a.asc", frames())
+    text = path.read_text()
+    path.write_text(text.replace("timestamps absolute", "timestamps relative"))
+    with refused(RecordingError, "time-irregular", path=str(path)):
+        open_log(path, dbc=dbc)
+    path.write_text(text + "1.5 1 " + "1" * 100_000)
+    with refused(RecordingError, "too-large", path=str(path), limit=1 << 16):
+        open_log(path, dbc=dbc)
+
+
+HEAD = b"LOGG" + struct.pack("<L", 144) + bytes(136)
+
+
+def container(content: bytes, declared: int) -> bytes:
+    body = struct.pack("<H6xL4x", 2, declared) + zlib.compress(content)
+    raw = struct.pack("<4sHHLL", b"LOBJ", 16, 1, 16 + len(body), 10) + body
+    return HEAD + raw + bytes(len(raw) % 4)
+
+
+def message(size: int) -> bytes:
+    return struct.pack("<4sHHLL", b"LOBJ", 32, 1, size, 86)
+
+
+@pytest.mark.parametrize(
+    ("content", "code", "facts"),
+    [
+        (container(bytes(1 << 24), 1 << 31), "too-large", {"limit": 1 << 26}),
+        (container(bytes(1 << 24), 100), "damaged", {"byte": 144}),
+        (container(message(0) + bytes(99), 115), "damaged", {"size": 0}),
+        (container(message(1 << 31) + bytes(99), 115), "damaged", {"size": 1 << 31}),
+        (container(message(200) + bytes(99), 115), "truncated", {}),
+        (container(message(48) + bytes(99), 115), "damaged", {"byte": 144}),
+        (HEAD + message(8), "damaged", {"byte": 144}),
+        (HEAD + message(1 << 31), "truncated", {"byte": 144}),
+        (b"LOGG" + struct.pack("<L", 1 << 31) + bytes(136), "damaged", {"size": 1 << 31}),
+    ],
+)
+def test_containers_that_contradict_their_sizes_are_refused(tmp_path, content, code, facts):
+    path = tmp_path / "a.blf"
+    path.write_bytes(content)
+    with refused(RecordingError, code, path=str(path), **facts):
+        open_log(path, dbc=tmp_path / "x.dbc")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("Drive: 8", "Drive: 4000000000", "too-large"),
+        ("0|16@1-", "4000000000|16@1-", "too-large"),
+        ("0|16@1-", "0|4000000000@1-", "too-large"),
+        ("BU_: X", "BU_: [", "damaged"),
+    ],
+)
+def test_definitions_of_hostile_size_are_refused(tmp_path, old, new, code):
+    path, dbc = written(tmp_path, "a.asc", frames(), DBC.replace(old, new, 1))
+    with refused(RecordingError, code, path=str(dbc)):
+        open_log(path, dbc=dbc)
+
+
+@pytest.mark.parametrize("package", ["can", "cantools"])
+def test_frames_without_their_libraries_name_the_extra(tmp_path, monkeypatch, package):
+    path, dbc = written(tmp_path, "a.blf", frames())
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ExtraError, match="which is not installed") as caught:
+        open_log(path, dbc=dbc)
+    assert caught.value.remedy == "run pip install livebode[can]"
