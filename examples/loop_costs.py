@@ -15,7 +15,7 @@ def velocity(**wrong: object) -> PID:
 
 
 def position(**wrong: object) -> PID:
-    return PID(**({"gain": KPC, "rate_hz": RATE_HZ / 2, "held_ticks": 2} | wrong))
+    return PID(**({"gain": KPC, "rate_hz": RATE_HZ / 2, "rate_divider": 2} | wrong))
 
 
 LOOPS = {

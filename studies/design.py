@@ -38,7 +38,7 @@ STANDSTILL = {
     ),
     "PRBS near the end": (
         BeltAxis(motion=Standstill(position_m=1.6)), Lines(tuple(range(6, 90)), 2555, 4000.0),
-        prbs(9, 2.0, held_ticks=5),
+        prbs(9, 2.0, rate_divider=5),
     ),
     "late and stiff": (
         BeltAxis(drive=Drive(velocity_rate_hz=2000, position_rate_hz=1000, position_gain_per_s=10, delay_ticks=2)),

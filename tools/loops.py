@@ -64,7 +64,7 @@ class Case:
             rate_hz=self.rate_hz,
             delay_ticks=self.delay_ticks,
         )
-        return Loop(feedback=Cascade(velocity, PID(gain=self.position_gain, rate_hz=self.rate_hz / 2, held_ticks=2)))
+        return Loop(feedback=Cascade(velocity, PID(gain=self.position_gain, rate_hz=self.rate_hz / 2, rate_divider=2)))
 
     @property
     def open(self) -> OpenLoop:

@@ -3,6 +3,7 @@
 import json
 import re
 import subprocess
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from livebode.records import RunRecord
 from livebode.report import save_excitation_picture
 from livebode.simulation import SimulatedAxis
 from tests.support.command import livebode, write_parquet
+from tests.support.schemas import validator
 from tools.structured_text import Machine
 
 ROOT = Path(__file__).parents[2]
@@ -59,6 +61,9 @@ def test_the_axis_file_tracks_what_was_designed(kind, tmp_path):
     made = livebode("design", path, "--out", out, "--json")
     assert made.code == 0, made.err
     printed = json.loads(made.out)
+    axis = (out / "axis.toml").read_text("utf-8")
+    schema = out / axis.splitlines()[0].removeprefix("#:schema ")
+    validator(json.loads(schema.read_text("utf-8"))).validate(tomllib.loads(axis))
     samples = np.load(out / "excitation.npz")["samples"]
     played(path, samples, printed["recording_s"], out / "log.parquet")
     ran = livebode("run", out / "axis.toml", "--out", tmp_path / "run")
@@ -217,7 +222,7 @@ def test_the_table_gives_each_choice_with_its_reason(tmp_path):
     for word in ("lines", "window", "amplitude", "peak torque", "following error", "95 % bound", "recording", "hop"):
         assert word in shown.out
     assert sorted(p.name for p in (tmp_path / "d").iterdir()) == [
-        "axis.toml", "design.json", "excitation.csv", "excitation.png",
+        "axis.schema.json", "axis.toml", "design.json", "excitation.csv", "excitation.png",
     ]  # fmt: skip
     printed = json.loads((tmp_path / "d" / "design.json").read_text())
     for f, sigma in zip(printed["frequency_hz"], printed["sigma_relative"]):

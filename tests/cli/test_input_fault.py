@@ -146,7 +146,7 @@ def test_missing_empty_and_damaged_recordings_are_refused(log: Path, tmp_path: P
         ("[source]\nlog='log.parquet'\n[signals]\noutput='y'\n[loop.velocity]\ngain=nan\nrate_hz=1000",
          ("loop.velocity.gain = nan", "finite")),
         ("[source]\nlog='log.parquet'\n[signals]\noutput='y'\n[loop.velocity]\ngain=1\nrate_hz=500",
-         ("loop.velocity has a rate of 500 Hz", "1000 Hz", "held_ticks")),
+         ("loop.velocity has a rate of 500 Hz", "1000 Hz", "rate_divider")),
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("log")

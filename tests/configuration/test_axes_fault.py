@@ -19,7 +19,7 @@ from livebode.configuration.axes import axes_of
 from livebode.configuration.axis import Axis
 from livebode.configuration.fit_settings import chosen_model, fitter_of
 from livebode.configuration.toml_file import FILE_BYTES_MAX
-from livebode.core import ConfigError, LivebodeError
+from livebode.core import ConfigError, LivebodeError, PlantKinds
 from livebode.preparation.plan import live_follower
 from tests.support.errors import refused
 
@@ -59,11 +59,11 @@ entry_gain = 1.0
 gain = 0.2308
 integral_time_s = 0.2
 rate_hz = 4000
-held_ticks = 1
+rate_divider = 1
 [loop.position]
 gain = 1.0
 rate_hz = 2000
-held_ticks = 2
+rate_divider = 2
 [fit]
 model = "two-mass"
 radius_m = 0.019
@@ -138,8 +138,8 @@ def used(axis: Axis) -> None:
     """As far as a run uses it before its first sample."""
     follower = live_follower(axis, RATE_HZ)
     if axis.fit is not None:
-        chosen_model(axis.fit, "rad/s/(N m)")
-        fitter_of(axis.fit, "rad/s/(N m)")
+        chosen_model(axis.fit, PlantKinds("velocity", "torque"))
+        fitter_of(axis.fit, PlantKinds("velocity", "torque"))
     assert follower.settings.lines.window <= 1 << 24
 
 

@@ -162,7 +162,7 @@ def test_a_held_controller_is_what_upsampling_its_output_gives(ticks: int) -> No
     sine = np.exp(2j * np.pi * 60 / RATE_HZ * n)
     held = np.repeat(3.0 * sine[::ticks], ticks)[: n.size]
     share = np.vdot(sine, held) / n.size
-    controller = PID(gain=3.0, rate_hz=RATE_HZ / ticks, held_ticks=ticks)
+    controller = PID(gain=3.0, rate_hz=RATE_HZ / ticks, rate_divider=ticks)
     assert controller.response(60.0) == pytest.approx(share, rel=2e-3)
 
 
@@ -180,7 +180,7 @@ def test_the_cascade_is_point_1_of_the_method() -> None:
     z = np.exp(2j * np.pi * F_HZ * t)
     truth = kvc * (1 + t / ti * z / (z - 1)) * (1 + kpc * (1 + 1 / z) / 2 * t * (z + 1) / (2 * (z - 1)))
     cascade = Cascade(
-        PID(gain=kvc, integral_time_s=ti, rate_hz=RATE_HZ), PID(gain=kpc, rate_hz=RATE_HZ / 2, held_ticks=2)
+        PID(gain=kvc, integral_time_s=ti, rate_hz=RATE_HZ), PID(gain=kpc, rate_hz=RATE_HZ / 2, rate_divider=2)
     )
     assert np.allclose(cascade.response(F_HZ), truth, rtol=1e-12)
 
@@ -205,7 +205,7 @@ def test_the_plant_comes_back_from_the_closed_loop(g: complex, f: float, e: floa
         (lambda: PID(gain=1.0, rate_hz=1, integral_time_s=0), "out-of-range", {"argument": "integral_time_s"}),
         (lambda: PID(gain=1.0, rate_hz=1, integrator="euler"), "not-one-of", {"argument": "integrator"}),
         (lambda: PID(gain=1.0, rate_hz=1, hold="foh"), "not-one-of", {"argument": "hold", "value": "foh"}),
-        (lambda: PID(gain=1.0, rate_hz=1, held_ticks=0), "out-of-range", {"argument": "held_ticks", "value": 0}),
+        (lambda: PID(gain=1.0, rate_hz=1, rate_divider=0), "out-of-range", {"argument": "rate_divider", "value": 0}),
         (lambda: PID(gain=1.0, rate_hz=1, delay_ticks=-1), "out-of-range", {"argument": "delay_ticks", "value": -1}),
         (lambda: Loop(input_logged="later"), "not-one-of", {"argument": "input_logged", "value": "later"}),
         (lambda: Loop().feedback_at(F_HZ), "missing", {"argument": "feedback"}),

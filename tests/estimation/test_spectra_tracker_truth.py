@@ -35,7 +35,7 @@ WINDOW, PERIODS = 400, 12
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=WINDOW)
 SIGNALS = (Channel("y", "rad/s"), Channel("u", "N m"), Channel("w", "N m"))
 LOOP = Loop(
-    Cascade(PID(gain=KVC, integral_time_s=TI, rate_hz=RATE_HZ), PID(gain=KPC, rate_hz=RATE_HZ / 2, held_ticks=2))
+    Cascade(PID(gain=KVC, integral_time_s=TI, rate_hz=RATE_HZ), PID(gain=KPC, rate_hz=RATE_HZ / 2, rate_divider=2))
 )
 
 

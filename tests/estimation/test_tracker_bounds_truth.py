@@ -19,7 +19,9 @@ from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop
 
 RUNS, SIGMA = 1000, 0.1
 PERIODS = 10
-FEEDBACK = Cascade(PID(gain=KVC, integral_time_s=TI, rate_hz=RATE_HZ), PID(gain=KPC, rate_hz=RATE_HZ / 2, held_ticks=2))
+FEEDBACK = Cascade(
+    PID(gain=KVC, integral_time_s=TI, rate_hz=RATE_HZ), PID(gain=KPC, rate_hz=RATE_HZ / 2, rate_divider=2)
+)
 
 
 def lines_of(window: int) -> Lines:

@@ -13,7 +13,7 @@ from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
 TRUTH = TwoMassPlant().response(LINES.frequency_hz)
 VELOCITY = PID(gain=KVC, integral_time_s=TI, rate_hz=RATE_HZ)
-POSITION = PID(gain=KPC, rate_hz=RATE_HZ / 2, held_ticks=2)
+POSITION = PID(gain=KPC, rate_hz=RATE_HZ / 2, rate_divider=2)
 LOOP = Loop(Cascade(VELOCITY, POSITION))
 
 

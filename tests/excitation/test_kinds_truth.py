@@ -39,7 +39,7 @@ def test_the_autocorrelation_of_a_prbs_is_exactly_n_and_minus_one(order):
 @pytest.mark.parametrize("held", [1, 3, 8])
 def test_a_held_prbs_has_the_spectrum_of_its_hold(held):
     order, amplitude = 6, 0.7
-    period = prbs(order, amplitude, held_ticks=held)
+    period = prbs(order, amplitude, rate_divider=held)
     bits, window = 2**order - 1, (2**order - 1) * held
     k = np.arange(1, (window + 1) // 2)
     k = k[k % bits != 0]

@@ -55,10 +55,10 @@ def test_more_lines_than_useful_are_refused_and_the_named_resolution_passes(reso
 @pytest.mark.parametrize("order", [14, 17, 20])
 def test_a_prbs_with_too_many_useful_lines_is_refused_with_an_order_that_passes(order):
     with pytest.raises(GridError) as caught:
-        grid(ExperimentSpec(band_hz=(1, 1999), order=order, kind="prbs", held_ticks=1), RATE_HZ)
+        grid(ExperimentSpec(band_hz=(1, 1999), order=order, kind="prbs", rate_divider=1), RATE_HZ)
     assert (caught.value.code, caught.value.lines_max) == ("grid.too-many-lines", 5000)
     named = caught.value.order_max
-    assert len(grid(ExperimentSpec(band_hz=(1, 1999), order=named, kind="prbs", held_ticks=1), RATE_HZ).lines) <= 5000
+    assert len(grid(ExperimentSpec(band_hz=(1, 1999), order=named, kind="prbs", rate_divider=1), RATE_HZ).lines) <= 5000
 
 
 def test_listed_amplitudes_are_reported_as_listed_and_refused_with_the_share_that_passes():

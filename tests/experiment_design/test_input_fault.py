@@ -219,7 +219,7 @@ WRONG = [
     ({"crest_factor_max": 2.0, "resolution_n_m": 0.7, "amplitude_n_m": 0.5} | GIVEN,
      "design.crest-factor-not-reached", None),
     ({"resolution_n_m": 1e-320}, "usage.out-of-range", "resolution_n_m"),
-    ({"kind": "prbs", "order": 20, "held_ticks": 10**21}, "grid.window-too-long", None),
+    ({"kind": "prbs", "order": 20, "rate_divider": 10**21}, "grid.window-too-long", None),
     ({"kind": "prbs", "band_hz": [20, 20], "resolution_hz": 1}, "grid.band-without-line", "band_hz"),
     ({"lines": "20:140:20"}, "usage.conflict", "band_hz"),
     ({"window": 400, "resolution_hz": 20}, "usage.conflict", "window"),
@@ -320,7 +320,7 @@ def test_small_settings_of_the_excitations_are_checked():
     for make, code, argument in (
         (lambda: low_crest_phases([1, 2], starts=0), "usage.out-of-range", "starts"),
         (lambda: low_crest_phases([1, 2], [1.0]), "usage.wrong-shape", "amplitude"),
-        (lambda: prbs(3, held_ticks=0), "usage.out-of-range", "held_ticks"),
+        (lambda: prbs(3, rate_divider=0), "usage.out-of-range", "rate_divider"),
         (lambda: stepped_sine(LINES, periods=0), "usage.out-of-range", "periods"),
         (lambda: stepped_sine(LINES, periods=10**6), "grid.window-too-long", None),
         (lambda: stepped_sine(many, periods=1), "grid.window-too-long", None),

@@ -93,7 +93,7 @@ def runs(tmp_path_factory):
         f"[loop.velocity]\ngain = {drive.velocity_gain_n_m_s}\nintegral_time_s = {drive.integral_time_s}\n"
         f"rate_hz = {drive.velocity_rate_hz}\nheld_ticks = {drive.velocity_ticks}\n"
         f"[loop.position]\ngain = {drive.position_gain_per_s}\nrate_hz = {drive.position_rate_hz}\n"
-        f"held_ticks = {drive.position_ticks}\n"
+        f"rate_divider = {drive.position_ticks}\n"
     )
     for name, output in (("speed", "speed"), ("theta", "theta")):
         (folder / f"{name}.toml").write_text(

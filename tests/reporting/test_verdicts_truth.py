@@ -15,7 +15,7 @@ import pytest
 
 from livebode.analysis.difference import Difference
 from livebode.core import Event
-from livebode.core.clock import moment
+from livebode.core.clock import date_and_time
 from livebode.fitting import mean_response
 from livebode.report.html import to_html
 from livebode.reporting.compare_report import Comparison
@@ -111,6 +111,9 @@ def zone() -> Iterator[None]:
 def test_a_moment_since_1970_is_the_local_time_of_day_with_its_zone() -> None:
     for local, zone in (("2026-07-01 14:32:07", "CEST"), ("2026-12-01 14:32:07", "CET")):
         stamp = time.mktime(time.strptime(local, "%Y-%m-%d %H:%M:%S"))
-        assert moment(stamp) == f"{local} {zone}"
+        assert date_and_time(stamp) == f"{local} {zone}"
     autumn = datetime(2026, 10, 25, 0, 30, tzinfo=UTC).timestamp()  # 02:30 comes twice that night
-    assert [moment(autumn), moment(autumn + 3600)] == ["2026-10-25 02:30:00 CEST", "2026-10-25 02:30:00 CET"]
+    assert [date_and_time(autumn), date_and_time(autumn + 3600)] == [
+        "2026-10-25 02:30:00 CEST",
+        "2026-10-25 02:30:00 CET",
+    ]

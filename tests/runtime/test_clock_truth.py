@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from datetime import datetime
 from pathlib import Path
@@ -11,15 +12,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.core import Event
-from livebode.core.clock import RunClock, moment, moments_by
+from livebode.configuration import Axis
+from livebode.core import ConfigError, Event, UsageError
+from livebode.core.clock import RunClock, date_and_time, moment, moment_of_start, moments_by
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 from livebode.records import RunRecord
 from livebode.records.query import query
+from livebode.records.summary_file import RUN, to_document
+from livebode.runtime import Destination, run
 from livebode.runtime.clock_relation import STEP_S, ClockRelation
-from livebode.sources.live import LiveBlock
-from tests.support.command import livebode
+from livebode.sources import open_log
+from livebode.sources.live import LiveBlock, SourceSettings, make_source
+from tests.support.command import livebode, signals, write_csv
+from tests.support.errors import refused
 from tests.support.live_session import LiveSession
 from tests.support.peers.peer import batches, until
 from tests.support.peers.plain import TcpPeer
@@ -137,3 +143,58 @@ def test_a_live_run_whose_sender_numbers_from_0_is_dated_everywhere_the_same(tmp
     assert state.span()["clock"] == [(0.0, unix_s)]
     assert livebode("report", session.run).code == 0
     assert shown in (session.run / "report.html").read_text()
+
+
+def dated_run(folder: Path, first_s: float, **source: object) -> RunRecord:
+    """A run on a recording whose time column begins at this second."""
+    folder.mkdir()
+    columns = signals(1000)
+    log = write_csv(folder / "log.csv", {"t": first_s + np.arange(1000) / 1000, **{n: columns[n] for n in "wuy"}})
+    data = {
+        "source": {"log": str(log)} | source,
+        "signals": {"output": "y", "input": "u", "excitation": "w"},
+        "lines": {"frequencies": "50,100,200", "window": 100},
+    }
+    return RunRecord.open(run(Axis.of(data, "test"), Destination(folder / "run", lambda *_: None)).directory)
+
+
+@pytest.mark.parametrize(
+    ("first_s", "declared", "kind"),
+    [
+        (1_790_000_000.0, None, "utc"), (5.0, None, "relative"), (9e7, None, "relative"),
+        (1_790_000_000.0, "relative", "relative"), (5.0, "utc", "utc"),
+    ],
+)  # fmt: skip
+def test_a_recording_is_dated_by_its_declared_clock_or_else_by_its_first_time(
+    tmp_path: Path, first_s: float, declared: str | None, kind: str
+) -> None:
+    found = dated_run(tmp_path / "a", first_s, **({} if declared is None else {"clock": declared}))
+    newest_s = found.responses().time_s[-1]
+    assert first_s < newest_s < first_s + 1.0
+    assert (found.found["clock"], found.clock.utc) == (kind, kind == "utc")
+    with moments_by(found.clock):
+        assert moment(newest_s) == (date_and_time(newest_s) if kind == "utc" else f"{newest_s:.1f} s")
+        assert moment_of_start() == ""
+    assert "clock" not in found.summary
+
+
+def test_a_run_without_a_recorded_kind_is_dated_by_its_first_response(tmp_path: Path) -> None:
+    for name, first_s, utc in (("dated", 1_790_000_000.0, True), ("relative", 5.0, False)):
+        path = dated_run(tmp_path / name, first_s).path
+        older = json.loads((path / RUN).read_text())
+        del older["found"]["clock"], older["crc32"]
+        (path / RUN).write_bytes(to_document(older))
+        assert RunRecord.open(path).clock.utc == utc
+
+
+def test_a_kind_of_clock_without_a_time_column_or_for_a_live_source_is_rejected(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", {name: values for name, values in signals(200).items() if name != "t"})
+    with refused(UsageError, "conflict", argument="clock"):
+        open_log(path, rate_hz=1000, clock="utc")
+    assert open_log(path, rate_hz=1000, clock="relative").clock_kind == "relative"
+    with refused(ConfigError, "key-unused", key="source.clock"):
+        make_source(SourceSettings(url="udp://127.0.0.1:5000", clock="utc"))
+    with pytest.raises(
+        ConfigError, match=r"source\.clock = 'local' is not usable: input should be 'utc' or 'relative'"
+    ):
+        Axis.of({"source": {"log": "a", "clock": "local"}, "signals": {"output": "y"}}, "axis.toml")

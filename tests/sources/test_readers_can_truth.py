@@ -100,7 +100,7 @@ def test_without_a_dbc_the_command_says_that_it_is_needed(tmp_path, name):
         open_log(path)
     result = livebode("inspect", path)
     assert (result.code, result.err.count("\n")) == (2, 1)
-    assert "give --dbc FILE, or dbc in [source]" in result.err
+    assert "set dbc to the file that defines them (option --dbc)" in result.err
     result = livebode("inspect", path, "--dbc", dbc)
     assert (result.code, "Drive.Torque" in result.out) == (0, True)
     with refused(RecordingError, "no-frames", path=str(dbc)):

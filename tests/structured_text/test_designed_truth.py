@@ -33,7 +33,7 @@ window = 20
 [loop.velocity]
 gain = 1.0
 rate_hz = 500.0
-held_ticks = 2
+rate_divider = 2
 """
 RATED = AXIS.replace("[signals]", "rate_hz = 2000.0\n[signals]")
 AUTO = AXIS.replace('frequencies = "50, 150, 350"\nwindow = 20', "")

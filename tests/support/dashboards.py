@@ -31,7 +31,7 @@ UNITS = {"w": "N m", "u": "N m", "y": "rad/s", "x": "m"}
 SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="x", hop=40)
 LOOP = {
     "velocity": {"gain": 0.2308, "integral_time_s": 0.2, "rate_hz": RATE_HZ},
-    "position": {"gain": 1.0, "rate_hz": RATE_HZ / 2, "held_ticks": 2},
+    "position": {"gain": 1.0, "rate_hz": RATE_HZ / 2, "rate_divider": 2},
 }
 FIT = {"model": "two-mass", "output": "velocity", "radius_m": 0.019}
 SAMPLES = 12_000

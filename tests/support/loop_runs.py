@@ -33,7 +33,7 @@ delay_ticks = {delay}
 [loop.position]
 gain = 1.0
 rate_hz = 2000
-held_ticks = 2
+rate_divider = 2
 [fit]
 model = "two-mass"
 output = "velocity"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.analysis.overview import Overview
-from livebode.core import Response, Responses
+from livebode.core import PlantKinds, Response, Responses
 from livebode.estimation import Movement
 from livebode.fitting import RunningMean
 from livebode.records import RunRecord
@@ -22,6 +22,8 @@ class Averaged:
     ----------
     response
         The mean of all responses; for a run with tracking.average the newest valid one.
+    kinds
+        Kinds of the plant's output and input.
     words
         Description of the average.
     overview
@@ -37,6 +39,7 @@ class Averaged:
     """
 
     response: Response
+    kinds: PlantKinds
     words: str
     overview: Responses
     count: int
@@ -65,6 +68,7 @@ def averaged(run: RunRecord) -> Averaged:
         words = f"the average up to {one.time_s:.6g} s"
     found = Averaged(
         one,
+        run.kinds,
         words,
         overview.responses(),
         counted.rows,

@@ -17,8 +17,9 @@ from livebode.records import RunRecord
 def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
     """A model fitted to a finished run, and a description of what it was fitted to.
 
-    For a run that averages, the newest valid response; else the mean of all. If neither configuration nor unit
-    determine whether the output is a velocity or a position, the one with the smaller misfit is used.
+    For a run that averages, the newest valid response; else the mean of all. If the run has no units, and its
+    configuration does not specify whether the output is a velocity or a position, the one with the smaller misfit is
+    used.
     """
     return fit_averaged(averaged(RunRecord.open(directory)), section)
 
@@ -29,9 +30,9 @@ def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
     if not one.unit:
         words += "; the run has no units: N m, and rad/s or rad are assumed"
     sections = [section]
-    if section.output == "auto" and not one.unit:
+    if section.output == "auto" and of.kinds.output is None:
         sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]
-    found = [fit(one, chosen_model(s, one.unit), **fit_settings(s)) for s in sections]
+    found = [fit(one, chosen_model(s, of.kinds), **fit_settings(s)) for s in sections]
     return min(found, key=lambda f: f.epsilon if f.status == "ok" else np.inf), words
 
 

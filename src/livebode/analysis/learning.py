@@ -162,11 +162,11 @@ def _joined(batches: list[list[Rows]]) -> list[Rows]:
 
 def _parameters(runs: list[RunRecord], section: FitSection) -> ScheduleTable:
     """The table of the fits; they are repeated, because a run's parameters.parquet has no covariance."""
-    model = fitter_of(section, runs[0].found["unit"])
+    model = fitter_of(section, runs[0].kinds)
     names = [name for name in model.model.names if name not in model.held]
     rows = []
     for run in runs:
-        fitter, each = fitter_of(section, run.found["unit"]), _apart(run)
+        fitter, each = fitter_of(section, run.kinds), _apart(run)
         fitted = (fitter.process(batch).only(names) for batch in run.steady_batches())
         rows += _joined([[apart.of_parameters(part) for apart in each] for part in fitted])
     return learn_table("parameters", names, rows, len(_apart(runs[0])))
@@ -208,7 +208,14 @@ def _samples(axis: Axis) -> Callable[[], Iterator[Block]]:
     def blocks() -> Iterator[Block]:
         source, output = axis.source, axis.signals.output
         assert source.log is not None
-        log = open_log(source.log, rate_hz=source.rate_hz, time=source.time, dbc=source.dbc, channels=[output])
+        log = open_log(
+            source.log,
+            rate_hz=source.rate_hz,
+            time=source.time,
+            kinds=source.kinds,
+            dbc=source.dbc,
+            channels=[output],
+        )
         return log.blocks(names)
 
     return blocks

@@ -32,6 +32,7 @@ from livebode.cli.plc_command import plc_command
 from livebode.cli.query_command import query_command
 from livebode.cli.report_command import report_command
 from livebode.cli.run_command import run_command
+from livebode.cli.schema_command import schema_command
 from livebode.cli.terminal import protect, unchecked_output
 from livebode.cli.validate_command import validate_command
 from livebode.cli.view_command import view_command
@@ -101,6 +102,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "compare": compare_command,
     "view": view_command,
     "doctor": doctor_command,
+    "schema": schema_command,
 }
 for _name, _command in _COMMANDS.items():
     app.command(_name, cls=_Command)(with_log(_command))

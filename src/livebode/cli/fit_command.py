@@ -24,7 +24,7 @@ def fit_command(
     ] = None,
     output: Annotated[
         str | None,
-        typer.Option(help="Quantity of y: velocity, position or auto (by its unit; without one, the better fit)."),
+        typer.Option(help="Quantity of y: velocity, position or auto (by its kind; without a unit, the better fit)."),
     ] = None,
     side: Annotated[str | None, typer.Option(help="Where y is measured: motor or load. \\[default: motor]")] = None,
     radius: Annotated[

@@ -110,15 +110,15 @@ def _show_recording(found: Inspection, console: Console) -> None:
         jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"
     console.print(f"{found.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
     table = Table(box=None, header_style="bold")
-    for heading in ("channel", "unit", "from", "to", "not finite"):
-        table.add_column(heading, justify="left" if heading in ("channel", "unit") else "right")
+    for heading in ("channel", "unit", "kind", "from", "to", "not finite"):
+        table.add_column(heading, justify="left" if heading in ("channel", "unit", "kind") else "right")
     for channel in found.channels:
         extent = [f"{x:.6g}" for x in (channel.minimum, channel.maximum)]
         if channel.minimum > channel.maximum:
             extent = ["empty", ""]
         elif channel.minimum == channel.maximum:
             extent[1] = "constant"
-        table.add_row(channel.name, channel.unit, *extent, str(channel.not_finite or ""))
+        table.add_row(channel.name, channel.unit, channel.kind, *extent, str(channel.not_finite or ""))
     console.print(table)
     for skipped in log.skipped:
         console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")

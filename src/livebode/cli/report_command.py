@@ -31,7 +31,7 @@ def report_command(
 
     An existing report in the run directory is replaced. The PDF needs the extra `pdf`.
     """
-    from livebode.core.clock import RunClock, moments_by
+    from livebode.core.clock import moments_by
     from livebode.language import in_language
     from livebode.records import RunRecord, to_json
     from livebode.reporting.report_data import Judged
@@ -46,7 +46,7 @@ def report_command(
         section = FitSection.model_validate(recorded_configuration(RunRecord.open(directory).summary).get("fit", {}))
         found, notes = validate_run(directory, on, [section])
         judged = Judged(on.name, tuple(found), tuple(notes))
-    with moments_by(RunClock.of(RunRecord.open(directory, on_damage=lambda _: None).summary)), in_language(language):
+    with moments_by(RunRecord.open(directory, on_damage=lambda _: None).clock), in_language(language):
         document = run_report(directory, judged, made=datetime.now(UTC))
         files, remark = write_documents(document, out or directory / "report", force=force or out is None)
     if as_json:

@@ -13,8 +13,8 @@ from livebode.configuration.toml_file import parse_table, read_bytes, shortened
 from livebode.core import ConfigError, LivebodeError
 
 AXES_MAX = 64
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
-_SUCCESSOR = re.compile(r".*-[0-9]+")
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+SUCCESSOR = re.compile(r".*-[0-9]+")
 Axes = Mapping[str, Axis]
 """Axes by name; the only axis of a file without [axes] has the empty name."""
 
@@ -122,7 +122,7 @@ def merged(below: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_name(name: str, origin: str) -> None:
-    if not _NAME.fullmatch(name):
+    if not NAME.fullmatch(name):
         raise ConfigError(
             "axis-name-invalid",
             f"the axis {shortened(name)} cannot be the name of a directory",
@@ -130,7 +130,7 @@ def _check_name(name: str, origin: str) -> None:
             key="axes",
             value=shortened(name),
         ).at(origin)
-    if _SUCCESSOR.fullmatch(name):
+    if SUCCESSOR.fullmatch(name):
         raise ConfigError(
             "axis-name-invalid",
             f"the axis {name!r} has a name that is reserved for a run that continues another",

@@ -39,7 +39,20 @@ class _Section(BaseModel):
 
 
 class SignalsSection(_Section):
-    """[signals]: channel names."""
+    """[signals]: names of the channels.
+
+    Parameters
+    ----------
+    output
+        Channel y, the response of the machine: a velocity or a position.
+    input
+        Channel u, the input of the plant, such as the torque or the current. Required by the estimators "direct" and
+        "joint".
+    excitation
+        Channel w, the excitation that is added in the loop. Required by the estimators "joint" and "indirect".
+    schedule
+        Channel over which responses are shown, such as the position.
+    """
 
     output: str
     input: str | None = None
@@ -48,14 +61,57 @@ class SignalsSection(_Section):
 
 
 class LinesSection(_Section):
-    """[lines]: frequencies as in `Lines.parse`, or "auto"; the window in samples, or "auto"."""
+    """[lines]: the excited frequencies and the window.
+
+    Parameters
+    ----------
+    frequencies
+        Excited lines in Hz as start:stop:step or single values, joined by commas: "20:140:20, 175"; "k=1:300" counts in
+        bins of the window. "auto": from the excitation of the recording.
+    window
+        Length of the window in samples. "auto": the measured period of the excitation.
+    """
 
     frequencies: str = "auto"
     window: int | Literal["auto"] = "auto"
 
 
 class TrackingSection(_Section):
-    """[tracking]: options of `livebode.estimation.Settings`, and whether the roles of the channels are accepted."""
+    """[tracking]: how responses and their bounds are estimated.
+
+    Parameters
+    ----------
+    estimator
+        "direct" from input and output, "joint" from both by the excitation, "indirect" from the closed loop and the
+        controllers in [loop].
+    quantity
+        The response that is estimated. All but "plant" need the controllers in [loop].
+    hop
+        Samples between responses. Default: for a recording a twentieth of the window, for a live source 20 responses
+        per second; the nearest divisor of the window.
+    average
+        Average over the previous periods, weighted by forgetting, instead of using only the newest window.
+    forgetting
+        Weight of a period relative to the next one; 1 forgets nothing.
+    noise
+        Source of the bounds. "auto": the scatter between periods and, where the schedule moves, the detection lines
+        (non-excited bins). "periods": always the scatter. "quiet": the larger of the two at standstill.
+    differenced
+        Channels that are differenced before the DFT: a position that drifts.
+    hann
+        Use a Hann window, from three bins.
+    spikes
+        Channels that are checked for spikes; windows with a spike are excluded.
+    dtype
+        Number format of the kernel; "float32" gives the result of a drive without double precision.
+    ripple
+        Orders of a torque ripple, such as [[201.0, 0.05]]: cycles per unit of the schedule, and amplitude in the unit
+        of the input. The bounds contain it. Default: from the baseline, or found with [motion].
+    accept_roles
+        Accept the roles in [signals] whatever the recording shows.
+    all_periods
+        Include a transient at the start of a recording.
+    """
 
     estimator: Literal["direct", "joint", "indirect"] = "joint"
     quantity: Quantity = "plant"
@@ -73,7 +129,17 @@ class TrackingSection(_Section):
 
 
 class MotionSection(_Section):
-    """[motion]: removes the effect of the axis's motion from responses; see `livebode.motion.MotionCorrection`."""
+    """[motion]: with this section the effect of the axis's motion is removed from the responses.
+
+    Parameters
+    ----------
+    radius_m
+        Radius of the pulley: metres of travel per radian of the motor.
+    chunk_s
+        Seconds that are fitted together: one stroke. Responses are delayed by this time.
+    driven_by
+        The signal that drives the model. "excitation" needs the controllers in [loop].
+    """
 
     radius_m: Positive
     chunk_s: Positive = 4.0
@@ -81,8 +147,18 @@ class MotionSection(_Section):
 
 
 class MonitoringSection(_Section):
-    """[monitoring]: the baseline, the mean time between false alarms in days of judged motion, and the channels that a
-    baseline's parameters may depend on."""
+    """[monitoring]: comparison with a baseline.
+
+    Parameters
+    ----------
+    baseline
+        File from `livebode learn`, relative to this file: the run is compared with it. Default: none.
+    covariates
+        Channels on which the parameters of a baseline may depend, such as a temperature; the same in all runs that are
+        learned. A run with a baseline uses the covariates of the baseline.
+    false_alarm_interval_days
+        Mean time between false alarms, at least, in days of judged motion.
+    """
 
     baseline: File | None = None
     covariates: Annotated[list[str], Field(max_length=4)] = []
@@ -90,14 +166,42 @@ class MonitoringSection(_Section):
 
 
 class _ControllerSection(_Section):
+    """What all controllers have.
+
+    Parameters
+    ----------
+    rate_hz
+        Computations of the controller per second, in Hz.
+    rate_divider
+        Samples of the recording for which one output is held: the sampling rate divided by rate_hz.
+    hold
+        "zero-order": the output is held between computations. "none": the controller interpolates.
+    delay_ticks
+        Delay between reading the input and acting, in samples of the recording, in addition to the hold.
+    """
+
     rate_hz: Positive
-    held_ticks: Annotated[int, Field(ge=1)] = 1
+    rate_divider: Annotated[int, Field(ge=1)] = 1
     hold: Literal["zero-order", "none"] = "zero-order"
     delay_ticks: Ticks = 0
 
 
 class PIDSection(_ControllerSection):
-    """[loop.velocity] and [loop.position]: see `livebode.core.PID`."""
+    """A controller gain·(1 + I/Ti + Td·D/(1 + Tf·D)).
+
+    Parameters
+    ----------
+    gain
+        Proportional gain: of [loop.velocity] in units of the input per unit of velocity, of [loop.position] in 1/s.
+    integral_time_s
+        Integral time Ti in seconds. Default: no integrator.
+    derivative_time_s
+        Derivative time Td in seconds; 0: no derivative.
+    derivative_filter_s
+        Time constant Tf of the derivative's filter in seconds; 0: no filter.
+    integrator
+        Integration rule.
+    """
 
     gain: float
     integral_time_s: Annotated[float, Field(gt=0)] = inf
@@ -107,7 +211,17 @@ class PIDSection(_ControllerSection):
 
 
 class PositionPDSection(_ControllerSection):
-    """[loop.position_pd]: see `livebode.core.PositionPD`."""
+    """[loop.position_pd]: a PD controller kv·(kp + D) of the position, instead of [loop.velocity] and [loop.position].
+
+    Parameters
+    ----------
+    position_gain
+        Position gain kp in 1/s.
+    velocity_gain
+        Velocity gain kv, in units of the input per unit of velocity.
+    smoothed
+        D is the difference of the means of two neighbouring positions.
+    """
 
     position_gain: float
     velocity_gain: float
@@ -115,7 +229,27 @@ class PositionPDSection(_ControllerSection):
 
 
 class LoopSection(_Section):
-    """[loop]: the controllers, the injection point of the excitation, and the times at which signals are logged."""
+    """[loop]: the controllers, the injection point of the excitation, and the times at which signals are logged.
+
+    Parameters
+    ----------
+    excitation_at
+        Injection point: where the excitation is added.
+    entry_gain
+        Injection gain: factor on the excitation at the injection point.
+    input_logged
+        The input is logged before or after the controller's update.
+    excitation_logged
+        The excitation is logged before or after the controller's update.
+    output_logged
+        The output is logged before or after the controller's update.
+    velocity
+        The velocity controller. It belongs to an output that is a velocity.
+    position
+        The position controller around the velocity controller.
+    position_pd
+        The whole controller of an output that is a position.
+    """
 
     excitation_at: Literal["plant input", "velocity reference", "output"] = "plant input"
     entry_gain: float = 1.0
@@ -130,17 +264,17 @@ class LoopSection(_Section):
         """The Loop of this description, recorded at `rate_hz`; ConfigError if its parts do not form one."""
         for name in ("velocity", "position", "position_pd"):
             part: _ControllerSection | None = getattr(self, name)
-            if part is not None and abs(part.rate_hz * part.held_ticks / rate_hz - 1) > SAME_RATE:
-                held = counted(part.held_ticks, "tick")
+            if part is not None and abs(part.rate_hz * part.rate_divider / rate_hz - 1) > SAME_RATE:
+                held = counted(part.rate_divider, "tick")
                 raise ConfigError(
                     "rate-mismatch",
                     f"loop.{name} has a rate of {part.rate_hz:g} Hz and holds {held}, which gives "
-                    f"{part.rate_hz * part.held_ticks:g} Hz, but the sampling rate is {rate_hz:g} Hz",
-                    "set held_ticks to the sampling rate divided by the rate of the controller",
+                    f"{part.rate_hz * part.rate_divider:g} Hz, but the sampling rate is {rate_hz:g} Hz",
+                    "set rate_divider to the sampling rate divided by the rate of the controller",
                     key=f"loop.{name}",
                     rate_hz=rate_hz,
                     controller_rate_hz=part.rate_hz,
-                    held_ticks=part.held_ticks,
+                    rate_divider=part.rate_divider,
                 )
         return Loop(
             feedback=self._feedback(),
@@ -196,7 +330,17 @@ class LoopSection(_Section):
 
 
 class RecordSection(_Section):
-    """[record]: the run is recorded in segments that survive a kill (docs/reference/run-directory.md)."""
+    """[record]: the run is recorded in segments that survive a kill, also if the section is empty.
+
+    Parameters
+    ----------
+    samples
+        Also record the raw samples of the channels in use.
+    budget_bytes
+        Maximum size of the record in bytes: the oldest segments are removed, events never. Default: no limit.
+    segment_s
+        Machine time in one segment, in seconds.
+    """
 
     samples: bool = False
     budget_bytes: Annotated[int, Field(ge=BUDGET_BYTES_MIN)] | None = None
@@ -204,7 +348,33 @@ class RecordSection(_Section):
 
 
 class ServeSection(_Section):
-    """[serve]: address of `livebode run --serve`, and access to it (docs/how-to/dashboard.md)."""
+    """[serve]: address of the dashboard (`livebode run --serve`), and access to it.
+
+    Parameters
+    ----------
+    address
+        Address to listen on. Any other than the loopback needs a token and TLS.
+    port
+        TCP port; 0 selects a free port. `--port` overrides it.
+    names
+        Host names by which a browser may open the page, in addition to IP addresses and localhost.
+    token_env
+        Environment variable with the token of users who may acknowledge.
+    token_file
+        File with the token of users who may acknowledge, relative to this file.
+    viewer_token_env
+        Environment variable with the token of users who may only view.
+    viewer_token_file
+        File with the token of users who may only view, relative to this file.
+    certificate_file
+        Certificate for TLS in PEM, relative to this file.
+    key_file
+        Private key for TLS in PEM, relative to this file.
+    read_only
+        Nobody may acknowledge.
+    language
+        Language of the page; the choice of a user overrides it. Default: that of the browser.
+    """
 
     address: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8765
@@ -225,7 +395,29 @@ class ServeSection(_Section):
 
 
 class FitSection(_Section):
-    """[fit]: the model that is fitted to every response; see `livebode.fitting.Fitter`."""
+    """[fit]: with this section a model is fitted to every response.
+
+    Parameters
+    ----------
+    model
+        The model. "auto": two-mass if the input is a torque in N m or radius_m is given, otherwise two-mass-gain.
+    output
+        What the output is. "auto": by its kind, velocity if it has neither a unit nor a kind.
+    side
+        Where the output is measured. Default: motor.
+    radius_m
+        Radius of a belt's pulley in metres: the load is then a mass in kg, without it an inertia in kg m².
+    inertia_ratio
+        Load inertia divided by motor inertia, if known.
+    fixed
+        Parameters with a fixed value, such as { Js = 0.0028 }, in the unit of the parameter.
+    free
+        Additional parameters to fit, such as ["delay", "BL"].
+    band_hz
+        Lowest and highest frequency of the lines that are fitted, in Hz. Default: all lines.
+    hold
+        Hold of the sampled plant; "none" for the response of a plant without a sampling hold.
+    """
 
     model: str = "auto"
     output: Literal["auto", "velocity", "position"] = "auto"
@@ -239,7 +431,31 @@ class FitSection(_Section):
 
 
 class Axis(_Section):
-    """One machine: its source, signals, lines, tracking and loop."""
+    """One machine: its source, signals, lines, tracking and loop.
+
+    Parameters
+    ----------
+    source
+        The recording, or the live source.
+    signals
+        Names of the channels.
+    lines
+        The excited frequencies and the window.
+    tracking
+        How responses and their bounds are estimated.
+    loop
+        The controllers, the injection point of the excitation, and the times at which signals are logged.
+    record
+        The run is recorded in segments that survive a kill.
+    motion
+        The effect of the axis's motion is removed from the responses.
+    fit
+        A model is fitted to every response.
+    monitoring
+        Comparison with a baseline.
+    serve
+        Address of the dashboard, and access to it.
+    """
 
     source: SourceSettings
     signals: SignalsSection

@@ -5,43 +5,56 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from livebode.configuration.axis import FitSection
+from livebode.core import ConfigError, PlantKinds
 from livebode.fitting import Fitter, PhysicalModel, model_named
 
-_POSITIONS = ("rad", "m", "deg", "mm")
 
-
-def fitter_of(section: FitSection, unit: str) -> Fitter:
-    """The section's Fitter for responses of this unit."""
-    return Fitter(chosen_model(section, unit), **fit_settings(section))
+def fitter_of(section: FitSection, kinds: PlantKinds) -> Fitter:
+    """The section's Fitter for the response of a plant of these kinds; ConfigError as in `chosen_model`."""
+    return Fitter(chosen_model(section, kinds), **fit_settings(section))
 
 
 def check_fit(section: FitSection) -> None:
-    """LivebodeError if this model can never be fitted; with "auto" the unit determines the model later."""
+    """LivebodeError if this model can never be fitted; with "auto" the kinds determine the model later."""
     if section.model != "auto":
-        fitter_of(section, "")
+        fitter_of(section, PlantKinds())
 
 
-def chosen_model(section: FitSection, unit: str) -> PhysicalModel:
-    """The section's model; "auto" is two masses if the input is a torque, else two masses with an unknown gain."""
+def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
+    """The section's model; "auto" is two masses if the input is a torque, else two masses with an unknown gain.
+
+    A torque that is not in N m also has an unknown gain: the parameters of two masses are in SI units.
+
+    Raises
+    ------
+    ConfigError
+        If the section does not specify the output, and its kind is neither a velocity nor a position.
+    """
     name = section.model
     if name == "auto":
-        name = "two-mass" if unit.endswith("/(N m)") or section.radius_m else "two-mass-gain"
+        torque = kinds.input == "torque" and kinds.input_factor == 1.0
+        name = "two-mass" if torque or section.radius_m else "two-mass-gain"
     output = section.output
     if output == "auto":
-        output = output_of(unit) or "velocity"
+        output = _output_of(kinds)
     options = {"side": section.side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
     return model_named(name, output=output, **options)
 
 
-def output_of(unit: str) -> Literal["velocity", "position"] | None:
-    """Whether a response of this unit leads to a position or a velocity; None where it has no unit.
-
-    >>> output_of("rad/(N m)"), output_of("rad/s/(N m)"), output_of("")
-    ('position', 'velocity', None)
-    """
-    if not unit:
-        return None
-    return "position" if unit.split("/(")[0] in _POSITIONS else "velocity"
+def _output_of(kinds: PlantKinds) -> Literal["velocity", "position"]:
+    if kinds.output is None:
+        return "velocity"
+    if kinds.output == "velocity" or kinds.output == "position":
+        return kinds.output
+    shown = "is not recognised from its unit" if kinds.output == "other" else f"is {kinds.output!r}"
+    raise ConfigError(
+        "kind-needed",
+        f"a model is fitted to a velocity or a position, but the kind of the output {shown}",
+        "declare it, as in source.kinds = { y = 'velocity' }, or set fit.output",
+        key="source.kinds",
+        value=kinds.output,
+        allowed=["velocity", "position"],
+    )
 
 
 def fit_settings(section: FitSection) -> dict[str, Any]:

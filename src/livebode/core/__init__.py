@@ -5,9 +5,11 @@ from livebode.core._event import Emit, Event, hand_over, ignore
 from livebode.core._frequency_response import PER_LINE, Quantity
 from livebode.core._kinds import PlotKind
 from livebode.core._loop import Loop
+from livebode.core._plant_kinds import PlantKinds
 from livebode.core._plotting import plot_responses
 from livebode.core._response import PER_RESPONSE, Response, Responses, widened
 from livebode.core._spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
+from livebode.core._unit_reading import QuantityKind, UnitReading, read_unit, split_plant_unit
 from livebode.core._wording import counted, rounded_down
 from livebode.core.controllers import PID, Cascade, PositionPD
 from livebode.core.errors import (
@@ -59,9 +61,11 @@ __all__ = [
     "Model",
     "OutputError",
     "Parameters",
+    "PlantKinds",
     "PlotKind",
     "PositionPD",
     "Quantity",
+    "QuantityKind",
     "RecordError",
     "RecordingError",
     "Response",
@@ -76,6 +80,7 @@ __all__ = [
     "StateError",
     "Stateful",
     "StatefulBase",
+    "UnitReading",
     "UsageError",
     "as_model",
     "counted",
@@ -83,7 +88,9 @@ __all__ = [
     "ignore",
     "nearest_name",
     "plot_responses",
+    "read_unit",
     "rms",
     "rounded_down",
+    "split_plant_unit",
     "widened",
 ]

@@ -9,21 +9,65 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core._unit_reading import KINDS, QuantityKind, read_unit
 from livebode.core.errors import SignalError, UsageError
 
 
 @dataclass(frozen=True)
 class Channel:
-    """Name and unit of one recorded signal; the unit is empty where the source does not report it.
+    """Name, unit and kind of quantity of one recorded signal.
+
+    Attributes
+    ----------
+    name
+        Its name in the source.
+    unit
+        Empty where the source does not report it.
+    kind
+        The quantity that it is: torque, force, current, velocity, position, acceleration or other. Default: the one
+        that the unit shows, "other" for a unit that is not recognised.
+
+    Raises
+    ------
+    UsageError
+        If `kind` is not one of these.
 
     Examples
     --------
     >>> Channel("iq", "A")
-    Channel(name='iq', unit='A')
+    Channel(name='iq', unit='A', kind='current')
+    >>> Channel("speed", "counts", "velocity").kind
+    'velocity'
     """
 
     name: str
     unit: str = ""
+    kind: QuantityKind = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        declared: str | None = self.kind
+        if declared is None:
+            object.__setattr__(self, "kind", read_unit(self.unit).kind)
+        elif declared not in KINDS:
+            raise UsageError(
+                "not-one-of",
+                f"channel {self.name!r} has kind {self.kind!r}",
+                f"choose one of {', '.join(KINDS)}",
+                argument="kind",
+                value=self.kind,
+                allowed=list(KINDS),
+            )
+
+    @property
+    def stated_kind(self) -> QuantityKind | None:
+        """The kind; None where the source reports no unit, and no kind is declared."""
+        return None if self.kind == "other" and not self.unit else self.kind
+
+    @property
+    def factor(self) -> float:
+        """SI units in one unit of the channel; 1 where the unit does not show the kind."""
+        reading = read_unit(self.unit)
+        return reading.factor if reading.kind == self.kind else 1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,7 +46,7 @@ class Loop:
 
     >>> from livebode import PID, Cascade
     >>> velocity = PID(gain=0.2308, integral_time_s=0.2, rate_hz=4000)
-    >>> loop = Loop(feedback=Cascade(velocity=velocity, position=PID(gain=1.0, rate_hz=2000, held_ticks=2)))
+    >>> loop = Loop(feedback=Cascade(velocity=velocity, position=PID(gain=1.0, rate_hz=2000, rate_divider=2)))
     >>> loop.feedback_at([20.0, 140.0]).shape
     (2,)
     """

@@ -8,12 +8,24 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from datetime import datetime
-from math import isfinite
-from typing import Any
+from math import isfinite, nan
+from typing import Any, Literal
 
 from livebode.language import date, number
 
-_EPOCH_FROM_S, _EPOCH_TO_S = 1e8, 1e11  # years 1973 … 5138; a run's own clock stays below three years
+ClockKind = Literal["utc", "relative"]
+"""Whether times are seconds since 1970 in UTC, or seconds since any other moment."""
+_SINCE_1970_S = 1e8  # 1973, and three years: no recording since 1970 begins before, and no machine runs that long
+_DATES_TO_S = 1e11  # year 5138: `datetime` ends in 9999
+
+
+def clock_kind_of(time_s: float) -> ClockKind:
+    """The kind of a clock that nobody stated, from one of its times: the only place that guesses.
+
+    >>> clock_kind_of(86400.0), clock_kind_of(1_700_000_000.0), clock_kind_of(float("nan"))
+    ('relative', 'utc', 'relative')
+    """
+    return "utc" if _SINCE_1970_S < time_s < _DATES_TO_S else "relative"
 
 
 @dataclass
@@ -35,9 +47,25 @@ class RunClock:
     pieces: list[tuple[float, float]] = field(default_factory=list)
 
     @classmethod
-    def of(cls, summary: dict[str, Any]) -> RunClock:
-        """The clock that run.json records."""
-        return cls([(float(from_s), float(unix_s)) for from_s, unix_s in summary.get("clock") or ()])
+    def of(cls, summary: dict[str, Any], time_s: float = nan) -> RunClock:
+        """The clock that run.json records; where an older version did not record its kind, `time_s` of the run counts.
+
+        >>> RunClock.of({"found": {"clock": "utc"}}).unix_s(1e9), RunClock.of({}, 12.0).unix_s(12.0)
+        (1000000000.0, None)
+        """
+        if pieces := summary.get("clock"):
+            return cls([(float(from_s), float(unix_s)) for from_s, unix_s in pieces])
+        return cls.of_kind(summary.get("found", {}).get("clock") or clock_kind_of(time_s))
+
+    @classmethod
+    def of_kind(cls, kind: ClockKind) -> RunClock:
+        """The clock of a recording: its times are since 1970, or their relation to the time of day is not known."""
+        return cls([(0.0, 0.0)] if kind == "utc" else [])
+
+    @property
+    def utc(self) -> bool:
+        """Whether the times of the run are seconds since 1970."""
+        return self.pieces == [(0.0, 0.0)]
 
     def unix_s(self, time_s: float) -> float | None:
         """Seconds since 1970; None where nothing is known."""
@@ -66,15 +94,14 @@ def moment(time_s: float, digits: int = 1) -> str:
     Parameters
     ----------
     time_s
-        Seconds of the run's clock: since 1970, or since its start.
+        Seconds of the run's clock.
     digits
         Of the seconds of the run's own clock. The time of day has whole seconds.
 
     Returns
     -------
     str
-        Local date and time with the abbreviation of the zone (the environment's TZ, daylight saving included), where
-        the time is since 1970 or the run has a clock (`moments_by`); else seconds.
+        As `date_and_time` where the run has a clock (`moments_by`); else seconds.
 
     >>> moment(12.345), moment(12.345, 2), moment(float("nan"))
     ('12.3 s', '12.35 s', '—')
@@ -82,15 +109,21 @@ def moment(time_s: float, digits: int = 1) -> str:
     if not isfinite(time_s):
         return "—"
     clock = _CLOCK.get()
-    unix_s: float | None = time_s
-    if clock is not None and not _EPOCH_FROM_S < time_s < _EPOCH_TO_S:
-        unix_s = clock.unix_s(time_s)
-    if unix_s is None or not _EPOCH_FROM_S < unix_s < _EPOCH_TO_S:
+    unix_s = None if clock is None else clock.unix_s(time_s)
+    if unix_s is None or not 0 <= unix_s < _DATES_TO_S:
         return f"{number(time_s, f'.{digits}f')} s"
+    return date_and_time(unix_s)
+
+
+def date_and_time(unix_s: float) -> str:
+    """Local date and time of seconds since 1970, with the abbreviation of the zone.
+
+    The zone is that of the environment's TZ, daylight saving included.
+    """
     return date(datetime.fromtimestamp(unix_s).astimezone())
 
 
 def moment_of_start() -> str:
-    """When second 0 of the run was, where one clock is valid for all of it; else nothing."""
+    """When second 0 of the run was, where one clock is valid for all of it, and the run began then; else nothing."""
     clock = _CLOCK.get()
-    return moment(0.0) if clock is not None and len(clock.pieces) == 1 else ""
+    return moment(0.0) if clock is not None and len(clock.pieces) == 1 and not clock.utc else ""

@@ -44,7 +44,7 @@ class DriveTiming(Algebra):
     ----------
     rate_hz
         Computations per second.
-    held_ticks
+    rate_divider
         Ticks of the recorded loop during which one output is held: the recorded rate over `rate_hz`. A
         controller at half the rate of the recording has 2.
     hold
@@ -54,7 +54,7 @@ class DriveTiming(Algebra):
     """
 
     rate_hz: float
-    held_ticks: int = 1
+    rate_divider: int = 1
     hold: Hold = "zero-order"
     delay_ticks: int = 0
 
@@ -67,8 +67,8 @@ class DriveTiming(Algebra):
                 argument="rate_hz",
                 value=self.rate_hz,
             )
-        if self.held_ticks < 1 or self.delay_ticks < 0:
-            name, least = ("held_ticks", 1) if self.held_ticks < 1 else ("delay_ticks", 0)
+        if self.rate_divider < 1 or self.delay_ticks < 0:
+            name, least = ("rate_divider", 1) if self.rate_divider < 1 else ("delay_ticks", 0)
             value = getattr(self, name)
             raise UsageError(
                 "out-of-range",
@@ -89,10 +89,10 @@ class DriveTiming(Algebra):
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)
-        tick = np.exp(-2j * np.pi * f / (self.rate_hz * self.held_ticks))
+        tick = np.exp(-2j * np.pi * f / (self.rate_hz * self.rate_divider))
         held = 1.0
         if self.hold == "zero-order":
-            held = np.mean([tick**i for i in range(self.held_ticks)], axis=0)
+            held = np.mean([tick**i for i in range(self.rate_divider)], axis=0)
         return np.asarray(self.law(f) * held * tick**self.delay_ticks, dtype=np.complex128)
 
     def law(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -191,7 +191,7 @@ class Cascade(Algebra):
     --------
     >>> loop = Cascade(
     ...     velocity=PID(gain=0.2308, integral_time_s=0.2, rate_hz=4000),
-    ...     position=PID(gain=1.0, rate_hz=2000, held_ticks=2),
+    ...     position=PID(gain=1.0, rate_hz=2000, rate_divider=2),
     ... )
     >>> loop.response([20.0, 140.0]).shape
     (2,)
@@ -202,5 +202,5 @@ class Cascade(Algebra):
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)
-        position = integral(f, self.velocity.rate_hz * self.velocity.held_ticks, "trapezoidal")
+        position = integral(f, self.velocity.rate_hz * self.velocity.rate_divider, "trapezoidal")
         return np.asarray(self.velocity.response(f) * (1 + self.position.response(f) * position))

@@ -37,7 +37,7 @@ class FittedCurve:
 
     def __init__(self, quantities: Quantities, section: FitSection) -> None:
         self._quantities = quantities
-        self.model: PhysicalModel = chosen_model(section, quantities.unit)
+        self.model: PhysicalModel = chosen_model(section, quantities.kinds)
         self._newest: tuple[float, Floats] | None = None
         self._grid = EvaluationGrid(grid_hz(quantities.lines), quantities.lines.rate_hz, section.hold)
 

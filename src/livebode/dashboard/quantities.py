@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, get_args
 
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from livebode.configuration.axis import LoopSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Lines, Loop, Quantity, Responses, ServerError
+from livebode.core import Lines, Loop, PlantKinds, Quantity, Responses, ServerError
 from livebode.estimation.quantities import convert
-from livebode.records.run import lines_in
+from livebode.records.run import kinds_in, lines_in
 
 Complex = NDArray[np.complex128]
 
@@ -36,12 +36,15 @@ class Quantities:
         The lines of the run.
     loop
         The loop of the configuration; None if it cannot be built.
+    kinds
+        Kinds of the plant's output and input.
     """
 
     own: Quantity
     unit: str
     lines: Lines
     loop: Loop | None
+    kinds: PlantKinds = field(default_factory=PlantKinds)
 
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Quantities:
@@ -54,7 +57,7 @@ class Quantities:
             )
         except ValueError:  # of livebode or of pydantic
             loop = None
-        return cls(found["quantity"], found["unit"], lines, loop)
+        return cls(found["quantity"], found["unit"], lines, loop, kinds_in(found))
 
     def why_not(self, quantity: Quantity) -> str:
         """The reason why the page cannot show a quantity; empty if it can."""

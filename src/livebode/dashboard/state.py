@@ -31,7 +31,6 @@ from livebode.records import RunRecord, to_json
 _SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _PACE_S = 3.0
 _SILENT_S = 2.0
-_SINCE_1970_S = 1e8  # later times are dates: a run's own clock does not reach three years
 _GROWS_S = 10.0
 _SENT = 90  # responses that were sent in three seconds: one that a person freezes is among them
 
@@ -236,9 +235,11 @@ class State:
 
         Events before the start of a run have a date.
         """
-        if self.quantities is None or self.last_s > _SINCE_1970_S:
-            return [(0.0, 0.0)]
-        return list(self.hub.clock) if self.hub is not None else RunClock.of(dict(self._summary)).pieces
+        if self.quantities is None:
+            return RunClock.of_kind("utc").pieces
+        if self.hub is not None and self.hub.clock:
+            return list(self.hub.clock)
+        return RunClock.of(dict(self._summary), self.first_s).pieces
 
     def health(self) -> dict[str, Any]:
         """Health of source and tracking."""

@@ -1,6 +1,6 @@
 """From samples to frequency responses: the online tracker and the offline reference."""
 
-from livebode.estimation.line_stage import response_unit
+from livebode.estimation.line_stage import plant_kinds, response_unit
 from livebode.estimation.movement import Movement
 from livebode.estimation.ripple import RippleOrder, RippleSpeed, ripple_power
 from livebode.estimation.settings import Settings
@@ -15,6 +15,7 @@ __all__ = [
     "Settings",
     "SpectraTracker",
     "Tracker",
+    "plant_kinds",
     "response_unit",
     "ripple_power",
     "welch",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, Event, Responses, Stage, StatefulBase
+from livebode.core import Channel, Event, PlantKinds, Responses, Stage, StatefulBase
 from livebode.estimation.bounds import between_periods, contained, power, unbiased
 from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.estimators import Role
@@ -305,6 +305,17 @@ class LineStage(StatefulBase):
 
 def response_unit(channels: Sequence[Channel], settings: Settings) -> str:
     """Unit of the response where both signals have one; open loop, closed loop and sensitivity have none."""
-    units = {channel.name: channel.unit for channel in channels}
-    over, under = (units[name] for name in (settings.output, settings.channel(settings.method.denominator) or ""))
-    return f"{over}/({under})" if over and under and settings.quantity == "plant" else ""
+    output, input = _ends(channels, settings)
+    return f"{output.unit}/({input.unit})" if output.unit and input.unit and settings.quantity == "plant" else ""
+
+
+def plant_kinds(channels: Sequence[Channel], settings: Settings) -> PlantKinds:
+    """The kinds of the plant's output, and of the signal that the response refers to."""
+    return PlantKinds.of(*_ends(channels, settings))
+
+
+def _ends(channels: Sequence[Channel], settings: Settings) -> tuple[Channel, Channel]:
+    by_name = {channel.name: channel for channel in channels}
+    names = settings.output, settings.channel(settings.method.denominator) or ""
+    output, input = (by_name.get(name, Channel(name)) for name in names)
+    return output, input

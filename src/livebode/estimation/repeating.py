@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, Event, Stage, StatefulBase
+from livebode.core import Block, Channel, Event, QuantityKind, Stage, StatefulBase
 from livebode.estimation.bounds import power
 from livebode.estimation.distortion import Distortion, reached
 from livebode.estimation.mains import Mains
@@ -160,7 +160,7 @@ class RepeatingErrors(StatefulBase):
         elif self._whole:
             with np.errstate(all="ignore"):
                 gone = self._take(block.channels)
-            self._report(sample, block.origin_s + sample / block.rate_hz, gone)
+            self._report(sample, block.origin_s + sample / block.rate_hz, gone, self._kind(block.channels))
         self._samples[:, 0] = self._samples[:, -1]
         self._at, self._whole = 0, True
 
@@ -230,12 +230,14 @@ class RepeatingErrors(StatefulBase):
 
         The steps of a velocity are those of the position that it was differenced from.
         """
-        unit = next((c.unit for c in channels if c.name == self._settings.output), "")
         lines = self._settings.lines
-        velocity = unit.endswith("/s") or not unit
+        velocity = self._kind(channels) in ("velocity", None)
         return self._step * (np.abs(1 - 1 / lines.z) if velocity else np.ones(len(lines)))
 
-    def _report(self, sample: int, time_s: float, gone: NDArray[np.bool_]) -> None:
+    def _kind(self, channels: Sequence[Channel]) -> QuantityKind | None:
+        return next((c.stated_kind for c in channels if c.name == self._settings.output), None)
+
+    def _report(self, sample: int, time_s: float, gone: NDArray[np.bool_], output: QuantityKind | None) -> None:
         for at in np.flatnonzero(gone & self._told[_HUM]):
             self._told[_HUM, at] = False
             f = self._settings.lines.frequency_hz[at]
@@ -245,11 +247,11 @@ class RepeatingErrors(StatefulBase):
         for i, at in zip(*np.nonzero(invalid & ~self._told)):
             self._told[i, at] = True
             f = self._settings.lines.frequency_hz[at]
-            message, value = self._reason(_KINDS[i], int(at), f)
+            message, value = self._reason(_KINDS[i], int(at), f, output)
             details = {"line_hz": float(f)} | value
             self._events.append(Event(_KINDS[i], sample, time_s, f"{message}; the line is not valid", details))
 
-    def _reason(self, kind: str, at: int, f: float) -> tuple[str, dict[str, float]]:
+    def _reason(self, kind: str, at: int, f: float, output: QuantityKind | None) -> tuple[str, dict[str, float]]:
         if kind == "hum":
             return (
                 f"{f:g} Hz is a multiple of the mains frequency: mains hum detected; use other lines",
@@ -257,10 +259,9 @@ class RepeatingErrors(StatefulBase):
             )
         if kind == "steps":
             counts = float(self._counts[at])
-            return (
-                f"the output moves only {counts:.2g} steps of its sensor at {f:g} Hz: increase the excitation",
-                {"steps": counts},
-            )
+            message = f"the output moves only {counts:.2g} steps of its sensor at {f:g} Hz: increase the excitation"
+            hint = "; if the output is a velocity, declare it in source.kinds" * (output == "other")
+            return message + hint, {"steps": counts}
         numerator, denominator = self._moments.now.pair[:, 0, at]
         share = float(self._now[0][at] / np.abs(numerator / denominator))
         why = "friction, backlash or sensor steps; increase the excitation, or move the axis"

@@ -18,8 +18,8 @@ _TAPS = {
 }  # fmt: skip
 
 
-def prbs(order: int, amplitude: float = 1.0, *, held_ticks: int = 1) -> Floats:
-    """One period of a maximal-length sequence of ±amplitude, shape ((2^order − 1)·held_ticks,), unit of `amplitude`.
+def prbs(order: int, amplitude: float = 1.0, *, rate_divider: int = 1) -> Floats:
+    """One period of a maximal-length sequence of ±amplitude, shape ((2^order − 1)·rate_divider,), unit of `amplitude`.
 
     From a shift register of `order` bits with linear feedback. Its periodic autocorrelation over the N = 2^order − 1
     bits is exactly N at 0 and −1 elsewhere (for amplitude 1), so every line of the bits has the same power N + 1,
@@ -37,13 +37,13 @@ def prbs(order: int, amplitude: float = 1.0, *, held_ticks: int = 1) -> Floats:
     array([ 1.,  1.,  1., -1., -1.,  1., -1.])
     """
     check_order(order)
-    if held_ticks < 1:
+    if rate_divider < 1:
         raise UsageError(
             "out-of-range",
-            f"{held_ticks=} is below 1",
+            f"{rate_divider=} is below 1",
             "let a bit last at least one tick",
-            argument="held_ticks",
-            value=held_ticks,
+            argument="rate_divider",
+            value=rate_divider,
             low=1,
         )
     # a(n + order) = a(n) ⊕ Σ a(n + tap)
@@ -55,7 +55,7 @@ def prbs(order: int, amplitude: float = 1.0, *, held_ticks: int = 1) -> Floats:
         stop = min(done + shortest, count)
         bits[done:stop] = np.bitwise_xor.reduce([bits[done - lag : stop - lag] for lag in lags])
         done = stop
-    return np.repeat(amplitude * (2.0 * bits - 1.0), held_ticks)
+    return np.repeat(amplitude * (2.0 * bits - 1.0), rate_divider)
 
 
 def check_order(order: int) -> None:

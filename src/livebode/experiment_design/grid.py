@@ -34,7 +34,7 @@ class LineChoice:
     window_why: str
     lines_why: str
     order: int = 0
-    held_ticks: int = 1
+    rate_divider: int = 1
     base: Lines | None = None  # of a stepped sine: the grid of one step
     periods: int = 0  # of each step
     mains: tuple[int, ...] = ()  # bins of the band that are not used because of the mains
@@ -219,7 +219,7 @@ def _numbers(item: str) -> list[str]:
 
 
 def _prbs(spec: ExperimentSpec, low: float, high: float, rate_hz: float) -> LineChoice:
-    held = spec.held_ticks or max(1, int(rate_hz / (_BITS_PER_PERIOD * high)))
+    held = spec.rate_divider or max(1, int(rate_hz / (_BITS_PER_PERIOD * high)))
     order = spec.order
     if order is None:
         bits = rate_hz / (spec.resolution_hz or 1.0) / held
@@ -261,4 +261,6 @@ def _prbs(spec: ExperimentSpec, low: float, high: float, rate_hz: float) -> Line
             order=order,
         )
     why = f"2^{order} − 1 bits of {counted(held, 'tick')}"
-    return LineChoice(Lines.of_bins(bins, window, rate_hz), why, "every bin of the band", order=order, held_ticks=held)
+    return LineChoice(
+        Lines.of_bins(bins, window, rate_hz), why, "every bin of the band", order=order, rate_divider=held
+    )

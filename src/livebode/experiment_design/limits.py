@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, isnan
+from typing import Annotated
+
+from annotated_types import Gt
 
 from livebode.core import DesignError, UsageError
 from livebode.experiment_design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
 from livebode.experiment_design.peaks import Peak
+
+_Above0 = Annotated[float, Gt(0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,10 +21,16 @@ class MachineLimits:
 
     Parameters
     ----------
-    torque_n_m_max, speed_m_per_s_max, following_error_m_max
-        Largest magnitudes.
-    position_m_min, position_m_max
-        Ends of the travel.
+    torque_n_m_max
+        Largest magnitude of the torque, N m.
+    speed_m_per_s_max
+        Largest magnitude of the speed, m/s.
+    following_error_m_max
+        Largest magnitude of the following error, m.
+    position_m_min
+        Lower end of the travel, m.
+    position_m_max
+        Upper end of the travel, m.
 
     Raises
     ------
@@ -27,9 +38,9 @@ class MachineLimits:
         If a limit is not above 0, or the travel has no room.
     """
 
-    torque_n_m_max: float = inf
-    speed_m_per_s_max: float = inf
-    following_error_m_max: float = inf
+    torque_n_m_max: _Above0 = inf
+    speed_m_per_s_max: _Above0 = inf
+    following_error_m_max: _Above0 = inf
     position_m_min: float = -inf
     position_m_max: float = inf
 

@@ -24,8 +24,8 @@ def unit_waveform(spec: ExperimentSpec, found: LineChoice, machine: Machine) -> 
     lines = found.lines
     about: dict[str, Any] = {"kind": spec.kind, "seed": spec.seed}
     if spec.kind == "prbs":
-        about |= {"order": found.order, "held_ticks": found.held_ticks}
-        samples = prbs(found.order, held_ticks=found.held_ticks)
+        about |= {"order": found.order, "rate_divider": found.rate_divider}
+        samples = prbs(found.order, rate_divider=found.rate_divider)
     elif spec.kind == "chirp":
         assert spec.band_hz is not None
         sweep = spec.sweep or "linear"

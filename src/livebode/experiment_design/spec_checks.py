@@ -13,11 +13,11 @@ from livebode.excitation import check_order
 if TYPE_CHECKING:
     from livebode.experiment_design.spec import ExperimentSpec
 
-_WHOSE = {"order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "stepped"}
-_RESOLUTION_MIN_HZ = 1e-6
-_STEP_MIN = 1e-12
-_MAINS_MIN_HZ = 1.0
-_ACCURACY_MIN, _AMPLITUDE_MIN, _AMPLITUDE_MAX = 1e-6, 1e-9, 1e9  # values outside are typing errors
+KIND_OF_KEY = {"order": "prbs", "rate_divider": "prbs", "sweep": "chirp", "periods": "stepped"}
+RESOLUTION_MIN_HZ = 1e-6
+STEP_MIN = 1e-12
+MAINS_MIN_HZ = 1.0
+ACCURACY_MIN, AMPLITUDE_MIN, AMPLITUDE_MAX = 1e-6, 1e-9, 1e9  # values outside are typing errors
 
 
 def check(spec: ExperimentSpec) -> None:
@@ -28,7 +28,7 @@ def check(spec: ExperimentSpec) -> None:
         raise error
     _check_band(spec)
     _check_distance(spec)
-    if not all(np.isfinite(mains) and mains >= _MAINS_MIN_HZ for mains in spec.mains_hz):
+    if not all(np.isfinite(mains) and mains >= MAINS_MIN_HZ for mains in spec.mains_hz):
         raise _out_of_range(
             "mains_hz", list(spec.mains_hz), "a list of frequencies above 1 Hz", "write for example [50, 60]"
         )
@@ -48,27 +48,25 @@ def _check_numbers(spec: ExperimentSpec) -> None:
         if value is not None and not (np.isfinite(value) and value > 0):
             raise _out_of_range(name, value, "a finite number above 0", "choose a number above 0")
     for name, low, remedy in (
-        ("resolution_hz", _RESOLUTION_MIN_HZ, "choose a coarser one"),
-        ("resolution_n_m", _STEP_MIN, "leave it out for no rounding"),
+        ("resolution_hz", RESOLUTION_MIN_HZ, "choose a coarser one"),
+        ("resolution_n_m", STEP_MIN, "leave it out for no rounding"),
         ("crest_factor_max", 1, "allow more: a PRBS has 1"),
         ("window", 1, "give a whole number above 0"),
-        ("held_ticks", 1, "give a whole number above 0"),
+        ("rate_divider", 1, "give a whole number above 0"),
         ("periods", 1, "give a whole number above 0"),
         ("seed", 0, "give a whole number of at least 0"),
     ):
         value = getattr(spec, name)
         if value is not None and value < low:
             raise _out_of_range(name, value, f"at least {low:g}", remedy, low=low)
-    if not _ACCURACY_MIN <= spec.accuracy <= 1:
+    if not ACCURACY_MIN <= spec.accuracy <= 1:
         remedy = "give it as a fraction of |G|, such as 0.05 for 5 %"
-        raise _out_of_range(
-            "accuracy", spec.accuracy, f"from {_ACCURACY_MIN:g} to 1", remedy, low=_ACCURACY_MIN, high=1
-        )
+        raise _out_of_range("accuracy", spec.accuracy, f"from {ACCURACY_MIN:g} to 1", remedy, low=ACCURACY_MIN, high=1)
 
 
 def _check_amplitude(spec: ExperimentSpec) -> None:
     given = np.atleast_1d(np.asarray(1.0 if spec.amplitude_n_m is None else spec.amplitude_n_m, dtype=np.float64))
-    low, high, remedy = _AMPLITUDE_MIN, _AMPLITUDE_MAX, "leave it out to have it chosen"
+    low, high, remedy = AMPLITUDE_MIN, AMPLITUDE_MAX, "leave it out to have it chosen"
     whole = np.all(np.isfinite(given)) and not np.any(given < 0) and given.any()
     if not (whole and low <= given.max() <= high):
         raise _out_of_range(
@@ -78,7 +76,7 @@ def _check_amplitude(spec: ExperimentSpec) -> None:
 
 def _of_another_kind(spec: ExperimentSpec) -> Iterator[UsageError]:
     kind = spec.kind
-    for name, whose in _WHOSE.items():
+    for name, whose in KIND_OF_KEY.items():
         if getattr(spec, name) is not None and kind != whose:
             yield _conflict(spec, name, f"{name} belongs to kind {whose!r}, and kind is {kind!r}", "leave it out")
     if spec.phases is not None and kind not in ("multisine", "odd"):

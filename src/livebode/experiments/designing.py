@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from livebode.configuration.schema import axis_schema
 from livebode.core import ConfigError, OutputError, UsageError
 from livebode.experiment_design import FORMATS, Design, axis_text, choose, write
 from livebode.experiments.experiment import Experiment
 from livebode.records import to_json
 from livebode.structured_text import PERIOD_MAX
 
-_MARK, _AXIS = "design.json", "axis.toml"
+_MARK, _AXIS, _SCHEMA = "design.json", "axis.toml", "axis.schema.json"
 Picture = Callable[[Design, Path], None]
 
 
@@ -94,7 +95,8 @@ def design_experiment(
                 motion=experiment.motion_table(lines.window / lines.rate_hz),
                 tracking=experiment.tracking(),
             )
-            (partial / _AXIS).write_text(configuration, encoding="utf-8")
+            (partial / _AXIS).write_text(f"#:schema ./{_SCHEMA}\n{configuration}", encoding="utf-8")
+            (partial / _SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
             if draw is not None:
                 draw(design, partial / f"{name}.png")
             files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
@@ -142,7 +144,7 @@ def _check_names(name: str, log: str) -> None:
             key="log",
             value=log,
         )
-    if log in (_MARK, _AXIS, f"{name}.png", *(f"{name}{kind}" for kind in FORMATS)):
+    if log in (_MARK, _AXIS, _SCHEMA, f"{name}.png", *(f"{name}{kind}" for kind in FORMATS)):
         raise ConfigError(
             "key-conflict",
             f"log = {log!r} is a file of the design",

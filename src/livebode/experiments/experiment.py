@@ -20,7 +20,7 @@ from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Se
 
 T = TypeVar("T")
 
-_BELT: dict[str, Any] = {
+BELT: dict[str, Any] = {
     "mechanics": Mechanics,
     "friction": Friction,
     "drive": Drive,
@@ -29,11 +29,30 @@ _BELT: dict[str, Any] = {
     "strokes": Strokes,
     "standstill": Standstill,
 }
-_SIGNALS = {"excitation": "w", "input": "u", "output": "velocity"}
+SIGNALS = {"excitation": "w", "input": "u", "output": "velocity"}
 
 
 class Experiment(BaseModel):
-    """A machine, either a belt axis by its constants or a measured one, and the specification of the experiment."""
+    """A machine, either a belt axis by its constants or a measured one, and the specification of the experiment.
+
+    Parameters
+    ----------
+    excitation
+        The excitation that is designed.
+    belt
+        A tooth-belt axis by its constants.
+    measured
+        A plant that a run measured, and the extremes of its motion alone.
+    limits
+        Limits of the machine. Default: of a belt axis the torque of its drive, and the speed and the travel of its
+        limits.
+    loop
+        The controllers of a measured axis, as in axis.toml. Default: those of the run.
+    signals
+        Names of the channels in axis.toml. Default: those of the simulated axis or of the run.
+    log
+        Name of the recording in axis.toml, relative to it.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -92,7 +111,7 @@ class Experiment(BaseModel):
         given = dict(self.excitation)
         if isinstance(given.get("band_hz"), list):
             given["band_hz"] = tuple(given["band_hz"])
-        return _made(ExperimentSpec, given, "excitation")
+        return made_of(ExperimentSpec, given, "excitation")
 
     def machine_limits(self) -> MachineLimits:
         """[limits]; for a belt axis its own limits by default."""
@@ -103,20 +122,20 @@ class Experiment(BaseModel):
             "position_m_min": axis.limits.position_m_min,
             "position_m_max": axis.limits.position_m_max,
         }  # fmt: skip
-        return _made(MachineLimits, own | self.limits, "limits")
+        return made_of(MachineLimits, own | self.limits, "limits")
 
     def axis(self) -> BeltAxis | None:
         """The belt axis; None for a measured one."""
         if self.belt is None:
             return None
-        if unknown := [name for name in self.belt if name not in _BELT]:
+        if unknown := [name for name in self.belt if name not in BELT]:
             raise ConfigError(
                 "key-unknown",
                 f"there is no [belt.{unknown[0]}]",
-                _near(unknown[0], _BELT),
+                _near(unknown[0], BELT),
                 key=f"belt.{unknown[0]}",
             )
-        parts = {name: _made(_BELT[name], given, f"belt.{name}") for name, given in self.belt.items()}
+        parts = {name: made_of(BELT[name], given, f"belt.{name}") for name, given in self.belt.items()}
         if "strokes" in parts and "standstill" in parts:
             raise ConfigError(
                 "key-conflict",
@@ -147,10 +166,10 @@ class Experiment(BaseModel):
             return _finite(self._measured_axis.loop_tables())
         drive = axis.drive
         velocity = {"gain": drive.velocity_gain_n_m_s, "integral_time_s": drive.integral_time_s,
-                    "rate_hz": drive.velocity_rate_hz, "held_ticks": drive.velocity_ticks,
+                    "rate_hz": drive.velocity_rate_hz, "rate_divider": drive.velocity_ticks,
                     "delay_ticks": drive.delay_ticks}  # fmt: skip
         position = {"gain": drive.position_gain_per_s, "rate_hz": drive.position_rate_hz,
-                    "held_ticks": drive.position_ticks}  # fmt: skip
+                    "rate_divider": drive.position_ticks}  # fmt: skip
         return {"velocity": velocity, "position": position}
 
     def motion_table(self, window_s: float) -> dict[str, Any]:
@@ -163,17 +182,17 @@ class Experiment(BaseModel):
 
     def signal_names(self) -> dict[str, str]:
         """[signals] of the axis.toml; default: those of the simulated axis or of the run."""
-        if unknown := [name for name in self.signals if name not in (*_SIGNALS, "schedule")]:
+        if unknown := [name for name in self.signals if name not in (*SIGNALS, "schedule")]:
             raise ConfigError(
                 "key-unknown",
                 f"there is no signals.{unknown[0]}",
-                _near(unknown[0], (*_SIGNALS, "schedule")),
+                _near(unknown[0], (*SIGNALS, "schedule")),
                 key=f"signals.{unknown[0]}",
             )
         if self.belt is None:
             own = self._measured_axis.signal_names()
         else:
-            own = _SIGNALS | ({"schedule": "x"} if "strokes" in self.belt else {})
+            own = SIGNALS | ({"schedule": "x"} if "strokes" in self.belt else {})
         names = own | self.signals
         for role, name in names.items():
             if not name or not name.isprintable():
@@ -226,7 +245,7 @@ def _plain(why: str) -> str:
     return why.lower().replace("tuple", "list")
 
 
-def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:
+def made_of(kind: type[T], given: Mapping[str, Any], section: str) -> T:
     """The dataclass from plain data; ConfigError for an unknown key, or a value of another type."""
     known = get_type_hints(kind)
     for name, value in given.items():

@@ -8,9 +8,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from livebode.configuration.axis import LoopSection
-from livebode.configuration.fit_settings import output_of
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import ConfigError
+from livebode.core import ConfigError, read_unit, split_plant_unit
 from livebode.experiment_design import Machine, MeasuredResponse, measured_machine
 from livebode.experiment_design.machine import MOTION_KEYS
 from livebode.experiment_design.measured import Output
@@ -20,12 +19,36 @@ from livebode.records import RunRecord
 Number = Annotated[float, Field(strict=True)]  # true is not a number
 
 _KEPT = ("differenced", "spikes")  # of the run's [tracking]: properties of the recording, not of the evaluation
-_UNITS = ("rad/s/(N m)", "rad/(N m)")
 _UNCHECKED = "the loop is not that of the run: its stability is not checked"
 
 
 class MeasuredSection(BaseModel):
-    """[measured]: a plant that a run measured, and the effect of its motion alone."""
+    """[measured]: a plant that a run measured, and the extremes of its motion alone.
+
+    Parameters
+    ----------
+    run
+        Directory of the run, relative to this file: the mean response of the plant. Its loop, signal names and
+        differenced channels are used also.
+    output
+        What the output of the run is. Default: by its kind, otherwise by its loop.
+    radius_m
+        Metres of travel per radian; of a rotary axis the metres are radians.
+    noise
+        Standard deviation of white noise on the output, in its unit; 0: not known.
+    encoder_counts_per_turn
+        Counts of the encoder per turn of the motor; 0: not known.
+    stroke_s
+        Seconds in which the motion passes each place once. Default: the axis is at standstill.
+    torque_n_m
+        Lowest and highest torque in the motion alone, in N m. Default: not known; 0 at standstill.
+    speed_m_per_s
+        Lowest and highest speed in the motion alone, in m/s. Default: not known; 0 at standstill.
+    position_m
+        Lowest and highest position in the motion alone, in metres. Default: not known.
+    following_error_m
+        Lowest and highest following error in the motion alone, in metres. Default: not known; 0 at standstill.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -93,16 +116,15 @@ class MeasuredAxis:
         return kept if "input" in self.signal_names() else {"estimator": "indirect"} | kept
 
     def _output(self) -> Output:
-        unit = self._run.found.get("unit", "")
-        own = output_of(unit)
+        own = self._own_output()
         if own and self._section.output and self._section.output != own:
             raise ConfigError(
                 "value-mismatch",
-                f"measured.output = {self._section.output!r}, but the run's plant is in {unit}",
+                f"measured.output = {self._section.output!r}, but the output of the run is a {own}",
                 "leave it out",
                 key="measured.output",
                 value=self._section.output,
-                unit=unit,
+                kind=own,
             )
         acts_on: Output = "position" if self._loop.position_pd is not None else "velocity"
         output = self._section.output or own or acts_on
@@ -117,11 +139,33 @@ class MeasuredAxis:
             )
         return output
 
+    def _own_output(self) -> Output | None:
+        """The kind of the run's output; None where only the description of the experiment specifies it."""
+        kind = self._run.kinds.output
+        if kind == "velocity" or kind == "position":
+            return kind
+        if kind is not None and self._section.output is None:
+            raise ConfigError(
+                "kind-needed",
+                f"a design needs a velocity or a position, but the kind of the run's output is {kind!r}",
+                "set measured.output",
+                key="measured.output",
+                value=kind,
+                allowed=["velocity", "position"],
+            )
+        return None
+
     def _notes(self) -> tuple[str, ...]:
         notes = [] if self._given is None else [_UNCHECKED]
-        if (unit := self._run.found.get("unit", "")) and unit not in _UNITS:
+        unit = self._run.found.get("unit", "")
+        if unit and not _in_n_m_and_rad(unit):
             notes.append(f"the run's plant is in {unit}: N m and rad here stand for these units")
         if not unit and self._section.output is None:
             taken = {"velocity": "a velocity in rad/s", "position": "a position in rad"}[self._output()]
             notes.append(f"the run has no units: its output is assumed to be {taken}, its input N m")
         return tuple(notes)
+
+
+def _in_n_m_and_rad(unit: str) -> bool:
+    output, input = map(read_unit, split_plant_unit(unit))
+    return output in (read_unit("rad/s"), read_unit("rad")) and input == read_unit("N m")

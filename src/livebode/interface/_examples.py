@@ -26,7 +26,7 @@ _CONFIGURATION = {
     "tracking": {"hop": _HOP},
     "loop": {
         "velocity": {"gain": 0.2308, "integral_time_s": 0.2, "rate_hz": _RATE_HZ},
-        "position": {"gain": 1.0, "rate_hz": _RATE_HZ / 2, "held_ticks": 2},
+        "position": {"gain": 1.0, "rate_hz": _RATE_HZ / 2, "rate_divider": 2},
     },
     "fit": {"model": "two-mass"},
 }

@@ -17,7 +17,7 @@ from livebode.analysis.loop_report import loop_report
 from livebode.configuration.axis import Axis, FitSection, LoopSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Event, Lines, LivebodeError, Loop, PlotKind, Response, Responses, counted, plot_responses
-from livebode.core.clock import RunClock, moment, moments_by
+from livebode.core.clock import moment, moments_by
 from livebode.fitting import Fit
 from livebode.margins import Margins
 from livebode.records import PARAMETERS, RunRecord
@@ -263,9 +263,9 @@ class Run:
 
     def _extent(self) -> str:
         """Number of responses, duration and, if the run has a clock, its start."""
-        clock = RunClock.of(self._record.summary)
+        clock = self._record.clock
         with moments_by(clock):
-            start = f" from {moment(0.0)}" if clock.pieces else ""
+            start = f" from {moment(0.0)}" if clock.pieces and not clock.utc else ""
         if "counts" not in self.summary:
             return f"not finished{start}"
         duration_s = self.summary["counts"]["samples"] / self.lines.rate_hz

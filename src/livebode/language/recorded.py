@@ -25,6 +25,7 @@ SENTENCES = (
     "{line} Hz is a multiple of the mains frequency: mains hum detected",
     "use other lines",
     "the output moves only {steps} steps of its sensor at {line} Hz: increase the excitation",
+    "if the output is a velocity, declare it in source.kinds",
     "distortion may be {share}% of the response at {line} Hz ({why})",
     "dry friction stops the axis at standstill or reversal: {percent} % of its output differs from the response "
     "in motion",

@@ -18,10 +18,10 @@ def drive_of(loop: Loop, rate_hz: float) -> Drive:
         controller (a `Cascade`), if the excitation does not enter at the torque, or rates do not divide.
     """
     velocity, position = _controllers(loop)
-    ticks = velocity.held_ticks * (position.held_ticks if position else 1)
+    ticks = velocity.rate_divider * (position.rate_divider if position else 1)
     return Drive(
         rate_hz=rate_hz,
-        velocity_rate_hz=rate_hz / velocity.held_ticks,
+        velocity_rate_hz=rate_hz / velocity.rate_divider,
         position_rate_hz=rate_hz / ticks,
         velocity_gain_n_m_s=velocity.gain,
         integral_time_s=min(velocity.integral_time_s, 1e12),

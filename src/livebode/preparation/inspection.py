@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import Block, Lines, LivebodeError
+from livebode.core import Block, Lines, LivebodeError, QuantityKind
 from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, recognise
 from livebode.preparation.plan import LIVE_RESPONSES_PER_S, beginning
@@ -22,6 +22,7 @@ class ChannelSummary:
 
     name: str
     unit: str
+    kind: QuantityKind
     minimum: float = float("inf")
     maximum: float = float("-inf")
     not_finite: int = 0
@@ -118,7 +119,7 @@ def inspect(
     samples, gaps, missing, stop = 0, 0, 0, None
     for block in log.blocks(names):
         for channel in block.channels:
-            summaries.setdefault(channel.name, ChannelSummary(channel.name, channel.unit)).take(block)
+            summaries.setdefault(channel.name, ChannelSummary(channel.name, channel.unit, channel.kind)).take(block)
         samples += len(block)
         if stop is not None and (block.gap or block.start != stop):
             gaps, missing = gaps + 1, missing + block.start - stop

@@ -144,7 +144,7 @@ def _show(run: RunRecord, database: Any, asked: set[str]) -> None:
         united = " UNION ALL ".join(f"SELECT {columns} FROM _{table}_{number}" for number in range(len(parts)))
         database.execute(f"CREATE VIEW {table} AS {united}")
     lines = list(run.each_event_and_damage())
-    clock = RunClock.of(run.summary)
+    clock = run.clock
     rows = [_plain(row.newest, clock) | vars(row) for row in event_rows(lines)]
     database.register("events", pa.Table.from_pylist(rows, schema=_EVENTS))
     each = [_plain(one, clock) for event in lines for one in each_event(event)]

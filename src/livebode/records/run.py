@@ -6,7 +6,9 @@ import logging
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,18 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.arrow import to_numpy
-from livebode.core import PER_LINE, PER_RESPONSE, DamageWarning, Event, Lines, LivebodeError, RecordError, Responses
+from livebode.core import (
+    PER_LINE,
+    PER_RESPONSE,
+    DamageWarning,
+    Event,
+    Lines,
+    LivebodeError,
+    PlantKinds,
+    RecordError,
+    Responses,
+)
+from livebode.core.clock import RunClock
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import StoredTable
@@ -41,6 +54,11 @@ class Files:
 def lines_in(found: Mapping[str, Any]) -> Lines:
     """The lines in `found` of run.json."""
     return Lines(tuple(found["bins"]), found["window"], found["rate_hz"], tuple(found["quiet_bins"]))
+
+
+def kinds_in(found: Mapping[str, Any]) -> PlantKinds:
+    """The kinds of the plant in `found` of run.json; from the unit if an older version wrote it."""
+    return PlantKinds(**found["kinds"]) if "kinds" in found else PlantKinds.of_unit(found.get("unit", ""))
 
 
 @dataclass(frozen=True)
@@ -114,6 +132,20 @@ class RunRecord:
     def lines(self) -> Lines:
         """Source of the measurement."""
         return lines_in(self.found)
+
+    @property
+    def kinds(self) -> PlantKinds:
+        """Kinds of the plant's output and input."""
+        return kinds_in(self.summary["found"])
+
+    @property
+    def clock(self) -> RunClock:
+        """Relation of its times to the time of day; from the first response if an older version recorded it."""
+        first_s = nan
+        if "clock" not in self.summary and "clock" not in self.summary["found"]:
+            with suppress(LivebodeError):  # the clock of damaged responses has no use
+                first_s = next((float(part.time_s[0]) for part in self.batches() if len(part)), nan)
+        return RunClock.of(self.summary, first_s)
 
     @property
     def finished(self) -> bool:

@@ -6,6 +6,9 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from livebode.core import QuantityKind
+from livebode.core.clock import ClockKind
+
 Text = Annotated[str, Field(max_length=100_000)]
 Count = Annotated[int, Field(ge=0, lt=1 << 62)]
 Positive = Annotated[int, Field(gt=0, lt=1 << 62)]
@@ -16,6 +19,14 @@ class _Part(BaseModel):
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
 
 
+class _Kinds(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    output: QuantityKind | None
+    input: QuantityKind | None
+    input_factor: Annotated[float, Field(gt=0)]
+
+
 class _Found(_Part):
     rate_hz: Annotated[float, Field(gt=0)]
     window: Positive
@@ -23,6 +34,8 @@ class _Found(_Part):
     quiet_bins: list[Positive]
     quantity: Text
     unit: Text
+    clock: ClockKind | None = None
+    kinds: _Kinds = _Kinds(output=None, input=None, input_factor=1.0)
     hop: Positive = 1
     frequency_hz: list[float] = []
     schedule: Text | None = None

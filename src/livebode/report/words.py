@@ -16,7 +16,7 @@ _SYMBOL = {
     marked("closed loop"): "T",
     marked("sensitivity"): "S",
 }
-_CLOCK_FROM_S = 1e5
+_READABLE_TO_S = 1e5  # ticks with more digits than this, over a short span, differ only in the last ones
 
 
 def quantity(responses: Response | Responses) -> str:
@@ -59,7 +59,7 @@ def clock(time_s: np.ndarray) -> tuple[float, str]:
     """Origin to subtract from times, with the label: seconds since 1970 are unreadable as ticks."""
     finite = time_s[np.isfinite(time_s)]
     first, last = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
-    if abs(first) < _CLOCK_FROM_S or last - first > abs(first) / 10:
+    if abs(first) < _READABLE_TO_S or last - first > abs(first) / 10:
         start = moment_of_start()
         return 0.0, tr("time in s after {start}", start=start) if start else tr("time in s")
     origin = float(np.floor(first))

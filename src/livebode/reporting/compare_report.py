@@ -15,7 +15,7 @@ import numpy as np
 from livebode.analysis.changes import Changes, QuantityChange, changes, percent
 from livebode.analysis.difference import ALPHA, Compared, Difference, compare
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core.clock import moment
+from livebode.core.clock import date_and_time
 from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
 from livebode.language import marked, number, recognised, tr, trn
 from livebode.records import RunRecord
@@ -92,7 +92,7 @@ class Comparison:
             (tr("before written"), written(one.path / "run.json")),
             (tr("after written"), written(other.path / "run.json")),
             (tr("responses"), " / ".join(number(a.count, ",") for a in self.found.averages)),
-            (tr("compared at"), _span(self.found)), (tr("report written"), moment(made.timestamp())),
+            (tr("compared at"), _span(self.found)), (tr("report written"), date_and_time(made.timestamp())),
         )  # fmt: skip
         sections = [self._response(), self._places(), self._parameters(), self._events(), _settings(one, other)]
         there = tuple(section for section in sections if section is not None)

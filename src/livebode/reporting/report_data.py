@@ -15,7 +15,7 @@ from livebode.analysis.parameter_track import Track, tracks
 from livebode.configuration.axis import FitSection, LoopSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import LivebodeError, Responses
-from livebode.core.clock import moment
+from livebode.core.clock import date_and_time
 from livebode.fitting import Fit
 from livebode.language import recognised, tr
 from livebode.records import RunRecord
@@ -138,7 +138,7 @@ def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple
 def written(path: Path) -> str:
     """Time at which a file was written; empty if the file does not exist."""
     try:
-        return moment(path.stat().st_mtime)
+        return date_and_time(path.stat().st_mtime)
     except OSError:
         return ""
 

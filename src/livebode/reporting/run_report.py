@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from livebode.core.clock import moment
+from livebode.core.clock import date_and_time, moment
 from livebode.core.document import Document, Paragraph, Section
 from livebode.language import tr
 from livebode.reporting import sections
@@ -65,11 +65,11 @@ def facts(of: ReportData, made: datetime) -> tuple[tuple[str, str], ...]:
         (tr("source"), str(source.get("url", "")) if "url" in source else tr("a recording") if log else ""),
         (tr("run"), of.run.path.resolve().name),
         (tr("run's clock"), f"{moment(first_s, 2)} … {moment(last_s, 2)}"),
-        (tr("started"), moment(float(begun)) if begun is not None else ""),
+        (tr("started"), date_and_time(float(begun)) if begun is not None else ""),
         (tr("duration"), duration(of.samples / of.run.lines.rate_hz)),
         (tr("recording written"), written(Path(log)) if log else ""),
         (tr("run written"), written(of.run.path / "run.json")),
-        (tr("report written"), moment(made.timestamp())),
+        (tr("report written"), date_and_time(made.timestamp())),
         ("livebode", str(of.run.summary.get("versions", {}).get("livebode", ""))),
     )
     return tuple((name, value) for name, value in rows if value)

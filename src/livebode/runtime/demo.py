@@ -6,7 +6,7 @@ from functools import partial
 
 from livebode.configuration.axis import FitSection, LoopSection, PIDSection
 from livebode.core import Lines, UsageError
-from livebode.estimation import Settings, Tracker
+from livebode.estimation import Settings, Tracker, plant_kinds
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Monitor, learn_machine
 from livebode.runtime.change_detection import ChangeDetection
@@ -89,13 +89,14 @@ def demo(to: Destination, *, seconds: float, seed: int, real_time: bool, baselin
         "loop": loop.model_dump(mode="json"),
     }
     settings = demo_settings()
+    machine = SimulatedAxis(axis)
     pipeline = Pipeline(
         Tracker(settings),
-        Fits(fit, loop.build(RATE_HZ)),
+        Fits(fit, loop.build(RATE_HZ), plant_kinds(machine.channels, settings)),
         ChangeDetection(Monitor(baseline, settings), f"{LEARNED_S:g} s of healthy strokes"),
     )
-    about = {"configuration": configuration}
-    return RunLoop(SimulatedAxis(axis), pipeline, to, about=about, block_samples=400, real_time=real_time).run()
+    about = {"configuration": configuration, "found": {"clock": "relative"}}
+    return RunLoop(machine, pipeline, to, about=about, block_samples=400, real_time=real_time).run()
 
 
 def _described(drive: Drive) -> LoopSection:
@@ -104,7 +105,7 @@ def _described(drive: Drive) -> LoopSection:
         gain=drive.velocity_gain_n_m_s, integral_time_s=drive.integral_time_s, rate_hz=drive.velocity_rate_hz
     )
     held = round(drive.rate_hz / drive.position_rate_hz)
-    position = PIDSection(gain=drive.position_gain_per_s, rate_hz=drive.position_rate_hz, held_ticks=held)
+    position = PIDSection(gain=drive.position_gain_per_s, rate_hz=drive.position_rate_hz, rate_divider=held)
     return LoopSection(velocity=velocity, position=position)
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from livebode.analysis.fits import plain_fit
 from livebode.configuration.axis import FitSection
-from livebode.configuration.fit_settings import fitter_of
-from livebode.core import Event, Loop, Parameters, Responses
+from livebode.configuration.fit_settings import chosen_model, fitter_of
+from livebode.core import Event, Loop, Parameters, PlantKinds, Responses
 from livebode.core.state import Stage, decode, encode
 from livebode.fitting import Fit, Fitter, best_of, fit_of
 from livebode.margins import OpenLoop, against_lines, margins
@@ -24,11 +24,11 @@ _EPSILON_MIN = 0.003  # of |G|: an ε that no fit is rejected for
 class Fits:
     """The fits of one run, and the margins of a known loop with them.
 
-    The model is chosen at the first responses: from the configuration, else from their unit.
+    The model is that of the configuration; where it is "auto", the kinds of the plant determine it.
     """
 
-    def __init__(self, section: FitSection, loop: Loop | None = None) -> None:
-        self.section, self.loop = section, loop
+    def __init__(self, section: FitSection, loop: Loop | None = None, kinds: PlantKinds | None = None) -> None:
+        self.section, self.loop, self._kinds = section, loop, kinds or PlantKinds()
         self._fitter: Fitter | None = None
         self._counts: dict[str, int] = {}
         self._newest: Parameters | None = None
@@ -36,9 +36,10 @@ class Fits:
         self._epsilons: list[float] = []
 
     @classmethod
-    def of(cls, section: FitSection | None, loop: Loop) -> Fits | None:
-        """From a configuration; with margins if its loop describes the feedback."""
-        return None if section is None else cls(section, loop if loop.feedback else None)
+    def of(cls, section: FitSection, loop: Loop, kinds: PlantKinds) -> Fits:
+        """From a configuration; with margins if its loop describes the feedback. ConfigError as in `chosen_model`."""
+        chosen_model(section, kinds)
+        return cls(section, loop if loop.feedback else None, kinds)
 
     def process(self, responses: Responses) -> tuple[tuple[Parameters, ...], list[Event]]:
         """Parameters of a batch: its fits, the quantities derived from them, the margins; and events."""
@@ -75,7 +76,7 @@ class Fits:
             self._fitter = self._newest = self._newest_response = None
             self._counts, self._epsilons = {}, []
             return
-        fitter = fitter_of(self.section, state["unit"])
+        fitter = fitter_of(self.section, self._kinds)
         fitter.restore(state["fitter"])
         newest = None
         if state["status"] is not None:
@@ -86,7 +87,7 @@ class Fits:
 
     def _begin(self, unit: str) -> Fitter:
         self._unit = unit
-        self._fitter = fitter_of(self.section, unit)
+        self._fitter = fitter_of(self.section, self._kinds)
         return self._fitter
 
     def newest(self) -> Fit | None:

@@ -103,7 +103,7 @@ class _Succession:
             # Most keys of a source apply to other kinds of source.
             "configuration": axis.model_dump(mode="json", exclude={"serve", "source"})
             | {"source": axis.source.model_dump(mode="json", exclude_defaults=True)},
-            "found": {"format": self._source.format, "rate_from": "the sender"},
+            "found": {"format": self._source.format, "rate_from": "the sender", "clock": "relative"},
         }
         return RunLoop(
             self._source,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from livebode.configuration.axis import Axis
-from livebode.core import LivebodeError, SignalError, Stateful, nearest_name
+from livebode.core import Channel, LivebodeError, SignalError, Stateful, nearest_name
+from livebode.estimation import plant_kinds
 from livebode.preparation.follower import Follower
 from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection, change_detection
@@ -36,15 +37,17 @@ class Pipeline:
     axis: Axis | None = None
 
     @classmethod
-    def of(cls, axis: Axis, follower: Follower, *, samples: bool = True) -> Pipeline:
+    def of(cls, axis: Axis, follower: Follower, channels: Sequence[Channel], *, samples: bool = True) -> Pipeline:
         """The configured stages after the follower, with or without `samples`; LivebodeError if one is not possible."""
         settings = follower.settings
-        return cls(follower, Fits.of(axis.fit, settings.loop), change_detection(axis, settings, samples=samples), axis)
+        fits = Fits.of(axis.fit, settings.loop, plant_kinds(channels, settings)) if axis.fit else None
+        return cls(follower, fits, change_detection(axis, settings, samples=samples), axis)
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> Pipeline:
         """The same for a live source, whose channels and rate are known; LivebodeError if they do not fit."""
-        pipeline = cls.of(axis, live_follower(axis, source.rate_hz, source.spectra), samples=source.spectra is None)
+        follower = live_follower(axis, source.rate_hz, source.spectra)
+        pipeline = cls.of(axis, follower, source.channels, samples=source.spectra is None)
         names = [channel.name for channel in source.channels]
         for name in pipeline.channels:
             if name not in names:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from livebode.configuration.axis import Axis
 from livebode.core import Event
+from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
 from livebode.preparation.aligned import AlignedLog, slip_event, slips_of
 from livebode.preparation.early_spikes import early_spikes
@@ -24,8 +25,16 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     started = time.perf_counter()
     given = axis.source
     assert given.log is not None
-    log = open_log(given.log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=[axis.signals.output])
-    pipeline = Pipeline.of(axis, make_follower(axis, log))
+    log = open_log(
+        given.log,
+        rate_hz=given.rate_hz,
+        time=given.time,
+        kinds=given.kinds,
+        clock=given.clock,
+        dbc=given.dbc,
+        channels=[axis.signals.output],
+    )
+    pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
     slips = slips_of(log, settings)
@@ -38,9 +47,10 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     if isinstance(pipeline.follower, Tracker):
         pipeline.follower.know_spikes(early_spikes(source, settings))
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
-    found["left_out_samples"] = source.first
+    found |= {"left_out_samples": source.first, "clock": log.clock_kind}
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
     loop = RunLoop(
         source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed
     )
-    return loop.run()
+    with moments_by(RunClock.of_kind(log.clock_kind)):
+        return loop.run()

@@ -14,7 +14,7 @@ import numpy as np
 from livebode.analysis.overview import Overview
 from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Event, LivebodeError, Parameters, Responses, SignalError
-from livebode.estimation import response_unit
+from livebode.estimation import plant_kinds, response_unit
 from livebode.fitting import Fit
 from livebode.preparation.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.runtime import summary
@@ -126,7 +126,8 @@ class RunLoop:
         self._noticed, self._ahead = tuple(noticed), LossesAhead()
         self._label = _schedule_label(source, settings.schedule)
         self._about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
-        self._begun = summary.begun(self._about, self._follower, response_unit(source.channels, settings))
+        self._plant = response_unit(source.channels, settings), plant_kinds(source.channels, settings)
+        self._begun = summary.begun(self._about, self._follower, *self._plant)
         self._overview = Overview()
         self._done: dict[str, Any] = {}
         self._found_on_the_way: dict[str, Any] = {}
@@ -324,7 +325,7 @@ class RunLoop:
         self._stream.publish_all(self._source_events() + self._ahead.finish())
         self._stream.publish_all(self._control.take_reported(*self.position) + left)
         fits, detection = self.pipeline.fits, self.pipeline.detection
-        self._done = summary.begun(self._about, self._follower, self._begun["found"]["unit"])
+        self._done = summary.begun(self._about, self._follower, *self._plant)
         self._done |= summary.done(self._follower, self._counts)
         self._newest = None if fits is None else fits.newest()
         self._done |= summary.of_source(self.source) | summary.fitted(fits, self._newest, self._overview.responses())

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis.loop_report import loop_report
-from livebode.core import Responses
+from livebode.core import PlantKinds, Responses
 from livebode.core.clock import moment
 from livebode.fitting import Fit
 from livebode.kernel import instruction_set
@@ -21,9 +21,9 @@ from livebode.runtime.run_counts import RunCounts
 from livebode.sources.live import LiveSource
 
 
-def begun(about: Mapping[str, Any], tracker: Follower, unit: str) -> dict[str, Any]:
+def begun(about: Mapping[str, Any], tracker: Follower, unit: str, kinds: PlantKinds) -> dict[str, Any]:
     """Entries at the beginning: configuration, findings, versions."""
-    found = tracker.found() | {"quantity": tracker.settings.quantity, "unit": unit}
+    found = tracker.found() | {"quantity": tracker.settings.quantity, "unit": unit, "kinds": asdict(kinds)}
     versions = {
         "livebode": version("livebode"),
         "numpy": np.__version__,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge, Lt
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import SimulationError, UsageError
-from livebode.simulation.values import nonnegative, positive
+from livebode.simulation.values import NonNegative, Positive, nonnegative, positive
 
 Floats = NDArray[np.float64]
 
@@ -30,19 +31,23 @@ class Mechanics:
     masses
         2 for (11), (12); 3 for (8)–(10), with the free pulley.
     inertia_kg_m2
-        Js: motor and both pulleys.
+        Js: inertia of motor and both pulleys, kg m².
     pulley_inertia_kg_m2
-        Jp, one pulley. With two masses it is only part of Js.
+        Jp: inertia of one pulley, kg m². With two masses it is only part of Js.
     load_kg
-        mL, the cart.
+        mL: mass of the cart, kg.
     radius_m
-        r of both pulleys.
+        r: radius of both pulleys, m.
     pulley_distance_m
-        l3.
-    stiffness_n_per_m, damping_n_s_per_m
-        Keff and bs with the cart at `nominal_position_m`.
+        l3: distance of the pulleys, m.
+    stiffness_n_per_m
+        Keff: stiffness of the belt with the cart at `nominal_position_m`, N/m.
+    damping_n_s_per_m
+        bs: damping of the belt with the cart at `nominal_position_m`, N s/m.
+    nominal_position_m
+        Position of the cart to which stiffness and damping belong, m.
     frozen_position_m
-        The spans are always those of the cart at this position: a linear machine. None: they follow the cart.
+        The spans are always those of the cart at this position, m: a linear machine. Default: they follow the cart.
     eccentricity
         The motor's pulley has the radius r·(1 + eccentricity·sin φ), so that the cart deviates from r·φ accordingly.
         Linearisations do not include it.
@@ -62,16 +67,16 @@ class Mechanics:
     """
 
     masses: Literal[2, 3] = 2
-    inertia_kg_m2: float = 0.0028
-    pulley_inertia_kg_m2: float = 1.8e-4
-    load_kg: float = 6.7
-    radius_m: float = 0.019
-    pulley_distance_m: float = 2.14
-    stiffness_n_per_m: float = 5.0e5
-    damping_n_s_per_m: float = 130.0
-    nominal_position_m: float = 0.8
-    frozen_position_m: float | None = None
-    eccentricity: float = 0.0
+    inertia_kg_m2: Positive = 0.0028
+    pulley_inertia_kg_m2: Positive = 1.8e-4
+    load_kg: Positive = 6.7
+    radius_m: Positive = 0.019
+    pulley_distance_m: Positive = 2.14
+    stiffness_n_per_m: Positive = 5.0e5
+    damping_n_s_per_m: NonNegative = 130.0
+    nominal_position_m: Positive = 0.8
+    frozen_position_m: Positive | None = None
+    eccentricity: Annotated[float, Ge(0), Lt(1)] = 0.0
 
     def __post_init__(self) -> None:
         if self.masses not in (2, 3):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from livebode.core import UsageError
 from livebode.simulation.settings import Limits
-from livebode.simulation.values import nonnegative, positive
+from livebode.simulation.values import NonNegative, Positive, nonnegative, positive
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +35,13 @@ class Motion(Protocol):
 class Standstill:
     """The cart is held at one position.
 
+    Parameters
+    ----------
+    position_m
+        Position of the cart, m.
+
+    Examples
+    --------
     >>> Standstill(position_m=0.8).cycle(4000)
     (array([0.8]), array([0.]))
     """
@@ -57,12 +64,18 @@ class Strokes:
 
     Parameters
     ----------
-    start_m, end_m
-        Position of the first dwell, and turning point.
-    speed_m_per_s, acceleration_m_per_s2, jerk_m_per_s3
-        Limits of the reference; an infinite jerk gives trapezoids.
+    start_m
+        Position of the first dwell, m.
+    end_m
+        Position of the turning point, m.
+    speed_m_per_s
+        Largest speed of the reference, m/s.
+    acceleration_m_per_s2
+        Largest acceleration of the reference, m/s².
+    jerk_m_per_s3
+        Largest jerk of the reference, m/s³. Default: no limit, which gives trapezoids.
     dwell_s
-        Rest before each stroke.
+        Rest before each stroke, s.
 
     Raises
     ------
@@ -77,12 +90,12 @@ class Strokes:
     (3900, 0.4, 1.2, 0.5)
     """
 
-    start_m: float = 0.25
-    end_m: float = 1.6
-    speed_m_per_s: float = 0.38
-    acceleration_m_per_s2: float = 4.0
-    jerk_m_per_s3: float = inf
-    dwell_s: float = 0.25
+    start_m: Positive = 0.25
+    end_m: Positive = 1.6
+    speed_m_per_s: Positive = 0.38
+    acceleration_m_per_s2: Positive = 4.0
+    jerk_m_per_s3: Positive = inf
+    dwell_s: NonNegative = 0.25
 
     def __post_init__(self) -> None:
         positive(self, "start_m", "end_m", "speed_m_per_s", "acceleration_m_per_s2")

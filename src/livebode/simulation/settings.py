@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, isnan, pi
+from typing import Annotated
+
+from annotated_types import Ge, Le
 
 from livebode.core import PID, Cascade, Loop, UsageError
-from livebode.simulation.values import count, nonnegative, positive
+from livebode.simulation.values import NonNegative, Positive, count, nonnegative, positive
 
 DELAY_TICKS_MAX = 64
+_COUNTS_MAX = 1 << 32
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,16 +22,35 @@ class Friction:
     viscous·v + (coulomb + stribeck/(1 + (v/vs)²))·v/√(v² + w²): v is the speed at the belt (of the shaft for the
     motor's viscous part), vs `stribeck_speed_m_per_s`, w `smoothing_m_per_s`. The Stribeck term is that of Hess and
     Soom (J. Tribology 112, 1990); the smooth sign, and so the absence of true sticking, keeps the equations analytic.
+
+    Parameters
+    ----------
+    motor_coulomb_n_m
+        Coulomb friction of the motor's shaft, N m.
+    motor_viscous_n_m_s
+        Viscous friction of the motor's shaft, N m s.
+    motor_stribeck_n_m
+        Additional friction of the motor's shaft near standstill, N m.
+    load_coulomb_n
+        Coulomb friction of the cart, N.
+    load_viscous_n_s_per_m
+        Viscous friction of the cart, N s/m.
+    load_stribeck_n
+        Additional friction of the cart near standstill, N.
+    stribeck_speed_m_per_s
+        Speed at which half of the Stribeck term is left, m/s.
+    smoothing_m_per_s
+        Speed over which the sign of the friction is smoothed, m/s.
     """
 
-    motor_coulomb_n_m: float = 0.0
-    motor_viscous_n_m_s: float = 0.0
-    motor_stribeck_n_m: float = 0.0
-    load_coulomb_n: float = 0.0
-    load_viscous_n_s_per_m: float = 0.0
-    load_stribeck_n: float = 0.0
-    stribeck_speed_m_per_s: float = 0.05
-    smoothing_m_per_s: float = 0.01
+    motor_coulomb_n_m: NonNegative = 0.0
+    motor_viscous_n_m_s: NonNegative = 0.0
+    motor_stribeck_n_m: NonNegative = 0.0
+    load_coulomb_n: NonNegative = 0.0
+    load_viscous_n_s_per_m: NonNegative = 0.0
+    load_stribeck_n: NonNegative = 0.0
+    stribeck_speed_m_per_s: Positive = 0.05
+    smoothing_m_per_s: Positive = 0.01
 
     def __post_init__(self) -> None:
         nonnegative(self, *(name for name in self.__dataclass_fields__ if name.startswith(("motor", "load"))))
@@ -49,35 +72,43 @@ class Drive:
     Parameters
     ----------
     rate_hz
-        Ticks per second: the rate of the record.
-    velocity_rate_hz, position_rate_hz
-        Rates of the two controllers; each divides the one above it, and its output is held in between.
-    velocity_gain_n_m_s, integral_time_s
-        Kvc and Ti of the PI velocity controller, backward integrator.
-    position_gain_per_s, velocity_feedforward
-        Kpc of the P position controller, and the share of the reference velocity that it adds.
+        Ticks per second, Hz: the rate of the record.
+    velocity_rate_hz
+        Rate of the velocity controller, Hz; divides rate_hz. Its output is held in between.
+    position_rate_hz
+        Rate of the position controller, Hz; divides velocity_rate_hz. Its output is held in between.
+    velocity_gain_n_m_s
+        Gain Kvc of the PI velocity controller, N m s.
+    integral_time_s
+        Integral time Ti of the PI velocity controller, s; backward integrator.
+    position_gain_per_s
+        Gain Kpc of the P position controller, 1/s.
+    velocity_feedforward
+        Share of the reference velocity that the position controller adds.
     delay_ticks
         Ticks between reading and the velocity controller's output acting; the excitation is added after it.
     torque_n_m_max
-        The torque u is limited to ±this value, and the integrator stops meanwhile; infinite by default.
-    torque_ripple_n_m, torque_ripple_per_turn
-        Amplitude·sin(periods·φ) added to the torque after the logged u.
+        The torque u is limited to ± this value, N m, and the integrator stops meanwhile. Default: no limit.
+    torque_ripple_n_m
+        Amplitude of a torque ripple that is added after the logged u, N m.
+    torque_ripple_per_turn
+        Periods of the torque ripple per turn of the motor.
     torque_noise_n_m
-        Standard deviation of a white Gaussian torque added after the logged u, constant over a tick.
+        Standard deviation of a white Gaussian torque that is added after the logged u, N m; constant over a tick.
     """
 
-    rate_hz: float = 4000.0
-    velocity_rate_hz: float = 4000.0
-    position_rate_hz: float = 2000.0
-    velocity_gain_n_m_s: float = 0.2308
-    integral_time_s: float = 0.2
-    position_gain_per_s: float = 1.0
-    velocity_feedforward: float = 1.0
-    delay_ticks: int = 0
-    torque_n_m_max: float = inf
-    torque_ripple_n_m: float = 0.0
-    torque_ripple_per_turn: float = 24.0
-    torque_noise_n_m: float = 0.0
+    rate_hz: Positive = 4000.0
+    velocity_rate_hz: Positive = 4000.0
+    position_rate_hz: Positive = 2000.0
+    velocity_gain_n_m_s: NonNegative = 0.2308
+    integral_time_s: Positive = 0.2
+    position_gain_per_s: NonNegative = 1.0
+    velocity_feedforward: NonNegative = 1.0
+    delay_ticks: Annotated[int, Ge(0), Le(DELAY_TICKS_MAX)] = 0
+    torque_n_m_max: Positive = inf
+    torque_ripple_n_m: NonNegative = 0.0
+    torque_ripple_per_turn: Positive = 24.0
+    torque_noise_n_m: NonNegative = 0.0
 
     def __post_init__(self) -> None:
         positive(self, "rate_hz", "velocity_rate_hz", "position_rate_hz", "integral_time_s", "torque_ripple_per_turn")
@@ -115,12 +146,12 @@ class Drive:
             gain=self.velocity_gain_n_m_s,
             integral_time_s=self.integral_time_s,
             rate_hz=self.velocity_rate_hz,
-            held_ticks=self.velocity_ticks,
+            rate_divider=self.velocity_ticks,
             delay_ticks=self.delay_ticks,
         )
         ratio = round(self.velocity_rate_hz / self.position_rate_hz)
         return Loop(
-            Cascade(velocity, PID(gain=self.position_gain_per_s, rate_hz=self.position_rate_hz, held_ticks=ratio))
+            Cascade(velocity, PID(gain=self.position_gain_per_s, rate_hz=self.position_rate_hz, rate_divider=ratio))
         )
 
 
@@ -145,21 +176,22 @@ class Sensor:
     Parameters
     ----------
     noise_rad_per_s
-        Standard deviation of white Gaussian noise on the read velocity.
+        Standard deviation of white Gaussian noise on the read velocity, rad/s.
     encoder_counts_per_turn
-        The angle is rounded to these; the velocity contains the rounding's differences times the rate. 0: exact.
+        Counts of the encoder per turn: the angle is rounded to these, and the velocity contains the rounding's
+        differences times the rate. 0: exact.
     velocity_differenced
         The velocity is the difference of the last two angles times the rate, with its lag of half a tick; else the
         velocity at the tick itself.
     """
 
-    noise_rad_per_s: float = 0.0
-    encoder_counts_per_turn: int = 0
+    noise_rad_per_s: NonNegative = 0.0
+    encoder_counts_per_turn: Annotated[int, Ge(0), Le(_COUNTS_MAX)] = 0
     velocity_differenced: bool = False
 
     def __post_init__(self) -> None:
         nonnegative(self, "noise_rad_per_s")
-        count(self, "encoder_counts_per_turn", 1 << 32)
+        count(self, "encoder_counts_per_turn", _COUNTS_MAX)
 
     @property
     def encoder_step_rad(self) -> float:
@@ -171,13 +203,26 @@ class Limits:
     """Limits of the machine: a stroke of 1.6 m between the pulleys, 3000 rpm and 14.5 N m of Nevaranta's motor.
 
     The reference is always within them; the cart itself may overrun the stroke by `overrun_m` before the run stops.
+
+    Parameters
+    ----------
+    position_m_min
+        Lowest position of the cart, m.
+    position_m_max
+        Highest position of the cart, m.
+    overrun_m
+        Distance by which the cart may leave the stroke before the run stops, m.
+    speed_m_per_s_max
+        Largest speed of the reference, m/s.
+    acceleration_m_per_s2_max
+        Largest acceleration of the reference, m/s².
     """
 
-    position_m_min: float = 0.2
-    position_m_max: float = 1.8
-    overrun_m: float = 0.05
-    speed_m_per_s_max: float = 5.9
-    acceleration_m_per_s2_max: float = 50.0
+    position_m_min: Positive = 0.2
+    position_m_max: Positive = 1.8
+    overrun_m: NonNegative = 0.05
+    speed_m_per_s_max: Positive = 5.9
+    acceleration_m_per_s2_max: Positive = 50.0
 
     def __post_init__(self) -> None:
         positive(self, "position_m_min", "position_m_max", "speed_m_per_s_max", "acceleration_m_per_s2_max")

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from math import isfinite
+from typing import Annotated
+
+from annotated_types import Ge, Gt
 
 from livebode.core import UsageError
+
+Positive = Annotated[float, Gt(0)]
+NonNegative = Annotated[float, Ge(0)]
+"""Limits for the schema of a file; `positive` and `nonnegative` check them."""
 
 
 def positive(owner: object, *names: str) -> None:

@@ -28,7 +28,7 @@ def messages_of(dbc: Path | None, path: Path) -> dict[tuple[int, bool], Any]:
         raise RecordingError(
             "dbc-missing",
             f"{path} contains CAN frames, whose signals only a DBC file defines",
-            "give --dbc FILE, or dbc in [source]",
+            "set dbc to the file that defines them",
             path=str(path),
             argument="dbc",
         )

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, RecordingError, UsageError
+from livebode.core import Block, Channel, QuantityKind, RecordingError, UsageError
+from livebode.core.clock import ClockKind
 from livebode.sources.naming import resolve
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
@@ -31,17 +32,24 @@ class Log:
     ...     _ = path.write_text("t [s],iq [A]\\n0.000,1.5\\n0.001,1.6\\n0.002,1.7\\n")
     ...     log = open_log(path)
     >>> log.format, log.rate_hz, log.channels[1]
-    ('csv', 1000.0, Channel(name='iq', unit='A'))
+    ('csv', 1000.0, Channel(name='iq', unit='A', kind='current'))
     """
 
     def __init__(
-        self, recording: Recording, columns: Sequence[Column], chosen: Sequence[str], clock: Clock, block_samples: int
+        self,
+        recording: Recording,
+        columns: Sequence[Column],
+        chosen: Sequence[str],
+        clock: Clock,
+        block_samples: int,
+        kinds: Mapping[str, QuantityKind],
     ) -> None:
         self._recording = recording
         self._columns = tuple(columns)
         self._chosen = tuple(chosen)
         self._clock = clock
         self._block_samples = block_samples
+        self._kinds = kinds
 
     @property
     def path(self) -> Path:
@@ -49,13 +57,13 @@ class Log:
 
     @property
     def format(self) -> str:
-        """Name of the format: csv, parquet, arrow, mat, hdf5, npz or sinumerik."""
+        """Name of the format: csv, parquet, arrow, mat, …; `docs/reference/readers.md` lists them."""
         return self._recording.format
 
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Everything that `blocks` can read, in the order of the file."""
-        return tuple(Channel(column.name, column.unit) for column in self._columns if not column.temporal)
+        return tuple(self._label(column, column.name) for column in self._columns if not column.temporal)
 
     @property
     def aliases(self) -> Mapping[str, str]:
@@ -98,6 +106,11 @@ class Log:
     def rate_origin(self) -> str:
         """Origin of the rate: "given", "time column 't' in s", "'fs' in the file", "metadata"; and what agrees."""
         return self._clock.rate_origin
+
+    @property
+    def clock_kind(self) -> ClockKind:
+        """Whether its times are seconds since 1970 ("utc"), or since any other moment ("relative")."""
+        return self._clock.kind
 
     @property
     def timing(self) -> Timing | None:
@@ -149,8 +162,12 @@ class Log:
             )
         with located(self.path):
             columns = [resolve(name, self._columns, self._recording.columns) for name in names]
-        labels = tuple(Channel(name, column.unit) for name, column in zip(names, columns))
+        labels = tuple(self._label(column, name) for name, column in zip(names, columns))
         return self._cut(self._read(columns, limit), labels, limit)
+
+    def _label(self, column: Column, name: str) -> Channel:
+        kind = self._kinds.get(column.name)
+        return Channel(name, column.unit) if kind is None else Channel(name, column.unit, kind)
 
     def _read(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         return guarded(self._recording.chunks(columns, rows), self._recording.path, self._recording.format)

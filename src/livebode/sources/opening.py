@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from livebode.core import RecordingError, UsageError
+from livebode.core import QuantityKind, RecordingError, UsageError
+from livebode.core.clock import ClockKind
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import resolve
@@ -28,6 +29,8 @@ def open_log(
     channels: Sequence[str] | None = None,
     dbc: str | os.PathLike[str] | None = None,
     block_samples: int = 65536,
+    kinds: Mapping[str, QuantityKind] | None = None,
+    clock: ClockKind | None = None,
 ) -> Log:
     """Open a recording of any format that `docs/reference/readers.md` lists.
 
@@ -46,6 +49,11 @@ def open_log(
         File that defines the signals in CAN frames, for BLF and ASC.
     block_samples
         Largest length of a Block.
+    kinds
+        Kind of quantity of some channels, by name. Default: the one that the unit shows (`Channel`).
+    clock
+        Whether the time column is in seconds since 1970 ("utc") or since any other moment ("relative"). Default: from
+        its first value; "relative" without a time column.
 
     Raises
     ------
@@ -67,7 +75,7 @@ def open_log(
     ...     [block["iq"] for block in log.blocks(["iq"])]
     [array([1.5, 1.6, 1.7])]
     >>> log.rate_hz, log.channels[1]
-    (1000.0, Channel(name='iq', unit='A'))
+    (1000.0, Channel(name='iq', unit='A', kind='current'))
     """
     if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
         raise UsageError(
@@ -80,13 +88,19 @@ def open_log(
     checked_block_samples(block_samples)
     recording = open_recording(Path(path), None if dbc is None else Path(dbc))
     with located(recording.path):
-        log = log_of(recording, rate_hz, time, channels, block_samples)
+        log = log_of(recording, rate_hz, time, channels, block_samples, kinds or {}, clock)
     _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)
     return log
 
 
 def log_of(
-    recording: Recording, rate_hz: float | None, time: str | None, channels: Sequence[str] | None, block_samples: int
+    recording: Recording,
+    rate_hz: float | None,
+    time: str | None,
+    channels: Sequence[str] | None,
+    block_samples: int,
+    kinds: Mapping[str, QuantityKind],
+    clock_kind: ClockKind | None,
 ) -> Log:
     """The log of an open recording; parameters as in `open_log`."""
     columns = together(recording, channels)
@@ -99,17 +113,29 @@ def log_of(
             "check that the recording is complete",
             path=str(recording.path),
         )
-    return Log(recording, columns, chosen, find_clock(recording, time_column, unit, rate_hz), block_samples)
+    declared = {resolve(name, columns, recording.columns).name: kind for name, kind in kinds.items()}
+    if clock_kind == "utc" and time_column is None:
+        raise UsageError(
+            "conflict",
+            "clock='utc' is the kind of a time column, and the recording has none",
+            "name its time column, or omit clock",
+            argument="clock",
+            value=clock_kind,
+        )
+    clock = find_clock(recording, time_column, unit, rate_hz, clock_kind)
+    return Log(recording, columns, chosen, clock, block_samples, declared)
 
 
-def find_clock(recording: Recording, column: Column | None, unit: str, rate_hz: float | None) -> Clock:
+def find_clock(
+    recording: Recording, column: Column | None, unit: str, rate_hz: float | None, kind: ClockKind | None = None
+) -> Clock:
     """Rate and gaps: from the time column, from the format or a number in the file, or as given."""
     stated = rate_in_file(recording.scalars)
     if recording.rate_hz is not None:
         stated = recording.rate_hz, "metadata"
     if column is not None:
         chunks = guarded(recording.chunks([column], 1 << 16), recording.path, recording.format)
-        return clock_from_time(column, unit, chunks, rate_hz, stated)
+        return clock_from_time(column, unit, chunks, rate_hz, stated, kind)
     if rate_hz is not None:
         if recording.rate_hz is not None and abs(recording.rate_hz / rate_hz - 1) > 1e-3:
             raise RecordingError(

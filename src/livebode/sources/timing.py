@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import RecordingError, nearest_name
+from livebode.core.clock import ClockKind, clock_kind_of
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.steps import Gap, Steps
@@ -63,6 +64,7 @@ class Clock:
     rate_origin: str
     samples: int | None = None
     origin_s: float = 0.0
+    kind: ClockKind = "relative"
     timing: Timing | None = None
     gap_rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     gap_missing: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
@@ -135,7 +137,12 @@ def rate_in_file(scalars: Mapping[str, float]) -> tuple[float, str] | None:
 
 
 def clock_from_time(
-    column: Column, unit: str, chunks: Iterator[Chunk], rate_hz: float | None, stated: tuple[float, str] | None
+    column: Column,
+    unit: str,
+    chunks: Iterator[Chunk],
+    rate_hz: float | None,
+    stated: tuple[float, str] | None,
+    kind: ClockKind | None = None,
 ) -> Clock:
     """The clock from a time column, in one pass over it.
 
@@ -149,6 +156,8 @@ def clock_from_time(
         Rate from the user; treated as exact, and rejected if the column contradicts it.
     stated
         Rate stated elsewhere in the file; used only if the unit of time is missing.
+    kind
+        Kind of the clock from the user.
     """
     unit = stated_unit(column, unit)
     steps = Steps(column.name)
@@ -176,6 +185,7 @@ def clock_from_time(
         f"given; {origin} agrees" if rate_hz is not None else origin,
         steps.rows,
         float(steps.first) * scale,
+        kind or clock_kind_of(float(steps.first) * scale),
         summary(column.name, unit, scale, steps),
         np.array(steps.gap_rows, dtype=np.int64),
         np.array(steps.gap_missing, dtype=np.int64),

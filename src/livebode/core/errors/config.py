@@ -37,6 +37,7 @@ class ConfigError(LivebodeError):
         "key-missing": "A required key is missing.",
         "key-unknown": "There is no such key.",
         "key-unused": "A key has no meaning for this kind of source.",
+        "kind-needed": "A model needs the kind of a channel, which its unit does not show and no key declares.",
         "needs-samples": "A key needs samples, and the drive sends spectra.",
         "nested-too-deeply": "Values are nested deeper than any configuration has them.",
         "not-text": "The file is not text.",

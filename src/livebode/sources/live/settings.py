@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from livebode.core import Channel, ConfigError
+from livebode.core import Channel, ConfigError, QuantityKind
+from livebode.core.clock import ClockKind
 from livebode.sources.units import split_unit
 
 File = Annotated[Path, Field(strict=False)]
@@ -23,20 +24,84 @@ TAKEN: dict[str, set[str]] = {
     "opc.tcp": {"rate_hz", "nodes", "sample_node", "security", "server_certificate_file"} | LOGIN | TLS - {"ca_file"},
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
 }
-"""Keys of each kind of URL, in addition to `url` and `timeout_s`."""
+"""Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
+EVERY = {"timeout_s", "kinds"}
 
 
 class SourceSettings(BaseModel):
-    """[source]: a recording (`log`), one that grows (`follow`), or a machine (`url`); docs/how-to/live.md has its keys.
+    """[source]: a recording (`log`), one that grows (`follow`), or a live source (`url`).
 
-    Relative paths are relative to the file that contains them.
+    Parameters
+    ----------
+    log
+        The recording, relative to this file.
+    time
+        Time column of the recording, with its unit if the file does not state it: "clock [us]". "none" ignores it.
+        Default: found by name.
+    clock
+        What the time column of a recording counts. "utc": seconds since 1970. "relative": seconds since any other
+        moment. Default: by its first value.
+    dbc
+        DBC file that defines the signals of a recording of CAN frames, relative to this file.
+    follow
+        The recording grows: a text table, or a directory of recordings.
+    url
+        Address of a live source, instead of log: kind://host:port; without user and password. Its scheme is the kind.
+    rate_hz
+        Samples per second, in Hz. Default: from the recording or the sender.
+    timeout_s
+        Time to the first samples after which a live source is reported as silent, in seconds.
+    reorder_batches
+        Number of batches by which a batch may be late (UDP, MQTT).
+    sender
+        The only permitted IP address of the sender (UDP). Default: any.
+    username
+        User name at the broker or server (MQTT, OPC UA).
+    password_env
+        Environment variable with the password (MQTT, OPC UA).
+    password_file
+        File with the password, relative to this file (MQTT, OPC UA).
+    ca_file
+        Certificate of the authority that signed the broker's certificate, relative to this file (mqtts).
+    certificate_file
+        Certificate of livebode, relative to this file (mqtts, OPC UA).
+    key_file
+        Private key of livebode, relative to this file (mqtts, OPC UA).
+    server_certificate_file
+        Certificate of the server, relative to this file (OPC UA).
+    security
+        Security policy; messages are signed and encrypted (OPC UA). Default: no security.
+    client_id
+        Name of the client, for which the broker stores messages while livebode is disconnected (MQTT).
+    nodes
+        Node id of each channel: "w [N m]" = "ns=2;s=axis.w" (OPC UA).
+    sample_node
+        Node id of the number of the batch's first sample (OPC UA). Default: from the time stamps.
+    symbol
+        Symbol of the ring, or of the array that is notified (ADS).
+    channels
+        Channels in the order of the symbol, each with its unit: "w [N m]" (ADS).
+    mode
+        "ring": reads a ring in the PLC program, without losses. "notify": the PLC sends each sample (ADS).
+    net_id
+        AMS net id of the PLC (ADS).
+    local_net_id
+        AMS net id of this computer, for which the PLC has a route (ADS).
+    ams_port
+        AMS port of the PLC runtime (ADS).
+    kinds
+        Kind of quantity of channels whose unit does not show it, or shows another: { speed = "velocity" }. Default: by
+        the unit.
+    poll_s
+        Time between reads of the ring, in seconds (ADS).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     log: File | None = None
     time: str | None = None
+    clock: ClockKind | None = None
     dbc: File | None = None
     follow: bool = False
     url: str | None = None
@@ -61,6 +126,7 @@ class SourceSettings(BaseModel):
     net_id: str | None = None
     local_net_id: str | None = None
     ams_port: Annotated[int, Field(ge=1, le=65535)] = 851
+    kinds: dict[str, QuantityKind] = {}
     poll_s: Annotated[float, Field(gt=0, le=10)] = 0.05
 
     @property
@@ -84,7 +150,7 @@ class SourceSettings(BaseModel):
 def check_keys(settings: SourceSettings, kind: str) -> None:
     """ConfigError for a key that does not apply to this kind of source: the scheme of a URL, or "log"."""
     taken = LOG if kind == "log" else TAKEN[kind] | {"url"}
-    if stray := sorted(settings.model_fields_set - taken - {"timeout_s"}):
+    if stray := sorted(settings.model_fields_set - taken - EVERY):
         raise ConfigError(
             "key-unused",
             f"source.{stray[0]} does not apply to {kind}",
@@ -99,6 +165,6 @@ def named_channels(headings: list[str]) -> tuple[Channel, ...]:
     """Channels from their names, each with its unit in brackets.
 
     >>> named_channels(["w [N m]", "y"])
-    (Channel(name='w', unit='N m'), Channel(name='y', unit=''))
+    (Channel(name='w', unit='N m', kind='torque'), Channel(name='y', unit='', kind='other'))
     """
     return tuple(Channel(*split_unit(heading)) for heading in headings)

@@ -16,7 +16,7 @@ import numpy as np
 
 from livebode.core import Channel, Event, LivebodeError, SourceError, SpectraLayout, nearest_name
 from livebode.sources.live.address import Address
-from livebode.sources.live.batch import LiveBlock
+from livebode.sources.live.batch import LiveBlock, with_kinds
 from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
@@ -176,6 +176,7 @@ class LiveSource(ABC):
                 self._raise_failure()
                 raise self._refused or self._silence(asked)
             self._take(TICK_S)
+        self._check_kinds()
         self._log(logging.INFO, f"{len(self.channels)} channels at {self.rate_hz:.9g} Hz")
         return self
 
@@ -198,13 +199,7 @@ class LiveSource(ABC):
         names = [channel.name for channel in self.channels]
         for name in channels or ():
             if name not in names:
-                raise SourceError(
-                    "channel-unknown",
-                    f"there is no channel {name!r}",
-                    nearest_name(name, names),
-                    channel=name,
-                    channels=names,
-                )
+                raise channel_unknown(name, names)
         rows = [names.index(name) for name in (names if channels is None else channels)]
         labels = tuple(self.channels[row] for row in rows)
         if rows == list(range(len(names))):
@@ -249,6 +244,14 @@ class LiveSource(ABC):
             self._ready += self._sequencer.poll(time.monotonic())
         else:
             self._ready += self._sequencer.push(batch)
+
+    def _check_kinds(self) -> None:
+        """SourceError if a kind is declared for a channel that the stream does not have."""
+        names = [channel.name for channel in self.channels]
+        for name in self.settings.kinds:
+            if name not in names:
+                self.close()
+                raise channel_unknown(name, names)
 
     def _silence(self, asked: bool) -> SourceError:
         """The error that no samples arrived before the source was stopped or the timeout."""
@@ -303,7 +306,7 @@ class LiveSource(ABC):
     def _announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
         """Set the channels of a record that continues; they are known before new samples arrive."""
         if self._resumed is not None:
-            self._sequencer.schema.announce(channels, rate_hz)
+            self._sequencer.schema.announce(with_kinds(channels, self.settings.kinds), rate_hz)
 
     def _lost_connection(self, why: str) -> None:
         if not self._outage:
@@ -316,6 +319,7 @@ class LiveSource(ABC):
 
     def _deliver(self, batch: AnyBatch) -> None:
         now = time.monotonic()
+        batch = batch.with_kinds(self.settings.kinds) if self.settings.kinds else batch
         self._pauses.reset()
         latency = None
         if batch.stamp_s is not None:
@@ -329,6 +333,13 @@ class LiveSource(ABC):
             self._dropped.finish()
         elif not self._stop.is_set():
             self._dropped.take(batch)
+
+
+def channel_unknown(name: str, names: list[str]) -> SourceError:
+    """The error that the stream has no channel of this name."""
+    return SourceError(
+        "channel-unknown", f"there is no channel {name!r}", nearest_name(name, names), channel=name, channels=names
+    )
 
 
 def _rows(block: LiveBlock, rows: list[int], channels: tuple[Channel, ...]) -> LiveBlock:

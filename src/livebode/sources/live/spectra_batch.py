@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, SourceError, Spectra, SpectraLayout, rms
-from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers
+from livebode.core import Channel, QuantityKind, SourceError, Spectra, SpectraLayout, rms
+from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers, with_kinds
 from livebode.sources.live.position import Origin
 
 
@@ -96,6 +97,11 @@ class SpectraBatch:
     @property
     def nbytes(self) -> int:
         return int(self.sums.nbytes + self.values.nbytes + self.state.nbytes)
+
+    def with_kinds(self, kinds: Mapping[str, QuantityKind]) -> SpectraBatch:
+        """The same with the declared kinds of its channels."""
+        signals, values = (with_kinds(part, kinds) for part in (self.layout.signals, self.layout.values))
+        return replace(self, layout=replace(self.layout, signals=signals, values=values))
 
     def block(self, number: int, start: int, gap: bool) -> LiveSpectra:
         """Spectra from sample `start` of the sender, which gets the number `number`."""

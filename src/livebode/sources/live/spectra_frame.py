@@ -85,7 +85,7 @@ def _numbers(word: str, found: dict[str, list[list[str]]]) -> tuple[int, ...]:
 def _channel(word: str, parts: list[str], most: int) -> Channel:
     if not 1 <= len(parts) <= most:
         raise _wrong(f"a layout of spectra has a {word} with {len(parts)} parts, not 1 to {most}", word=word)
-    return Channel(*parts[:2])
+    return Channel(parts[0], "".join(parts[1:2]))
 
 
 def _signal(parts: list[str]) -> tuple[Channel, float, bool]:

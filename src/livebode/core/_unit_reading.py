@@ -1,0 +1,158 @@
+"""From the text of a unit to the kind of quantity that it measures: the only place where such a text decides."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from functools import lru_cache
+from math import pi
+from typing import Literal, get_args
+
+QuantityKind = Literal["torque", "force", "current", "velocity", "position", "acceleration", "other"]
+KINDS: tuple[QuantityKind, ...] = get_args(QuantityKind)
+
+_TEXT_MAX = 64
+_EXPONENT_MAX = 9
+_Dimension = tuple[int, int, int, int, int]  # exponents of m, kg, s, A and of the angle
+
+_NUMBER: _Dimension = (0, 0, 0, 0, 0)
+_METRE: _Dimension = (1, 0, 0, 0, 0)
+_SECOND: _Dimension = (0, 0, 1, 0, 0)
+_AMPERE: _Dimension = (0, 0, 0, 1, 0)
+_ANGLE: _Dimension = (0, 0, 0, 0, 1)
+_NEWTON: _Dimension = (1, 1, -2, 0, 0)
+
+_KIND_OF: dict[_Dimension, QuantityKind] = {
+    (2, 1, -2, 0, 0): "torque",
+    _NEWTON: "force",
+    _AMPERE: "current",
+    _METRE: "position",
+    _ANGLE: "position",
+    (1, 0, -1, 0, 0): "velocity",
+    (0, 0, -1, 0, 1): "velocity",
+    (0, 0, -1, 0, 0): "velocity",
+    (1, 0, -2, 0, 0): "acceleration",
+    (0, 0, -2, 0, 1): "acceleration",
+    (0, 0, -2, 0, 0): "acceleration",
+}
+_PREFIXED = {"m": _METRE, "s": _SECOND, "A": _AMPERE, "N": _NEWTON, "rad": _ANGLE}
+_PREFIXES = {"n": 1e-9, "u": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
+_SYMBOLS: dict[str, tuple[float, _Dimension]] = {
+    **{symbol: (1.0, dimension) for symbol, dimension in _PREFIXED.items()},
+    **{p + s: (factor, dimension) for s, dimension in _PREFIXED.items() for p, factor in _PREFIXES.items()},
+    **dict.fromkeys(("Arms", "Aeff", "Apk"), (1.0, _AMPERE)),
+    **dict.fromkeys(("deg", "degree", "degrees", "°"), (pi / 180, _ANGLE)),
+    **dict.fromkeys(("rev", "turn", "r", "U"), (2 * pi, _ANGLE)),
+    **dict.fromkeys(("rpm", "RPM"), (2 * pi / 60, (0, 0, -1, 0, 1))),
+    "kg": (1.0, (0, 1, 0, 0, 0)),
+    "sec": (1.0, _SECOND),
+    "min": (60.0, _SECOND),
+    "h": (3600.0, _SECOND),
+}
+_TOKEN = re.compile(
+    r"\s*(?:(?P<symbol>[^\W\d_]+|°)(?:(?:\^|\*\*)?(?P<exponent>[+-]?\d+|\([+-]?\d+\)))?|(?P<one>1)(?!\d)"
+    r"|(?P<mark>[/()])|(?:[*·⋅∙.]|-(?!\d)))\s*"
+)
+_TORQUE = re.compile(r"([kMmcμu]?N)([cm]?m)")  # "Nm" is one word in most headings
+
+
+@dataclass(frozen=True)
+class UnitReading:
+    """The quantity that a unit measures.
+
+    Attributes
+    ----------
+    kind
+        Kind of the quantity; "other" for a unit that is not recognised, or that measures none of the other kinds.
+    factor
+        SI units (rad for angles) in one of this unit; 1 for a unit that is not recognised.
+    rotary
+        Whether it contains no length, except in a torque.
+    """
+
+    kind: QuantityKind = "other"
+    factor: float = 1.0
+    rotary: bool = False
+
+
+def read_unit(text: str) -> UnitReading:
+    """What a unit measures, by its dimension; spellings of the same unit give the same.
+
+    Recognised are products and quotients of m, kg, s, min, h, A, N, rad, °, deg, rev and rpm with SI prefixes. The unit
+    1/s is that of an angular velocity.
+
+    >>> [read_unit(text).kind for text in ("N m", "rad s^-1", "mm/s²", "Arms", "1/min", "counts", "")]
+    ['torque', 'velocity', 'acceleration', 'current', 'velocity', 'other', 'other']
+    >>> read_unit("mNm")
+    UnitReading(kind='torque', factor=0.001, rotary=True)
+    """
+    return _read(text) if 0 < len(text) <= _TEXT_MAX else UnitReading()
+
+
+def split_plant_unit(text: str) -> tuple[str, str]:
+    """The units of output and input in the unit of a plant, which is written as "output/(input)".
+
+    >>> split_plant_unit("rad/s/(N m)"), split_plant_unit("m/(A)"), split_plant_unit("")
+    (('rad/s', 'N m'), ('m', 'A'), ('', ''))
+    """
+    depth = 0
+    for at in range(len(text) - 1, 0, -1):
+        depth += (text[at] == ")") - (text[at] == "(")
+        if depth <= 0:
+            return (text[: at - 1], text[at + 1 : -1]) if text[at - 1] == "/" and text[-1] == ")" else ("", "")
+    return "", ""
+
+
+@lru_cache(maxsize=1024)
+def _read(text: str) -> UnitReading:
+    found = _dimension(_tokens(unicodedata.normalize("NFKC", text).replace("−", "-").strip("[] ")))
+    if found is None:
+        return UnitReading()
+    factor, dimension = found
+    kind = _KIND_OF.get(dimension, "other")
+    return UnitReading(kind, factor, kind == "torque" or dimension[0] == 0) if kind != "other" else UnitReading()
+
+
+def _tokens(text: str) -> list[re.Match[str]] | None:
+    """The words and marks of a text; None if there is anything else in it."""
+    found, at = [], 0
+    while at < len(text):
+        match = _TOKEN.match(text, at)
+        if match is None:
+            return None
+        found.append(match)
+        at = match.end()
+    return found
+
+
+def _dimension(tokens: list[re.Match[str]] | None) -> tuple[float, _Dimension] | None:
+    """Factor and dimension of a product; None if it is not one of known units."""
+    factor, dimension = 1.0, list(_NUMBER)
+    signs, sign = [1], 1  # of the open parentheses, and of the next word
+    for token in tokens or ():
+        if token["mark"] == "(":
+            signs.append(signs[-1] * sign)
+        elif token["mark"] == ")":
+            signs.pop()
+        elif token["symbol"]:
+            known = _symbol(token["symbol"])
+            exponent = int((token["exponent"] or "1").strip("()")) * sign * signs[-1]
+            if known is None or abs(exponent) > _EXPONENT_MAX:
+                return None
+            factor *= known[0] ** exponent
+            dimension = [d + exponent * k for d, k in zip(dimension, known[1])]
+        if not signs:
+            return None
+        if token.group().strip():  # a space between "/" and its unit changes nothing
+            sign = -1 if token["mark"] == "/" else 1
+    m, kg, s, a, angle = dimension
+    return (factor, (m, kg, s, a, angle)) if (len(signs), sign) == (1, 1) else None
+
+
+def _symbol(text: str) -> tuple[float, _Dimension] | None:
+    if (known := _SYMBOLS.get(text)) or not (torque := _TORQUE.fullmatch(text)):
+        return known
+    (force, newton), (length, metre) = (_SYMBOLS[part] for part in torque.groups())
+    m, kg, s, a, angle = (f + d for f, d in zip(newton, metre))
+    return force * length, (m, kg, s, a, angle)
