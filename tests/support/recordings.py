@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import shutil
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -18,6 +19,8 @@ import pyarrow.parquet as pq
 import scipy.io
 import scipy.io.wavfile
 from numpy.typing import NDArray
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from livebode.sources import Log
 from livebode.sources import open_log as open_alone
@@ -138,6 +141,26 @@ def write_ulog(path: Path, signals: Signals) -> None:
     path.write_bytes(ulog_file({"log": {"timestamp": time_us, **given}}))
 
 
+def write_ros(storage: StoragePlugin, path: Path, signals: Signals) -> None:
+    """One topic, /log, whose header has the time; a bag is a directory, of which a reader takes the file."""
+    given = {name: values for name, values in signals.items() if name != "t"}
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    fields = "".join(f"float64 {name}\n" for name in given)
+    store.register(get_types_from_msg(f"std_msgs/Header header\n{fields}", "test_msgs/msg/Log"))
+    header, stamp, log = (
+        store.types[name] for name in ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", "test_msgs/msg/Log")
+    )
+    bag = path.with_name(f"{path.stem}_bag")
+    shutil.rmtree(bag, ignore_errors=True)
+    with Writer(bag, version=9, storage_plugin=storage) as writer:
+        topic = writer.add_connection("/log", log.__msgtype__, typestore=store)
+        for at, (time_s, row) in enumerate(zip(clock_s(signals), zip(*given.values(), strict=True), strict=True)):
+            seconds, nanoseconds = divmod(round(time_s * 1e9), 1_000_000_000)
+            message = log(header(stamp(seconds, nanoseconds), "drive"), *row)
+            writer.write(topic, at, store.serialize_cdr(message, log.__msgtype__))
+    next(one for one in bag.iterdir() if one.suffix in (".mcap", ".db3")).rename(path)
+
+
 FD_LENGTHS = 8, 12, 16, 20, 24, 32, 48, 64
 DBC = "frames.dbc"
 
@@ -185,18 +208,29 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "wav": (".wav", write_wav),
     "blf": (".blf", partial(write_frames, can.BLFWriter)),
     "asc": (".asc", partial(write_frames, can.ASCWriter)),
+    "mcap": (".mcap", partial(write_ros, StoragePlugin.MCAP)),
+    "rosbag": (".db3", partial(write_ros, StoragePlugin.SQLITE3)),
 }
 """Ending and writer for each module of `livebode.sources` that reads a format."""
 NAMES = {
     "asc": ("Log.input", "Log.output"),
     "blf": ("Log.input", "Log.output"),
+    "mcap": ("/log.input", "/log.output"),
+    "rosbag": ("/log.input", "/log.output"),
     "ulog": ("log.input", "log.output"),
     "wav": ("c1", "c2"),
 }
 """What the signals input and output are called where the format does not keep these names."""
 OWN_RATE = "sinumerik", "wav"
 """Formats that define a rate and have no time column."""
-CLOCKS = {"asc": "Log.time", "blf": "Log.time", "mdf": "t", "ulog": "log.timestamp"}
+CLOCKS = {
+    "asc": "Log.time",
+    "blf": "Log.time",
+    "mcap": "/log.header.stamp",
+    "mdf": "t",
+    "rosbag": "/log.header.stamp",
+    "ulog": "log.timestamp",
+}
 """The time column of formats that always have one."""
 
 

@@ -81,6 +81,8 @@ FORMATS = (
     Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith((b"MDF     ", b"UnFinMF ")), "mdf"),
     Format("ULog", (".ulg", ".ulog"), lambda head: head.startswith(ULOG_MAGIC), "ulog"),
     Format("WAV", (".wav",), is_wav, "wav"),
+    Format("MCAP", (".mcap",), lambda head: head.startswith(b"\x89MCAP0\r\n"), "mcap"),
+    Format("ROS 2 bag", (".db3",), lambda head: head.startswith(b"SQLite format 3\0"), "rosbag"),
     Format("BLF", (".blf",), lambda head: head.startswith(b"LOGG"), "blf", takes_dbc=True),
     Format("ASC", (".asc",), lambda head: ASC_HEAD.match(head) is not None, "asc", takes_dbc=True),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
