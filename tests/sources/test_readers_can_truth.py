@@ -7,6 +7,7 @@ import sys
 import zlib
 from pathlib import Path
 
+import asammdf
 import can
 import cantools
 import numpy as np
@@ -16,6 +17,7 @@ from livebode.core import ExtraError, RecordingError
 from livebode.sources import open_log
 from tests.support.command import livebode
 from tests.support.errors import refused
+from tests.support.recordings import Mf4Writer
 
 DBC = """VERSION ""
 NS_ :
@@ -33,7 +35,9 @@ BO_ 512 Diagnosis: 8 X
 SIG_VALTYPE_ 2566848512 Angle : 2;
 VAL_ 256 Enabled 1 "on" 0 "off" ;
 """
-WRITERS = {"a.blf": can.BLFWriter, "a.asc": can.ASCWriter}
+
+
+WRITERS = {"a.blf": can.BLFWriter, "a.asc": can.ASCWriter, "a.mf4": Mf4Writer}
 RNG = np.random.default_rng(0)
 SPEED = RNG.integers(-400, 400, 500) / 4
 TORQUE = RNG.integers(-100, 100, 500) / 10
@@ -80,7 +84,8 @@ def test_signals_are_physical_and_each_message_has_its_clock(tmp_path, name):
     np.testing.assert_allclose(angles.time_s - block.time_s, 0.0003, rtol=0, atol=1e-12)
     assert (log.rate_hz, position.rate_hz, position.channels[1].unit) == (500, 500, "rad")
     reasons = {one.name: one.reason for one in log.skipped}
-    assert reasons["1/0x7FF"] == "the DBC does not define this frame"
+    first = 0 if name == "a.mf4" else 1  # python-can writes its own numbers of buses into MF4
+    assert reasons[f"{first}/0x7FF"] == "the DBC does not define this frame"
     assert reasons["Diagnosis"] == "its signals are multiplexed"
     with refused(RecordingError, "clocks-differ", groups=["Drive", "Position"]):
         open_log(path, dbc=dbc, channels=["Drive.Torque", "Position.Angle"])
@@ -89,7 +94,8 @@ def test_signals_are_physical_and_each_message_has_its_clock(tmp_path, name):
 @pytest.mark.parametrize("name", sorted(WRITERS))
 def test_a_message_on_two_buses_is_two_groups(tmp_path, name):
     path, dbc = written(tmp_path, name, frames(positions=2))
-    (block,) = open_log(path, dbc=dbc, channels=["2/Position.Angle"]).blocks()
+    last = 1 if name == "a.mf4" else 2
+    (block,) = open_log(path, dbc=dbc, channels=[f"{last}/Position.Angle"]).blocks()
     np.testing.assert_array_equal(block.data, [ANGLE])
 
 
@@ -107,6 +113,34 @@ def test_without_a_dbc_the_command_says_that_it_is_needed(tmp_path, name):
         open_log(dbc, dbc=dbc)
     with refused(RecordingError, "not-found", path=str(tmp_path / "none.dbc")):
         open_log(path, dbc=tmp_path / "none.dbc")
+
+
+def test_mf4_gives_the_values_of_asammdf(tmp_path):
+    path, dbc = written(tmp_path, "a.mf4", frames())
+    log = open_log(path, dbc=dbc)
+    (block,) = log.blocks(["Drive.Torque", "Drive.Speed", "Drive.time"])
+    with asammdf.MDF(path) as file, file.extract_bus_logging({"CAN": [(dbc, 0)]}) as extracted:
+        for name in ("Torque", "Speed"):
+            signal = extracted.get(name)
+            np.testing.assert_allclose(block[f"Drive.{name}"], signal.samples, rtol=0, atol=1e-12)
+            np.testing.assert_array_equal(block["Drive.time"], signal.timestamps)
+
+
+def test_mf4_with_frames_and_channels_has_both_and_without_frames_takes_no_dbc(tmp_path):
+    path, dbc = written(tmp_path, "a.mf4", frames())
+    signal = asammdf.Signal(np.arange(500.0), np.arange(500) / 1000, name="y")
+    with asammdf.MDF(path) as file:
+        file.append([signal], common_timebase=True)
+        both = file.save(tmp_path / "b.mf4")
+    log = open_log(both)
+    assert [channel.name for channel in log.channels if channel.name != "time"] == ["y"]
+    assert log.skipped[0].reason == "it has CAN frames, whose signals only a DBC file defines"
+    assert "Drive.Torque" in [channel.name for channel in open_log(both, dbc=dbc).channels]
+    with asammdf.MDF(version="4.10") as file:
+        file.append([signal], common_timebase=True)
+        none = file.save(tmp_path / "c.mf4")
+    with refused(RecordingError, "no-frames", path=str(none)):
+        open_log(none, dbc=dbc)
 
 
 def test_a_frame_shorter_than_its_message_is_refused(tmp_path):

@@ -30,6 +30,7 @@ from tests.support.errors import refused
 from tests.support.recordings import (
     OWN_RATE,
     WRITERS,
+    Mf4Writer,
     dspace,
     open_log,
     signals,
@@ -356,13 +357,16 @@ def seeds(module: str, folder: Path) -> bytes:
     if module == "struct73":
         write_dspace73(folder / "a.mat", 50)
         return (folder / "a.mat").read_bytes()
+    if module == "mdf_frames":
+        write_frames(Mf4Writer, folder / "log.mf4", with_time(signals(50)))
+        return (folder / "log.mf4").read_bytes()
     if module == "blf_plain":  # damage reaches the frames
         write_frames(partial(can.BLFWriter, compression_level=0), folder / "log.blf", with_time(signals(50)))
         return (folder / "log.blf").read_bytes()
     return write(module, folder, signals(50) if module in OWN_RATE else with_time(signals(50))).read_bytes()
 
 
-@pytest.mark.parametrize("module", [*MODULES, "struct", "struct73", "blf_plain"])
+@pytest.mark.parametrize("module", [*MODULES, "struct", "struct73", "blf_plain", "mdf_frames"])
 def test_damaged_files_are_read_or_refused(module, tmp_path):
     whole = seeds(module, tmp_path)
     for round_ in range(ROUNDS):
@@ -382,15 +386,15 @@ def peak_kib():  # ru_maxrss would count what the parent held before it started 
         return next(int(line.split()[1]) for line in status if line.startswith("VmHWM"))
 
 before = peak_kib()
-blocks = open_log(sys.argv[1]).blocks(["input", "output"])
+blocks = open_log(sys.argv[1]).blocks(sys.argv[3:])
 blocks = list(blocks) if sys.argv[2] == "kept" else blocks
 print(sum(len(block) for block in blocks), (peak_kib() - before) // 1024)
 """
 
 
-def measured(path: Path, how: str) -> tuple[int, int]:
+def measured(path: Path, how: str, *channels: str) -> tuple[int, int]:
     """Samples read and growth of the peak memory in MiB, with the blocks let go or kept."""
-    command = [sys.executable, "-c", MEASURE, str(path), how]
+    command = [sys.executable, "-c", MEASURE, str(path), how, *(channels or ("input", "output"))]
     read, grown = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
     return int(read), int(grown)
 
@@ -435,6 +439,20 @@ def test_memory_stays_bounded_whatever_the_length(module, tmp_path):
     assert read == samples
     assert kept_mib > samples * 16 / 2**20
     assert grown_mib < kept_mib - samples * 8 / 2**20
+    assert grown_mib < 128
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the peak memory is read from /proc")
+def test_memory_of_a_long_wav_file_is_that_of_a_block(tmp_path):
+    path = write("wav", tmp_path, signals(2))
+    frames = 12_000_000
+    with path.open("r+b") as file:  # two channels of eight bytes, zeros that the disk does not store
+        at = file.read().index(b"data") + 4
+        file.seek(at)
+        file.write(struct.pack("<I", frames * 16))
+        file.truncate(at + 4 + frames * 16)
+    read, grown_mib = measured(path, "let go", "c1", "c2")
+    assert read == frames
     assert grown_mib < 128
 
 

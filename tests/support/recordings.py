@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import scipy.io
 import scipy.io.wavfile
+from can.io.mf4 import MF4Writer
 from numpy.typing import NDArray
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -171,6 +172,14 @@ def write_dbc(path: Path, names: Sequence[str], length: int) -> None:
     kinds = [f"SIG_VALTYPE_ 291 {name} : 2;" for name in names]
     lines = ['VERSION ""', "NS_ :", "BS_:", "BU_: X", f"BO_ 291 Log: {length} X", *signals, *kinds]
     path.write_text("\n".join(lines) + "\n")
+
+
+class Mf4Writer(MF4Writer):
+    """Without the date that python-can subtracts."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._start_time = 0.0
 
 
 def write_frames(writer: type, path: Path, signals: Signals) -> None:

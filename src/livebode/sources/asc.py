@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import IO, Any, ClassVar
 
 from livebode.core import RecordingError
-from livebode.sources.can import CanRecording, import_can
+from livebode.sources.can import VectorRecording, import_can
 from livebode.sources.damage import oversized
 from livebode.sources.formats import ASC_HEAD, HEAD_BYTES
 
 LINE_CHARACTERS_MAX = 1 << 16
 
 
-class AscRecording(CanRecording):
-    """An ASC file; see CanRecording."""
+class AscRecording(VectorRecording):
+    """An ASC file; see VectorRecording."""
 
     format: ClassVar[str] = "asc"
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import IO, Any, ClassVar
 
 from livebode.sources.blfcheck import check
-from livebode.sources.can import CanRecording, import_can
+from livebode.sources.can import VectorRecording, import_can
 
 
-class BlfRecording(CanRecording):
-    """A BLF file; see CanRecording."""
+class BlfRecording(VectorRecording):
+    """A BLF file; see VectorRecording."""
 
     format: ClassVar[str] = "blf"
 

@@ -53,16 +53,8 @@ class CanRecording(Recording):
         self.columns, self.skipped = tuple(columns), tuple(skipped)
 
     @abstractmethod
-    def _reader(self, file: IO[bytes]) -> Any:
-        """The reader of python-can for the file, which is open at its beginning."""
-
     def _frames(self) -> Iterator[tuple[Identity, float, bytes]]:
         """Identity, time in seconds and content of each frame with data."""
-        with self.path.open("rb") as file, self._reader(file) as frames:
-            for frame in frames:
-                if not frame.is_error_frame and not frame.is_remote_frame:
-                    bus = frame.channel + 1 if isinstance(frame.channel, int) else 1
-                    yield (bus, frame.arbitration_id, frame.is_extended_id), frame.timestamp, bytes(frame.data)
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         identity, message, _ = columns[0].key
@@ -83,6 +75,21 @@ class CanRecording(Recording):
                 held = []
         if held:
             yield list(np.array(held, dtype=np.float64).T)
+
+
+class VectorRecording(CanRecording):
+    """A log of Vector, which python-can reads; see CanRecording."""
+
+    @abstractmethod
+    def _reader(self, file: IO[bytes]) -> Any:
+        """The reader of python-can for the file, which is open at its beginning."""
+
+    def _frames(self) -> Iterator[tuple[Identity, float, bytes]]:
+        with self.path.open("rb") as file, self._reader(file) as frames:
+            for frame in frames:
+                if not frame.is_error_frame and not frame.is_remote_frame:
+                    bus = frame.channel + 1 if isinstance(frame.channel, int) else 1
+                    yield (bus, frame.arbitration_id, frame.is_extended_id), frame.timestamp, bytes(frame.data)
 
 
 def message_columns(name: str, message: Any, identity: Identity, samples: int) -> Iterator[Column]:

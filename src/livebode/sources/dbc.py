@@ -43,6 +43,17 @@ def messages_of(dbc: Path | None, path: Path) -> dict[tuple[int, bool], Any]:
     return {(message.frame_id, message.is_extended_frame): message for message in database.messages}
 
 
+def no_frames(path: Path, title: str) -> RecordingError:
+    """The error for a DBC that is given with a file without CAN frames."""
+    return RecordingError(
+        "no-frames",
+        f"{path} is {title}, which has no CAN frames, but dbc is given",
+        "omit dbc, or check that the file is complete",
+        path=str(path),
+        argument="dbc",
+    )
+
+
 def check_sizes(dbc: Path) -> None:
     """RecordingError for a message or signal whose size would fill the memory: cantools builds a mask of its bits."""
     if dbc.stat().st_size > DBC_BYTES_MAX:

@@ -10,9 +10,11 @@ from importlib import import_module
 from pathlib import Path
 
 from livebode.core import LivebodeError, RecordingError
+from livebode.sources.dbc import no_frames
 from livebode.sources.recording import Recording, contained
 
 HEAD_BYTES = 1024
+MDF_MAGIC = b"MDF     ", b"UnFinMF "
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
@@ -34,13 +36,7 @@ class Format:
     def open(self, path: Path, dbc: Path | None = None) -> Recording:
         reader: Callable[..., Recording] = import_module(f"livebode.sources.{self.module}").READER
         if dbc is not None and not self.takes_dbc:
-            raise RecordingError(
-                "no-frames",
-                f"{path} is {self.title}, which has no CAN frames, but dbc is given",
-                "omit dbc, or check that the file is complete",
-                path=str(path),
-                argument="dbc",
-            )
+            raise no_frames(path, self.title)
         with contained(path, self.title):
             return reader(path, dbc) if self.takes_dbc else reader(path)
 
@@ -78,7 +74,7 @@ FORMATS = (
     Format("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), lambda head: head.startswith(HDF5_MAGIC), "hdf5"),
     Format("NPZ", (".npz",), lambda head: head.startswith(b"PK\x03\x04"), "npz"),
     Format("TDMS", (".tdms",), lambda head: head.startswith(b"TDSm"), "tdms"),
-    Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith((b"MDF     ", b"UnFinMF ")), "mdf"),
+    Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith(MDF_MAGIC), "mdf", takes_dbc=True),
     Format("ULog", (".ulg", ".ulog"), lambda head: head.startswith(ULOG_MAGIC), "ulog"),
     Format("WAV", (".wav",), is_wav, "wav"),
     Format("MCAP", (".mcap",), lambda head: head.startswith(b"\x89MCAP0\r\n"), "mcap"),

@@ -46,7 +46,7 @@ def open_log(
     channels
         Channels to read; selects the series that belong together if the file has series of several lengths or clocks.
     dbc
-        File that defines the signals in CAN frames, for BLF and ASC.
+        File that defines the signals in CAN frames, for BLF, ASC and MDF.
     block_samples
         Largest length of a Block.
     kinds
