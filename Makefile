@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test docs lint bench peers studies repeating fit-bounds monitoring healthy temperature fuzz crash damage soak attacks system-packages catalogues lock clean
+.PHONY: help demo test docs lint bench bench-compare release-check peers studies repeating recognition fit-bounds monitoring healthy temperature fuzz crash damage soak attacks system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -66,6 +66,13 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.segments
 	$(BIN)/python -m bench.dashboard
 
+BASE ?=
+bench-compare: $(BUILT)  ## the speed of this version and of another commit, alternately (BASE=REV; default: newest tag or stored result)
+	$(BIN)/python -m bench.versions --base "$(BASE)"
+
+release-check: $(VENV)/.docs  ## what is missing for a release (CONTRIBUTING.md)
+	$(BIN)/python -m tools.release check
+
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/explanation/peers.md)
 	$(BIN)/python -m studies.peers
 
@@ -74,6 +81,9 @@ studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/e
 
 repeating: $(BUILT) ## coverage of the bounds under friction, backlash, encoder steps, hum and noise of many kinds
 	$(BIN)/python -m studies.repeating
+
+recognition: $(BUILT) ## share of 1,000 generated excitations whose period and lines are found exactly
+	$(BIN)/python -m studies.recognition
 
 fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lacks something (docs/explanation/fits.md)
 	$(BIN)/python -m studies.fit_bounds

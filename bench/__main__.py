@@ -1,7 +1,8 @@
 """`python -m bench`: the kernel compared with its alternatives, all in one run.
 
 With --long: the error over 1e9 samples; with --accuracy: the error of the named variants; with --job: the complete
-command; with --record: the cost of a record in segments.
+command; with --record: the cost of a record in segments. With --json FILE: kernel and complete command, stored with
+version and environment (bench/history has one file for each release).
 """
 
 import argparse
@@ -12,7 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from bench import native_build
+from bench import history, native_build
 from bench.accuracy import accuracy
 from bench.long import long_run
 from livebode.kernel import instruction_sets
@@ -52,9 +53,15 @@ def main() -> None:
     parser.add_argument(
         "--record", action="store_true", help="measure the cost of a record in segments, instead of the kernel"
     )
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="measure kernel and complete command, and store the figures here"
+    )
     parser.add_argument("--seconds", type=float, default=0.5, help="duration per contender and cell")
     parser.add_argument("--sets", nargs="+", default=list(instruction_sets()[1:]) or list(instruction_sets()))
     options = parser.parse_args()
+    if options.json:
+        store(options.json, options.seconds, options.sets)
+        return
     result: dict[str, Any]
     if options.long:
         name, result = "long", dict(long_run(int(options.samples)))
@@ -76,6 +83,19 @@ def main() -> None:
     machine = {"machine": platform.machine(), "processor": processor(), "python": platform.python_version()}
     path = RESULTS / f"{name}.json"
     path.write_text(json.dumps({"when": time.time(), **machine, "result": result}, indent=1), encoding="utf-8")
+    print(f"written to {path}")
+
+
+def store(path: Path, seconds: float, sets: list[str]) -> None:
+    """Measure what a release's figures are, and write them."""
+    from bench import job
+
+    # First the command: the peak memory of a child includes that of the process it was forked from.
+    command = job.measure()
+    job.report(command)
+    kernel = speed(seconds, sets)
+    document = history.document([*history.of_kernel(kernel), *history.of_job(command)], processor())
+    path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     print(f"written to {path}")
 
 

@@ -78,18 +78,18 @@ def main() -> None:
     options = parser.parse_args()
     host, _, port = options.target.rpartition(":")
     epoch = secrets.randbits(63)
-    if options.spectra is None:
-        made = frames(options.seconds, epoch)
-    elif not options.spectra > 0:
+    if options.spectra is not None and not options.spectra > 0:
         parser.error(f"--spectra {options.spectra:g} is not above 0; 20 a second is usual")
-    else:
-        try:
+    try:
+        if options.spectra is None:
+            made = frames(options.seconds, epoch)
+        else:
             made = spectra_frames(options.seconds, epoch, layout(options.spectra))
-        except LivebodeError as error:
-            parser.error(f"--spectra {options.spectra:g}: {error}")
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        for frame in made:
-            sender.sendto(frame, (host, int(port)))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for frame in made:
+                sender.sendto(frame, (host, int(port)))
+    except LivebodeError as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

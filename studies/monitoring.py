@@ -121,7 +121,7 @@ class Study:
             "cpu_s": time.process_time() - begun,
         }
         self.target(f"false alarms in {self.count} healthy strokes", len(alarms), max(1.0, self.count / 1000))
-        self._rates(seen.rows(seen.judged))
+        self._rates(seen[seen.judged])
 
     def _rates(self, seen: Evidence) -> None:
         """False alarms of other settings on the same healthy windows: the detector restarts after each alarm."""
@@ -249,7 +249,7 @@ class Study:
                 for block in run(axis(motion, seed))():
                     watcher.process(block, kept.append)
                 seen = Evidence.join(kept)
-                seen = seen.rows(seen.judged)
+                seen = seen[seen.judged]
                 information = np.einsum("rjj->rj", seen.information)
                 row[way] = {
                     "held_percent": (100 / np.sqrt(np.median(information, axis=0))).tolist(),
@@ -282,7 +282,7 @@ def _free(seen: Evidence) -> np.ndarray:
 def raised(detector: MachineDetector, seen: Evidence, i: int) -> bool:
     row = np.zeros(len(seen), dtype=bool)
     row[i] = True
-    return bool(detector.process(seen.rows(row)))
+    return bool(detector.process(seen[row]))
 
 
 def main() -> None:

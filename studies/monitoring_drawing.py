@@ -40,7 +40,7 @@ def draw(machine: LearnedMachine, path: Path) -> None:
             events += watcher.process(block)
             kept += [plain.process(stretch, Offset()) for stretch in stretches.process(block)]
         seen = Evidence.join(kept)
-        seen = seen.rows(seen.judged)
+        seen = seen[seen.judged]
         information = seen.information[:, direction, direction]
         change = 100 * np.expm1(seen.score[:, direction] / information)
         local = "spot" in title

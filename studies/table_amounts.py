@@ -16,9 +16,9 @@ from livebode.excitation import multisine
 from livebode.monitoring import (
     DEFAULT_INTERVAL_S,
     NonOverlappingWindows,
-    Rows,
     ScheduleTable,
     TableMonitor,
+    WindowRows,
     learn_table,
     places,
 )
@@ -29,7 +29,7 @@ LINES = Lines.parse("20:140:8", rate_hz=RATE_HZ, window=WINDOW)
 SETTINGS = Settings(lines=LINES, output="velocity", input="u", excitation="w")
 
 
-def rows(seed: int, seconds: float, *faults: TensionLoss) -> tuple[BeltAxis, list[Rows]]:
+def rows(seed: int, seconds: float, *faults: TensionLoss) -> tuple[BeltAxis, list[WindowRows]]:
     """Of an axis that stands, at each place of the period."""
     axis = BeltAxis(
         motion=Standstill(position_m=0.8),

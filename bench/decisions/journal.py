@@ -24,7 +24,7 @@ import pyarrow as pa
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.frames import ROWS, to_frame
 from livebode.records.segments.journal import FOLDER, Commit, Journal, head, name_of
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 
 STATE, SAMPLES, RESPONSES, LINES, SYNC_S = 60_000, 1000, 5, 21, 1.0
 KILLS, FLIPS = 10, 200

@@ -23,7 +23,7 @@ from livebode.dashboard.past import Past
 from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import RecentResponses
 from livebode.dashboard.state import State
-from livebode.dashboard.trends import POINTS_MAX, Rows, Trend
+from livebode.dashboard.trends import POINTS_MAX, Trend, TrendRows
 from livebode.runtime import RunControl
 from livebode.runtime.documents import ClockSet, RunEnded, RunStarted, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
@@ -170,7 +170,7 @@ def test_a_trend_is_evenly_thinned_however_it_came(sizes: list[int]) -> None:
     trend, at = Trend("two-mass", "Js", "kg m²"), 0
     for size in sizes:
         time_s = np.arange(at, at + size, dtype=float)
-        trend.add(Rows(time_s, time_s, 2 * time_s, time_s, np.full(size, "ok")))
+        trend.add(TrendRows(time_s, time_s, 2 * time_s, time_s, np.full(size, "ok")))
         at += size
     kept = trend.rows()
     assert len(kept) <= POINTS_MAX

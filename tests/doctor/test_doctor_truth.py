@@ -228,7 +228,7 @@ def test_a_directory_that_cannot_be_written_fails() -> None:
 
 
 def test_versions_are_those_of_the_installed_packages() -> None:
-    from livebode.doctor.versions import versions
+    from livebode.doctor.bundle import versions
 
     found = versions()
     assert found["packages"]["numpy"] == version("numpy")

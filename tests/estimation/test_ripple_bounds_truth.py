@@ -13,7 +13,7 @@ from livebode.configuration import Axis
 from livebode.core import Block, Lines, LivebodeError, Responses, UsageError
 from livebode.estimation import RippleOrder, Settings, Tracker, ripple_power
 from livebode.excitation import multisine
-from livebode.monitoring import Baseline, Rows, learn_table
+from livebode.monitoring import Baseline, WindowRows, learn_table
 from livebode.monitoring.ripple import Ripple
 from livebode.motion import MotionCorrection
 from livebode.preparation.plan import live_follower
@@ -111,7 +111,7 @@ def described(**sections: object) -> Axis:
 
 
 def test_orders_come_from_the_configuration_or_else_from_the_baseline(tmp_path: Path) -> None:
-    rows = Rows(
+    rows = WindowRows(
         np.ones((40, len(LINES)), dtype=complex), np.full((40, len(LINES)), 1e-4), np.zeros(40), np.zeros(40),
         0.1 * np.arange(40), 400 * np.arange(40) + 399, np.ones(40, dtype=bool),
     )  # fmt: skip

@@ -23,6 +23,7 @@ from livebode.core import (
     SignalError,
     Spectra,
     SpectraLayout,
+    UsageError,
 )
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
@@ -226,6 +227,12 @@ def test_any_cutting_and_a_restored_tracker_give_the_same(record: Block, cuts: l
         parts.append(tracker.process(whole.cut(a, b)))
     same(Responses.join(parts), expected)
     assert tracker.counts == one.counts
+
+
+def test_a_drive_with_an_unknown_instruction_set_is_refused_as_a_tracker_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LIVEBODE_INSTRUCTION_SET", "mmx")
+    with refused(UsageError, "not-one-of", argument="LIVEBODE_INSTRUCTION_SET", value="mmx"):
+        KernelDrive(layout())
 
 
 @pytest.mark.parametrize(

@@ -186,16 +186,16 @@ def live_run(program: Path, folder: Path) -> dict[str, np.ndarray]:
     """The responses of `livebode run` on the drive's serial line, which QEMU gives to TCP; ended by Ctrl-C."""
     port = free_port(socket.SOCK_STREAM)
     line = ("-serial", f"tcp:127.0.0.1:{port},server=on,wait=on", "-serial", "null")
+    (folder / "axis.toml").write_text(AXIS.replace("5000", str(port)))
     machine = subprocess.Popen(M4F.qemu(program, *line, "-icount", "shift=4,sleep=off"), stdout=subprocess.DEVNULL)
     try:
-        (folder / "axis.toml").write_text(AXIS.replace("5000", str(port)))
-        process = started(folder / "axis.toml", folder / "live")
-        assert machine.wait(PATIENCE_S) == 0
+        with started(folder / "axis.toml", folder / "live") as process:
+            assert machine.wait(PATIENCE_S) == 0
+            with pytest.raises(subprocess.TimeoutExpired):
+                process.wait(2.5)
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=PATIENCE_S)
+            assert (process.returncode, err) == (0, b"")
     finally:
         machine.kill()
-    with pytest.raises(subprocess.TimeoutExpired):
-        process.wait(2.5)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=PATIENCE_S)
-    assert (process.returncode, err) == (0, b"")
     return table(folder / "live")

@@ -280,7 +280,7 @@ def completed(excitation):
         ({"excitation": {}, "measured": {"run": "x", "noise": True}}, "measured.noise = True is not usable"),
         ({"excitation": {}, "measured": {"run": "x", "torque_n_m": [True, 1]}}, "torque_n_m.0 = True is not usable"),
         ({"excitation": {}, "belt": {}, "loop": {}}, "remove [loop]"),
-        ({"excitation": {}, "measured": {"run": "x"}, "loop": {"velocity": {"foo": 1}}}, "known here: rate_hz"),
+        ({"excitation": {}, "measured": {"run": "x"}, "loop": {"velocity": {"foo": 1}}}, "Settings: rate_hz"),
         ({"excitation": {}, "belt": {}, "signals": {"input": "w"}}, "are both 'w'"),
         ({"excitation": {}, "belt": {}, "signals": {"output": "a\x7fb"}}, "cannot be the name of a channel"),
         ({"excitation": {}, "measured": {"noise": 1.0}}, "'measured.run' is missing"),

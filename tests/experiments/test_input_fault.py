@@ -48,4 +48,4 @@ def test_a_key_or_value_that_cannot_be_used_is_refused(data, code, facts):
 def test_the_nearest_key_is_proposed(data, remedy):
     with pytest.raises(ConfigError) as caught:
         read({"excitation": {}} | data)
-    assert caught.value.remedy == remedy
+    assert caught.value.remedy.startswith(f"{remedy} Settings: ")

@@ -17,7 +17,7 @@ from livebode.fitting.rows import SENTENCES as FITS
 from livebode.language import available
 from livebode.language.recorded import NAMES, SENTENCES
 from livebode.margins.margins import NAMES as MARGINS
-from livebode.margins.words import WORDS as MARGIN_WORDS
+from livebode.margins.margins import WORDS as MARGIN_WORDS
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import WHAT
 from tools.catalogues import FOLDER, PACKAGE, STATIC, catalogues, extracted, json_text, po_text, translated, updated

@@ -15,7 +15,7 @@ from livebode.records import PARAMETERS, RESPONSES
 from livebode.records.segments import frames
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE
 from livebode.records.segments.journal import Journal
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
 
 ROOT = Path(__file__).parents[2]

@@ -110,7 +110,7 @@ def test_false_alarms_are_rarer_than_asked_for() -> None:
     monitor, kept = watcher(), []
     monitor.process(recorded((0.3, 0.3), seed=12), kept.append)
     seen = Evidence.join(kept)
-    seen = seen.rows(seen.judged)
+    seen = seen[seen.judged]
     factor = np.linalg.cholesky(seen.information)
     windows_between, alarms, windows = 300, 0, 0
     detector = MachineDetector(learned, float(np.log(windows_between * 10)))

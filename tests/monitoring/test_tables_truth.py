@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from livebode.core import BaselineError
-from livebode.monitoring import DEFAULT_INTERVAL_S, Rows, TableMonitor, learn_table
+from livebode.monitoring import DEFAULT_INTERVAL_S, TableMonitor, WindowRows, learn_table
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
 from tests.support.errors import refused
@@ -16,7 +16,9 @@ TRUE = np.array([1.4 + 0.2j, 4.0 - 1.0j, 0.5 - 1.1j])
 SIGMA = 0.02
 
 
-def made(windows: int, seed: int, *, factor: np.ndarray | float = 1.0, louder: float = 1.0, real: bool = False) -> Rows:
+def made(
+    windows: int, seed: int, *, factor: np.ndarray | float = 1.0, louder: float = 1.0, real: bool = False
+) -> WindowRows:
     """Back and forth between 0 and 1 in 50 windows; the mean depends on the place and on the way."""
     generator = np.random.default_rng(seed)
     at = np.arange(windows)
@@ -28,7 +30,7 @@ def made(windows: int, seed: int, *, factor: np.ndarray | float = 1.0, louder: f
     scatter = SIGMA * louder * np.abs(TRUE) * (noise[0] if real else (noise[0] + 1j * noise[1]) / np.sqrt(2))
     variance = np.ones((windows, 3)) * (SIGMA * louder * np.abs(TRUE)) ** 2
     ok = np.isfinite(step)
-    return Rows(mean + scatter, variance, schedule, step, 0.1 * at, 400 * at + 399, ok)
+    return WindowRows(mean + scatter, variance, schedule, step, 0.1 * at, 400 * at + 399, ok)
 
 
 def monitor(what: str = "lines", interval_s: float = DEFAULT_INTERVAL_S) -> TableMonitor:
@@ -67,14 +69,14 @@ def test_the_line_that_changed_is_named(what: str) -> None:
     assert not watcher.standing
 
 
-def stepped(seed: int) -> Rows:
+def stepped(seed: int) -> WindowRows:
     """A change of −26 % at row 100, which the rows behind it take for noise: their variance says 400 times as much."""
     factor = np.ones((200, 3))
     factor[100:, 1] = 0.74
     rows = made(200, seed, factor=factor)
     variance = rows.variance.copy()
     variance[100:130] *= 400.0
-    return Rows(**(vars(rows) | {"variance": variance}))
+    return WindowRows(**(vars(rows) | {"variance": variance}))
 
 
 def test_an_amount_is_right_while_the_step_is_in_the_rows_own_scatter() -> None:
@@ -105,7 +107,7 @@ def test_louder_noise_is_no_change() -> None:
 
 def test_a_position_that_was_not_learned_is_reported_once() -> None:
     rows = made(600, 6)
-    beyond = Rows(**(vars(rows) | {"schedule": rows.schedule + 0.7}))
+    beyond = WindowRows(**(vars(rows) | {"schedule": rows.schedule + 0.7}))
     watcher = monitor()
     events = watcher.process(beyond)
     assert [e.kind for e in events if e.kind != "change"] == ["baseline-unknown"]
@@ -114,11 +116,11 @@ def test_a_position_that_was_not_learned_is_reported_once() -> None:
 def test_windows_that_hang_together_are_allowed_for() -> None:
     """Noise that lasts for five windows: as many alarms as asked for at most, and none of them for a month."""
 
-    def slow(seed: int) -> Rows:
+    def slow(seed: int) -> WindowRows:
         rows = made(6000, seed)
         steady = rows.value - made(6000, seed, louder=0.0).value
         smoothed = np.stack([np.convolve(steady[:, i], np.ones(5) / np.sqrt(5), "same") for i in range(3)], axis=1)
-        return Rows(**(vars(rows) | {"value": rows.value - steady + smoothed}))
+        return WindowRows(**(vars(rows) | {"value": rows.value - steady + smoothed}))
 
     table = learn_table("lines", NAMES, [slow(7)])
     assert table.accuracy.inflation.min() > 2.0
@@ -133,11 +135,13 @@ def test_the_error_of_a_short_baseline_raises_no_alarm() -> None:
     such tests) would its sum rise.
     """
 
-    def still(windows: int, seed: int) -> Rows:
+    def still(windows: int, seed: int) -> WindowRows:
         rows, place = made(windows, seed, louder=5.0), made(windows, seed, louder=0.0)
         nowhere = np.full(windows, np.nan)
         value = rows.value / place.value
-        return Rows(**(vars(rows) | {"value": value, "schedule": nowhere, "step": nowhere, "ok": np.ones(windows) > 0}))
+        return WindowRows(
+            **(vars(rows) | {"value": value, "schedule": nowhere, "step": nowhere, "ok": np.ones(windows) > 0})
+        )
 
     for seed in range(60):
         watcher = TableMonitor(learn_table("lines", NAMES, [still(40, 1000 + seed)]), DEFAULT_INTERVAL_S, 0.1)

@@ -22,7 +22,7 @@ from livebode.records.segments.damage import total
 from livebode.records.segments.frames import COMMIT, ROWS, frames, to_frame
 from livebode.records.segments.journal import Commit, Journal, head, name_of, read_sealed
 from livebode.records.segments.json_lines import in_line, to_line
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 from tests.support.errors import refused
 from tests.support.recorded import check_beginning, expected, machine, record_machine, same
 

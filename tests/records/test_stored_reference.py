@@ -14,8 +14,8 @@ from livebode.estimation import Tracker
 from livebode.monitoring import Baseline, Monitor
 from livebode.records import RunRecord
 from livebode.records.segments.frames import FORMAT, to_frame
+from livebode.records.segments.journal import last_commit
 from livebode.records.segments.json_lines import to_line
-from livebode.records.segments.last_commit import last_commit
 from livebode.records.segments.recovery import recover
 from livebode.records.summary_file import COPY, RUN, read_summary, to_document
 from livebode.records.versions import format_of

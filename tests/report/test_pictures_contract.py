@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import resource
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -137,3 +139,15 @@ def test_drawing_never_imports_pyplot(tmp_path) -> None:
         check=True,
     )
     assert done.stdout.strip() == "False"
+
+
+def test_a_picture_that_cannot_be_written_leaves_the_previous_ones(tmp_path: Path) -> None:
+    before = [path.read_bytes() for path in save_pictures(some(), tmp_path)]
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            save_pictures(some(seed=1), tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [path.read_bytes() for path in sorted(tmp_path.iterdir())] == before

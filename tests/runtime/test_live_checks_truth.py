@@ -17,8 +17,7 @@ from livebode.core.state import Stage, decode
 from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.records import RunRecord
-from livebode.records.segments.journal import Commit
-from livebode.records.segments.last_commit import last_commit
+from livebode.records.segments.journal import Commit, last_commit
 from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.runtime.live_checks import LiveChecks
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis

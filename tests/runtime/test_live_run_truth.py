@@ -43,8 +43,8 @@ def axis(folder: Path, source: str, rest: str = SMALL_AXIS) -> Path:
 
 
 def test_lines_on_standard_input_give_what_the_recording_gives(tmp_path):
-    process = started(axis(tmp_path, 'url = "stdin:"'), tmp_path / "live")
-    out, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
+    with started(axis(tmp_path, 'url = "stdin:"'), tmp_path / "live") as process:
+        out, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
     assert (process.returncode, err) == (0, b"")
     log = write_parquet(tmp_path / "log.parquet", signals())
     livebode("run", axis(tmp_path, f'log = "{log}"'), "--out", tmp_path / "recorded")
@@ -62,8 +62,10 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
     class Machine(TcpPeer):
         layout = encode_layout(CHANNELS, float(RATE_HZ), epoch=9)
 
-    with Machine(tmp_path) as peer:
-        process = started(axis(tmp_path, f'url = "{peer.settings["url"]}"'), tmp_path / "live")
+    with (
+        Machine(tmp_path) as peer,
+        started(axis(tmp_path, f'url = "{peer.settings["url"]}"'), tmp_path / "live") as process,
+    ):
         peer.wait_ready()
         for at, batch in enumerate(sent()):
             if at not in (20, 21):
@@ -81,10 +83,16 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
     assert (tmp_path / "live" / "bode.png").is_file()
 
 
+def test_a_run_whose_wait_times_out_is_ended(tmp_path):
+    with pytest.raises(subprocess.TimeoutExpired), started(axis(tmp_path, 'url = "stdin:"'), tmp_path) as process:
+        process.communicate(timeout=0.01)
+    assert process.poll() == -signal.SIGKILL
+
+
 def test_a_live_source_without_specified_lines_is_refused(tmp_path):
     path = axis(tmp_path, 'url = "stdin:"', SMALL_AXIS.replace("window = 100", ""))
-    process = started(path, tmp_path / "live")
-    _, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
+    with started(path, tmp_path / "live") as process:
+        _, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
     assert process.returncode == 2
     assert b"set lines.frequencies and lines.window for a live source" in err
     assert not (tmp_path / "live").exists()
@@ -115,19 +123,19 @@ def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
     stranger = [replace(batch, epoch=77) for batch in given]
     again = [replace(batch, first_sample=batch.first_sample - 70_000, epoch=10) for batch in given]
     port = free_port(socket.SOCK_DGRAM)
-    process = started(axis(tmp_path, f'url = "udp://127.0.0.1:{port}"'), tmp_path / "live")
-    with socket.socket(type=socket.SOCK_DGRAM) as sender:
-        sender.connect(("127.0.0.1", port))
-        layout = encode_layout(CHANNELS, float(RATE_HZ))
-        until(lambda: listens(sender, layout), "the port to be open")
-        mixed = [batch for pair in zip(given, stranger) for batch in pair]
-        for batch in mixed * 2 + again * 2:
-            sender.send(encode_samples(batch, double=True))
-            time.sleep(0.002)
-    until(lambda: (tmp_path / "live" / "events.jsonl").exists(), "the run to begin")
-    until(lambda: b"restart" in (tmp_path / "live" / "events.jsonl").read_bytes(), "the restart to be recorded")
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=PATIENCE_S)
+    with started(axis(tmp_path, f'url = "udp://127.0.0.1:{port}"'), tmp_path / "live") as process:
+        with socket.socket(type=socket.SOCK_DGRAM) as sender:
+            sender.connect(("127.0.0.1", port))
+            layout = encode_layout(CHANNELS, float(RATE_HZ))
+            until(lambda: listens(sender, layout), "the port to be open")
+            mixed = [batch for pair in zip(given, stranger) for batch in pair]
+            for batch in mixed * 2 + again * 2:
+                sender.send(encode_samples(batch, double=True))
+                time.sleep(0.002)
+        until(lambda: (tmp_path / "live" / "events.jsonl").exists(), "the run to begin")
+        until(lambda: b"restart" in (tmp_path / "live" / "events.jsonl").read_bytes(), "the restart to be recorded")
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=PATIENCE_S)
     printed = err.decode().splitlines()
     assert sum("does not belong to the stream and was dropped" in line for line in printed) == 1
     assert sum("the sender restarted at its sample 0" in line for line in printed) == 1

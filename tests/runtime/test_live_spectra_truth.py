@@ -136,12 +136,12 @@ def run_live(
     with of_spectra(kind, folder, sent[0].layout) as peer:
         path = folder / f"{name}.toml"
         path.write_text(f'[source]\nurl = "{peer.settings["url"]}"\n{config}')
-        process = started(path, folder / name)
-        peer.wait_ready()
-        for batch in sent:
-            peer.send(batch)
-            time.sleep(pause_s)
-        out = ended(process)
+        with started(path, folder / name) as process:
+            peer.wait_ready()
+            for batch in sent:
+                peer.send(batch)
+                time.sleep(pause_s)
+            out = ended(process)
     return json.loads(out), folder / name
 
 
@@ -204,8 +204,7 @@ def test_a_run_continues_after_lost_frames_and_after_its_end(tmp_path: Path) -> 
     assert [e["kind"] for e in events(out)] == ["connected", "loss", "gap"]
     # The same machine, begun anew, where the same configuration looks for it.
     port = int(config.split('"')[1].rsplit(":", 1)[1])
-    with of_spectra(TcpPeer, tmp_path, layout(), port) as peer:
-        process = started(tmp_path / "live.toml", out)
+    with of_spectra(TcpPeer, tmp_path, layout(), port) as peer, started(tmp_path / "live.toml", out) as process:
         peer.wait_ready()
         for batch in given:
             peer.send(replace(batch, epoch=10))

@@ -10,8 +10,8 @@ import pytest
 
 from livebode import MotionCorrection, Tracker
 from livebode.configuration.axis import FitSection, RecordSection
+from livebode.estimation.stream_estimator import Follower
 from livebode.monitoring import Baseline, Monitor
-from livebode.preparation.follower import Follower
 from livebode.records import RunRecord
 from livebode.runtime import Document, Outcome
 from livebode.runtime.change_detection import ChangeDetection

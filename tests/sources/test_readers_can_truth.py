@@ -109,6 +109,15 @@ def test_without_a_dbc_the_command_says_that_it_is_needed(tmp_path, name):
     assert "set dbc to the file that defines them (option --dbc)" in result.err
     result = livebode("inspect", path, "--dbc", dbc)
     assert (result.code, "Drive.Torque" in result.out) == (0, True)
+    assert "on the clock --time 'Position.time': Position.Angle\n" in result.out
+    result = livebode("inspect", path, "--dbc", dbc, "--time", "Position.time")
+    assert (result.code, "Position.Angle  rad" in result.out) == (0, True)
+    (tmp_path / "axis.toml").write_text(
+        f'[source]\nlog = "{name}"\ndbc = "x.dbc"\n[signals]\noutput = "Drive.Torque"\ninput = "Drive.Speed"\n'
+        '[lines]\nfrequencies = "50,100"\nwindow = 100\n[tracking]\nestimator = "direct"\naccept_roles = true\n'
+    )
+    result = livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run")
+    assert (result.code, result.err) == (0, "")
     with refused(RecordingError, "no-frames", path=str(dbc)):
         open_log(dbc, dbc=dbc)
     with refused(RecordingError, "not-found", path=str(tmp_path / "none.dbc")):

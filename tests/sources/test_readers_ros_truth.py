@@ -85,6 +85,7 @@ def test_each_topic_has_its_clock_and_its_fields_by_path(tmp_path, name):
     assert (rates.rate_hz, rates.rate_origin) == (100, "time column '/imu.logged' in ns")
     logged = open_log(path, channels=["/joints.position[0]"], time="/joints.logged")
     assert logged.rate_hz == 100
+    assert open_log(path, time="/joints.logged").channels == joints.channels
     with refused(RecordingError, "clocks-differ", groups=["/joints", "/imu"]):
         open_log(path, channels=["/joints.position[0]", "/imu.angular_velocity.z"])
 

@@ -42,7 +42,8 @@ def test_each_topic_has_a_clock_of_its_own(tmp_path):
         assert (log.rate_hz, log.rate_origin) == (rate_hz, f"time column '{topic}.timestamp' in s")
     log = open_log(path)
     assert [channel.name for channel in log.channels] == ["command.timestamp", "command.u", "command.armed"]
-    assert {one.name: one.reason for one in log.skipped}["gyro[1].x"] == "it is sampled by the clock of 'gyro[1]'"
+    assert log.other_clocks == {"gyro.timestamp": ("gyro.x",), "gyro[1].timestamp": ("gyro[1].x",)}
+    assert open_log(path, time="gyro[1].timestamp").channels[1].name == "gyro[1].x"
     with refused(RecordingError, "clocks-differ", groups=["gyro", "gyro[1]"]):
         open_log(path, channels=["gyro[0].x", "gyro[1].x"])
     with refused(RecordingError, "clocks-differ", channel="gyro.x", groups=["gyro", "command"]):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +14,16 @@ import pyarrow as pa
 from livebode.records import RunRecord
 
 
-def started(path: Path, out: Path) -> subprocess.Popen[bytes]:
+@contextmanager
+def started(path: Path, out: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """The process of this run; it does not outlive the test, also where a wait for it times out."""
     command = [Path(sys.executable).with_name("livebode"), "run", str(path), "--out", str(out), "--json"]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def table(out: Path, what: str = "responses") -> dict[str, np.ndarray]:

@@ -14,7 +14,7 @@ from livebode.monitoring import (
     Baseline,
     LearnedMachine,
     MachineMonitor,
-    Rows,
+    WindowRows,
     learn_machine,
     learn_table,
 )
@@ -149,7 +149,7 @@ def small_baseline() -> Baseline:
     lines = Lines.parse("20:140:20", rate_hz=4000, window=400)
     generator = np.random.default_rng(1)
     noise = generator.standard_normal((2, 40, len(lines)))
-    rows = Rows(
+    rows = WindowRows(
         1 + 0.01 * (noise[0] + 1j * noise[1]), np.full(noise[0].shape, 2e-4), np.zeros(40), np.zeros(40),
         0.1 * np.arange(40), 400 * np.arange(40) + 399, np.ones(40, dtype=bool),
     )  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 
 from livebode.configuration import Axis
 from livebode.configuration.axis import RecordSection
-from livebode.preparation.follower import Follower
+from livebode.estimation.stream_estimator import Follower
 from livebode.records import RunRecord
 from livebode.records.piece import parts_of
 from livebode.records.summary_file import RUN, to_document

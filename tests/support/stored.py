@@ -16,7 +16,7 @@ from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.records.segments.last_commit import last_commit
+from livebode.records.segments.journal import last_commit
 from livebode.runtime import Destination, run
 from tests.support.command import write_parquet
 from tests.support.recorded import NAMES, Machine

@@ -15,8 +15,8 @@ from livebode.monitoring import (
     Baseline,
     LearnedMachine,
     NonOverlappingWindows,
-    Rows,
     ScheduleTable,
+    WindowRows,
     learn_machine,
     learn_table,
     places,
@@ -150,14 +150,14 @@ def _apart(run: RunRecord) -> list[NonOverlappingWindows]:
     return [NonOverlappingWindows(max(window, hop), place) for place in places(window, hop)]
 
 
-def _rows(run: RunRecord) -> list[Rows]:
+def _rows(run: RunRecord) -> list[WindowRows]:
     """Rows at each place of the period."""
     each = _apart(run)
     return _joined([[apart.of_responses(batch) for apart in each] for batch in run.steady_batches()])
 
 
-def _joined(batches: list[list[Rows]]) -> list[Rows]:
-    return [Rows.join(parts) for parts in zip(*batches)]
+def _joined(batches: list[list[WindowRows]]) -> list[WindowRows]:
+    return [WindowRows.join(parts) for parts in zip(*batches)]
 
 
 def _parameters(runs: list[RunRecord], section: FitSection) -> ScheduleTable:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from livebode.cli.options import Json
-from livebode.core import Responses, UsageError
+from livebode.core import Responses, UsageError, counted
 from livebode.records import RunRecord, to_json
 
 _IN_PYTHON = {
@@ -58,7 +58,7 @@ def export_command(
         print(to_json({"file": str(path), "rows": written.rows, "left_out": written.left_out}))
         return
     left_out = f"; {written.left_out} with fewer than two valid lines left out" if written.left_out else ""
-    print(f"{path}: {written.rows} response{'s' * (written.rows != 1)} at {len(record.lines)} lines{left_out}")
+    print(f"{path}: {counted(written.rows)} at {counted(len(record.lines), 'line')}{left_out}")
 
 
 def _check(to: str, at: float | None, mean: bool, parameters: bool, formats: tuple[str, ...]) -> None:

@@ -7,9 +7,11 @@ import sys
 import traceback
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from livebode.core import LivebodeError, OutputError, UsageError
+from livebode.core import LivebodeError, UsageError, plural
+from livebode.core.writing import not_written
 
 _OPTIONS_BY_CODE = {"output.exists": ("out", "force")}
 _UNITS = frozenset({"hz", "s", "days", "n", "m", "db", "deg", "rad"})
@@ -43,7 +45,7 @@ def failure_of(error: Exception) -> Failure:
         message, remedy = "internal error in livebode", "please report it with the lines above"
         return Failure(f"{lines}livebode: {message}; {remedy}", _internal(error, lines), 1)
     options = [option for option in known.facts.get("options", ()) if option not in str(known)]
-    named = f" (option{'s' * (len(options) > 1)} {', '.join(options)})" if options else ""
+    named = f" ({plural('option', len(options))} {', '.join(options)})" if options else ""
     return Failure(f"livebode: {known}{named}", _written(known), 2)
 
 
@@ -95,8 +97,7 @@ def _known(error: Exception) -> LivebodeError | None:
             "too-large", "there is not enough memory", "take a shorter window, fewer lines or a longer hop"
         )
     if isinstance(error, OSError) and disk_full(error):
-        why = error.strerror
-        return OutputError("not-written", f"the output could not be written: {why}", "make room", reason=why)
+        return not_written(Path(error.filename) if isinstance(error.filename, str) else None, error, unchanged=False)
     return None
 
 

@@ -11,8 +11,9 @@ from rich.table import Table
 
 from livebode.cli import terminal
 from livebode.cli.options import Dbc, Excitation, Json, Output, Rate, Time
-from livebode.core import UsageError
+from livebode.core import UsageError, counted
 from livebode.estimation.settings import default_hop
+from livebode.excitation.pattern import pattern
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def _show_recording(found: Inspection, console: Console) -> None:
     console.print(
         f"{log.path}: {log.format}, {found.samples} samples at {log.rate_hz:.9g} Hz ({log.rate_origin})", soft_wrap=True
     )
-    gaps = f"{found.gaps} gap{'s' * (found.gaps > 1)} ({found.missing} samples missing)" if found.gaps else "no gaps"
+    gaps = f"{counted(found.gaps, 'gap')} ({found.missing} samples missing)" if found.gaps else "no gaps"
     jitter = ""
     if log.timing is not None:
         jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"
@@ -122,6 +123,8 @@ def _show_recording(found: Inspection, console: Console) -> None:
     console.print(table)
     for skipped in log.skipped:
         console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")
+    for clock, names in log.other_clocks.items():
+        console.print(f"  on the clock --time '{clock}': {', '.join(names)}", style="dim", soft_wrap=True)
 
 
 def _show_hum(quiet: Quiet, console: Console) -> None:
@@ -171,7 +174,10 @@ def _show_excitation(found: Inspection, console: Console) -> None:
             f"{'missing' if missing >= 0 else 'repeated'} in all without a gap; realigned here, and by a run",
             soft_wrap=True,
         )
-    console.print(f"{len(lines)} lines, {lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz")
+    console.print(
+        f"{counted(len(lines), 'line')} ({pattern(lines.bins)}), "
+        f"{lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz"
+    )
     hops = ((default_hop(excitation.period), "a run"), (found.live_hop, "live"))
     each = "; ".join(f"{who} {lines.rate_hz / hop:.4g} (hop {hop})" for hop, who in hops)
     console.print(f"responses/s by default, with this period as window: {each}", soft_wrap=True)

@@ -9,7 +9,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.options import Json
-from livebode.core import OutputError
+from livebode.core import OutputError, counted
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def _found(baseline: Baseline) -> dict[str, Any]:
 
 
 def _sentences(found: dict[str, Any]) -> str:
-    cells = f"{found['cells']} cell{'s' * (found['cells'] != 1)} of the schedule"
+    cells = f"{counted(found['cells'], 'cell')} of the schedule"
     text = f"Learned from {found['windows']} windows in {cells}."
     if (model := found["model"]) is None:
         least, most = min(found["lines_from_percent"]), max(found["lines_from_percent"])

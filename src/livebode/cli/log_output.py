@@ -11,7 +11,7 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
 from livebode.cli.terminal import visible
-from livebode.core import OutputError
+from livebode.core.writing import not_written
 
 FILE_BYTES_MAX = 16 << 20
 """A file that has so many bytes is renamed to NAME.1, in the place of the one before."""
@@ -94,9 +94,4 @@ def _opened(file: Path) -> logging.Handler:
     try:
         return _FileHandler(file, maxBytes=FILE_BYTES_MAX, backupCount=1, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
-        raise OutputError(
-            "not-written",
-            f"the log file {str(file)!r} cannot be opened: {error.strerror}",
-            "check its directory and permissions",
-            path=str(file),
-        ) from None
+        raise not_written(file, error, unchanged=False) from None

@@ -11,7 +11,9 @@ import typer
 from livebode.cli.options import Json
 from livebode.cli.pictures import margins_in_short
 from livebode.configuration import Axis
-from livebode.margins.words import WORDS
+from livebode.core import RecordError
+from livebode.core.writing import writing
+from livebode.margins.margins import WORDS
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -43,7 +45,8 @@ def margins_command(
     given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
     section = FitSection.model_validate(given) if given else None
     found = loop_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity)
-    picture = save_loop_picture(found, directory, title=directory.name)
+    with writing(directory, RecordError):
+        picture = save_loop_picture(found, directory, title=directory.name)
     if as_json:
         print(to_json(found.plain()))
         return

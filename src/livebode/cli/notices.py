@@ -9,7 +9,7 @@ from livebode.runtime import Document
 
 _KINDS = {
     "roles-doubtful", "transient", "phase-slip", "phase-slips", "restart", "replaced", "computer-clock", "foreign",
-    "backlog", "backlog-cleared", "waiting",
+    "backlog", "backlog-cleared", "waiting", "window-doubtful",
 }  # fmt: skip
 _ONCE = {"foreign"}
 

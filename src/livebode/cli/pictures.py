@@ -11,7 +11,7 @@ from shutil import get_terminal_size
 from typing import Any
 
 from livebode.cli.terminal import is_terminal, print_drawn
-from livebode.core import Model, Responses
+from livebode.core import Model, Responses, counted
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.fitting import Fit
 from livebode.runtime import Draw, Outcome
@@ -46,7 +46,7 @@ def show(outcome: Outcome) -> None:
             unicode="utf" in (sys.stdout.encoding or "").lower(),
         )
     )
-    print(f"{counted(outcome.summary)}\n{outcome.directory}/")
+    print(f"{tracked_amount(outcome.summary)}\n{outcome.directory}/")
     found = outcome.summary["found"]
     for line in _judged(found):
         print(line)
@@ -75,21 +75,23 @@ def _judged(found: dict[str, Any]) -> list[str]:
     lines = []
     judged = found.get("judged", {})
     if moved := judged.get("noise_from_detection_lines"):
-        lines.append(f"the schedule moves: noise of {_many(moved, 'response')} from detection lines (non-excited bins)")
+        lines.append(
+            f"the schedule moves: noise of {counted(moved, 'response')} from detection lines (non-excited bins)"
+        )
     for kind, frequency_hz in judged.get("invalid_lines_hz", {}).items():
         where = ", ".join(f"{f:g}" for f in frequency_hz)
         lines.append(f"not valid at {where} Hz: {_REASONS[kind]} (see events.jsonl)")
     return lines
 
 
-def counted(summary: dict[str, Any]) -> str:
+def tracked_amount(summary: dict[str, Any]) -> str:
     """One line with the amount of data tracked."""
     counts, speed, found = (summary[part] for part in ("counts", "speed", "found"))
     invalid = f", {counts['invalid_responses']} of them not valid" if counts["invalid_responses"] else ""
-    gaps = f", {_many(counts['gaps'], 'gap')}" if counts["gaps"] else ""
+    gaps = f", {counted(counts['gaps'], 'gap')}" if counts["gaps"] else ""
     return (
-        f"{_many(counts['responses'], 'response')} at {_many(len(found['frequency_hz']), 'line')}{invalid}, "
-        f"from {counts['samples']} samples{gaps}, one in {_many(found['hop'], 'sample')} "
+        f"{counted(counts['responses'], 'response')} at {counted(len(found['frequency_hz']), 'line')}{invalid}, "
+        f"from {counts['samples']} samples{gaps}, one in {counted(found['hop'], 'sample')} "
         f"({found['rate_hz'] / found['hop']:.4g}/s): "
         f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s"
     )
@@ -110,7 +112,7 @@ def _show_loop(found: dict[str, Any]) -> None:
     if not (worst := found["worst_over_places"]):
         print(f"no margins: {found['message']}")
         return
-    print(f"margins, worst of {_many(found['places'], 'fit')} over the run: {margins_in_short(worst)}")
+    print(f"margins, worst of {counted(found['places'], 'fit')} over the run: {margins_in_short(worst)}")
 
 
 def margins_in_short(worst: dict[str, float]) -> str:
@@ -125,20 +127,20 @@ def _show_monitoring(found: dict[str, Any]) -> None:
     for sentence in found.get("alarms", [])[:_ALARMS_SHOWN]:
         print(sentence)
     if (more := len(found.get("alarms", [])) - _ALARMS_SHOWN) > 0:
-        print(f"and {_many(more, 'alarm')} more in events.jsonl")
+        print(f"and {counted(more, 'alarm')} more in events.jsonl")
     print(found["message"])
 
 
 def _show_statuses(summary: dict[str, Any]) -> None:
     """Print the numbers of valid and rejected fits, with reasons."""
     why = "".join(f"; {count} rejected: {word}" for word, count in summary["statuses"].items() if word != "ok")
-    print(f"\n{_many(summary['statuses'].get('ok', 0), 'fit')} of the {summary['model']} model valid{why}")
+    print(f"\n{counted(summary['statuses'].get('ok', 0), 'fit')} of the {summary['model']} model valid{why}")
 
 
 def show_fit(found: Fit, of: str) -> None:
     """Print the fitted parameters with bounds."""
     low, high = found.band_hz
-    print(f"{found.model.name} model, {of}; {_many(found.lines, 'line')}, {low:g} … {high:g} Hz")
+    print(f"{found.model.name} model, {of}; {counted(found.lines, 'line')}, {low:g} … {high:g} Hz")
     if found.status != "ok":
         print(f"  no parameters ({found.status}): {found.sentence}")
         return
@@ -150,7 +152,3 @@ def show_fit(found: Fit, of: str) -> None:
     chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} from sigma alone"
     print(f"  {found.about_bounds}")
     print(f"  model error ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
-
-
-def _many(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

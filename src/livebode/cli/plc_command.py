@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import typer
 
 from livebode.cli.options import Json
 from livebode.core import OutputError
-
-_DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
+from livebode.core.files import whole_files
+from livebode.core.writing import writing
 
 
 def plc_command(
@@ -77,18 +74,8 @@ def _write(folder: Path, files: dict[str, str], force: bool) -> None:
                 "choose another --out, or replace it with --force",
                 path=str(path),
             )
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=".partial-", dir=folder) as partial:
+        with whole_files(folder, "plc") as partial:
             for name, text in files.items():
-                (Path(partial) / name).write_text(text, encoding="ascii")
-            for name in files:
-                (Path(partial) / name).replace(folder / name)
-    except OSError as error:
-        why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
-        raise OutputError(
-            "not-written",
-            f"{str(folder)!r} could not be written: {why}; no file was written",
-            path=str(folder),
-            reason=why,
-        ) from None
+                (partial / name).write_text(text, encoding="ascii")

@@ -11,7 +11,7 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.notices import NoticePrinter
 from livebode.cli.options import Dbc, Excitation, Json, Output, Port, Rate, Serve, Time
-from livebode.cli.pictures import counted, drawing, show
+from livebode.cli.pictures import drawing, show, tracked_amount
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
 from livebode.configuration.axis import ServeSection
@@ -226,7 +226,7 @@ def _run_axes(
         print(to_json({"axes": plain(session)}))
     for thread in session.all:
         if thread.outcome is not None and not as_json:
-            print(f"{thread.name}: {counted(thread.outcome.summary)}\n{thread.outcome.directory}/")
+            print(f"{thread.name}: {tracked_amount(thread.outcome.summary)}\n{thread.outcome.directory}/")
     errors = [thread.error for thread in session.all if thread.error is not None and not thread.ended_early]
     if errors:
         raise typer.Exit(2 if all(isinstance(error, (LivebodeError, StoppedError)) for error in errors) else 1)

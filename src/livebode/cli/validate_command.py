@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from livebode.cli.options import Excitation, Json, Output
+from livebode.core import RecordError
+from livebode.core.writing import writing
 from livebode.records import RunRecord, to_json
 
 if TYPE_CHECKING:
@@ -47,7 +49,8 @@ def validate_command(
     sections = [FitSection.model_validate(base | one) for one in named]
     channels = {"output": output, "input": input, "excitation": excitation}
     found, notes = validate_run(directory, on, sections, lags=lags, samples=samples, channels=channels)
-    picture = save_validation_picture(found, directory, title=f"{directory.name} on {on.name}")
+    with writing(directory, RecordError):
+        picture = save_validation_picture(found, directory, title=f"{directory.name} on {on.name}")
     if as_json:
         print(to_json({"models": [v.plain() for v in found], "notes": notes}))
         return

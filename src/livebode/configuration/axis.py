@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.configuration.toml_file import one_line, read_table, shortened
-from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, Quantity, counted
+from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, Quantity, counted, nearest_name
 from livebode.language import available
 from livebode.sources.live import SourceSettings, checked_address
 
@@ -400,7 +399,8 @@ class FitSection(_Section):
     Parameters
     ----------
     model
-        The model. "auto": two-mass if the input is a torque in N m or radius_m is given, otherwise two-mass-gain.
+        The model. "auto": two-mass if the input is a torque or radius_m is given, otherwise two-mass-gain; that also
+        where a unit is recognised and not SI (rpm, mN m).
     output
         What the output is. "auto": by its kind, velocity if it has neither a unit nor a kind.
     side
@@ -537,6 +537,4 @@ def nearest(loc: tuple[int | str, ...]) -> str:
             for c in (annotation, *getattr(annotation, "__args__", ()))
             if isinstance(c, type) and issubclass(c, BaseModel)
         )
-    known = list(section.model_fields)
-    near = difflib.get_close_matches(str(loc[-1]), known, n=1)
-    return f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(known)}"
+    return nearest_name(str(loc[-1]), section.model_fields, "Settings")

@@ -10,7 +10,7 @@ from livebode.core._plotting import plot_responses
 from livebode.core._response import PER_RESPONSE, Response, Responses, widened
 from livebode.core._spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
 from livebode.core._unit_reading import QuantityKind, UnitReading, read_unit, split_plant_unit
-from livebode.core._wording import counted, rounded_down
+from livebode.core._wording import counted, plural, rounded_down
 from livebode.core.controllers import PID, Cascade, PositionPD
 from livebode.core.errors import (
     BaselineError,
@@ -34,6 +34,7 @@ from livebode.core.errors import (
 from livebode.core.lines import Lines
 from livebode.core.model import Gain, Model, as_model
 from livebode.core.parameters import Parameters
+from livebode.core.rows import RowArrays
 from livebode.core.state import Stage, Stateful, StatefulBase
 
 __all__ = [
@@ -70,6 +71,7 @@ __all__ = [
     "RecordingError",
     "Response",
     "Responses",
+    "RowArrays",
     "ServerError",
     "SignalError",
     "SimulationError",
@@ -88,6 +90,7 @@ __all__ = [
     "ignore",
     "nearest_name",
     "plot_responses",
+    "plural",
     "read_unit",
     "rms",
     "rounded_down",

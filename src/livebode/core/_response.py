@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -14,7 +14,7 @@ from livebode.core._frequency_response import PER_LINE, FrequencyResponse, Quant
 from livebode.core._line_selection import ends
 from livebode.core.errors import GridError
 from livebode.core.lines import Lines
-from livebode.core.rows import joined
+from livebode.core.rows import RowArrays
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -167,7 +167,7 @@ def _fill_unknown(of: Response | Responses) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Responses(FrequencyResponse, Sequence[Response]):
+class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
     """Consecutive responses, one for each hop, as arrays: (rows, lines) for attributes of a line, (rows,) for the rest.
 
     Indexing gives a Response; a slice, or an array of numbers or of truth values, gives Responses. The attributes are
@@ -201,20 +201,19 @@ class Responses(FrequencyResponse, Sequence[Response]):
     weight: NDArray[np.complex128] = None  # type: ignore[assignment]
     distortion: Floats = None  # type: ignore[assignment]
 
+    _SHARED = ("lines", "quantity", "unit")
+
     def __post_init__(self) -> None:
         _fill_unknown(self)
-
-    def __len__(self) -> int:
-        return len(self.sample)
 
     @overload
     def __getitem__(self, at: int) -> Response: ...
     @overload
     def __getitem__(self, at: slice | NDArray[Any]) -> Responses: ...
     def __getitem__(self, at: int | slice | NDArray[Any]) -> Response | Responses:
-        rows: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
         if isinstance(at, slice | np.ndarray):
-            return replace(self, **rows)
+            return super().__getitem__(at)
+        rows: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
         for name in PER_RESPONSE:
             rows[name] = rows[name].item()
         return Response(lines=self.lines, quantity=self.quantity, unit=self.unit, **rows)
@@ -272,13 +271,9 @@ class Responses(FrequencyResponse, Sequence[Response]):
         return cls(lines=response.lines, quantity=response.quantity, unit=response.unit, **rows)
 
     @classmethod
-    def join(cls, parts: Sequence[Responses]) -> Responses:
-        """Join parts of one run, in order; GridError where their lines differ."""
-        if any((p.lines, p.quantity, p.unit) != (parts[0].lines, parts[0].quantity, parts[0].unit) for p in parts):
-            raise GridError(
-                "not-alike",
-                "responses on different lines or of different quantities cannot be joined",
-                "join responses of one run",
-            )
-        rows = joined(parts, _PER_ROW, "responses")
-        return replace(parts[0], **rows)
+    def _not_alike(cls, _: Sequence[Responses]) -> GridError:
+        return GridError(
+            "not-alike",
+            "responses on different lines or of different quantities cannot be joined",
+            "join responses of one run",
+        )

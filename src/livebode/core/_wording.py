@@ -6,7 +6,15 @@ def counted(count: int, what: str = "response") -> str:
     >>> counted(1), counted(3)
     ('1 response', '3 responses')
     """
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+    return f"{count} {plural(what, count)}"
+
+
+def plural(what: str, count: int) -> str:
+    """
+    >>> plural("option", 1), plural("option", 2)
+    ('option', 'options')
+    """
+    return what if count == 1 else f"{what}s"
 
 
 def rounded_down(value: float) -> float:

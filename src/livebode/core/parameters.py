@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from livebode.core._wording import counted
 from livebode.core.errors import UsageError
-from livebode.core.rows import joined
+from livebode.core.rows import RowArrays
 
 Floats = NDArray[np.float64]
 
 OK = "ok"
 """The status of a valid row; any other status is the reason why the row contains NaN."""
 
-_PER_ROW = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
 _STEP = 1e-6
 
 
@@ -38,7 +37,7 @@ def half_width(sigma: Floats, probability: float) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Parameters:
+class Parameters(RowArrays):
     """Parameters of one model in a row, one for each Response that it was fitted to. Immutable.
 
     Attributes
@@ -85,12 +84,11 @@ class Parameters:
     time_s: Floats
     schedule: Floats
 
+    _SHARED = ("model", "names", "units")
+
     def __repr__(self) -> str:
         valid = f"{np.count_nonzero(self.ok)} of {counted(len(self), 'row')} valid"
         return f"<Parameters: {self.model}, {', '.join(self.names)}; {valid}>"
-
-    def __len__(self) -> int:
-        return len(self.sample)
 
     @overload
     def __getitem__(self, at: str) -> Floats: ...
@@ -100,8 +98,7 @@ class Parameters:
         """The values of one parameter by its name, shape (rows,); or some of the rows."""
         if isinstance(at, str):
             return np.asarray(self.value[:, self.index(at)])
-        rows: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
-        return replace(self, **rows)
+        return super().__getitem__(at)
 
     def index(self, name: str) -> int:
         """Column of a parameter; UsageError with the known names where it is not there."""
@@ -166,14 +163,10 @@ class Parameters:
         return replace(self, names=tuple(names), units=tuple(units), value=value, covariance=covariance)
 
     @classmethod
-    def join(cls, parts: Sequence[Parameters]) -> Parameters:
-        """Join parts of one run, in order; UsageError where their models differ."""
-        if any((p.model, p.names, p.units) != (parts[0].model, parts[0].names, parts[0].units) for p in parts):
-            raise UsageError(
-                "conflict",
-                "parameters of different models cannot be joined",
-                "fit one model",
-                models=sorted({p.model for p in parts}),
-            )
-        rows = joined(parts, _PER_ROW, "parameters")
-        return replace(parts[0], **rows)
+    def _not_alike(cls, parts: Sequence[Parameters]) -> UsageError:
+        return UsageError(
+            "conflict",
+            "parameters of different models cannot be joined",
+            "fit one model",
+            models=sorted({part.model for part in parts}),
+        )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Parameters
+from livebode.core import Parameters, RowArrays
 
 Floats = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ TRENDS_MAX = 256
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class TrendRows(RowArrays):
     """One parameter over time, arrays of equal length."""
 
     time_s: Floats
@@ -26,23 +26,17 @@ class Rows:
     sigma: Floats
     status: NDArray[Any]
 
-    def __getitem__(self, at: slice) -> Rows:
-        return Rows(self.time_s[at], self.schedule[at], self.value[at], self.sigma[at], self.status[at])
-
-    def __len__(self) -> int:
-        return len(self.time_s)
-
 
 class Trend:
     """Every n-th row of one parameter, with n doubled whenever there are too many, and the newest row."""
 
     def __init__(self, model: str, name: str, unit: str) -> None:
         self.model, self.name, self.unit = model, name, unit
-        self.newest: Rows | None = None
-        self._rows: list[Rows] = []
+        self.newest: TrendRows | None = None
+        self._rows: list[TrendRows] = []
         self._seen, self._stride, self._kept = 0, 1, 0
 
-    def add(self, rows: Rows) -> None:
+    def add(self, rows: TrendRows) -> None:
         """Append rows."""
         if not len(rows):
             return
@@ -55,10 +49,10 @@ class Trend:
             self._keep(whole[::2])
             self._stride *= 2
 
-    def rows(self) -> Rows:
+    def rows(self) -> TrendRows:
         """The retained rows."""
         if len(self._rows) > 1:
-            self._rows = [Rows(*(np.concatenate([getattr(r, n) for r in self._rows]) for n in Rows.__annotations__))]
+            self._rows = [TrendRows.join(self._rows)]
         return self._rows[0]
 
     def plain(self, *, whole: bool) -> dict[str, Any]:
@@ -66,11 +60,11 @@ class Trend:
         rows = self.rows() if whole else self.newest
         assert rows is not None
         found = {"model": self.model, "name": self.name, "unit": self.unit}
-        return found | {name: getattr(rows, name).tolist() for name in Rows.__annotations__}
+        return found | {name: array.tolist() for name, array in vars(rows).items()}
 
-    def _keep(self, rows: Rows) -> None:
+    def _keep(self, rows: TrendRows) -> None:
         if len(rows):
-            self._rows.append(Rows(*(np.array(getattr(rows, name)) for name in Rows.__annotations__)))
+            self._rows.append(TrendRows.join([rows]))  # a copy
             self._kept += len(rows)
 
 
@@ -86,10 +80,10 @@ class Trends:
         for part in parts:
             sigma = part.sigma
             for i, (name, unit) in enumerate(zip(part.names, part.units)):
-                rows = Rows(part.time_s, part.schedule, part.value[:, i], sigma[:, i], part.status)
+                rows = TrendRows(part.time_s, part.schedule, part.value[:, i], sigma[:, i], part.status)
                 self.add(part.model, name, unit, rows)
 
-    def add(self, model: str, name: str, unit: str, rows: Rows) -> None:
+    def add(self, model: str, name: str, unit: str, rows: TrendRows) -> None:
         """Take rows of one parameter."""
         key = (model, name)
         if key not in self.by_name:

@@ -13,7 +13,7 @@ import pyarrow as pa
 from livebode.core import Event, Responses
 from livebode.dashboard.hub import Item
 from livebode.dashboard.state import State
-from livebode.dashboard.trends import Rows
+from livebode.dashboard.trends import TrendRows
 from livebode.records import RunRecord
 from livebode.records.grouped_events import still_waiting
 
@@ -41,7 +41,7 @@ class Viewed:
             self._responses(state, part)
         self._rest(state)
 
-    def more(self) -> tuple[list[Item], list[tuple[str, str, str, Rows]], dict[str, Any], bool]:
+    def more(self) -> tuple[list[Item], list[tuple[str, str, str, TrendRows]], dict[str, Any], bool]:
         """Pass new data: responses and events, rows of parameters, run.json, and whether the run has ended."""
         self._run = RunRecord.open(self.directory)
         behind_s = self._last_s, inf  # earlier segments are not read again
@@ -78,7 +78,7 @@ class Viewed:
         self._sample, self._last_s = int(part.sample[-1]), float(part.time_s[-1])
         return part[behind]
 
-    def _parameters(self, span_s: tuple[float, float] | None) -> Iterator[tuple[str, str, str, Rows]]:
+    def _parameters(self, span_s: tuple[float, float] | None) -> Iterator[tuple[str, str, str, TrendRows]]:
         """Model, name, unit and rows of each parameter, table by table."""
         for table in self._run.tables("parameters", span_s=span_s):
             sample = table["sample"].to_numpy()
@@ -92,5 +92,5 @@ class Viewed:
             _, first = np.unique(both, return_index=True)
             for at in np.sort(first):
                 use = both == both[at]
-                rows = Rows(*(column[c][use] for c in ("time_s", "schedule", "value", "sigma", "status")))
+                rows = TrendRows(*(column[c][use] for c in ("time_s", "schedule", "value", "sigma", "status")))
                 yield str(model[at]), str(name[at]), str(unit[at]), rows

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import logging
+import platform
+import sys
 import zipfile
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
+from importlib.metadata import distributions
 from pathlib import Path
+from typing import Any
 
+from livebode import __version__
 from livebode.core import LivebodeError
 from livebode.doctor.check import Check, worst
 from livebode.doctor.secrets import Secrets
 from livebode.doctor.subject import Subject
-from livebode.doctor.versions import versions
 from livebode.export import save
+from livebode.kernel import instruction_sets
 from livebode.records import RunRecord, to_json
 
 PART_BYTES_MAX = 2 << 20
@@ -125,3 +130,16 @@ def _json(value: object) -> str:
 def _bounded(text: str) -> bytes:
     data = text.encode("utf-8", errors="replace")
     return data if len(data) <= PART_BYTES_MAX else f"{_TOO_LONG.format(PART_BYTES_MAX)}\n".encode()
+
+
+def versions() -> dict[str, Any]:
+    """livebode, Python, the system, the kernel's instruction sets, and every installed package."""
+    packages = {found.metadata["Name"]: found.version for found in distributions() if found.metadata["Name"]}
+    return {
+        "livebode": __version__,
+        "python": sys.version,
+        "system": platform.platform(),
+        "machine": platform.machine(),
+        "instruction_sets": list(instruction_sets()),
+        "packages": dict(sorted(packages.items(), key=lambda item: item[0].lower())),
+    }

@@ -8,8 +8,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from livebode.core.writing import why
 from livebode.doctor.check import Check
-from livebode.records.segments.disk import why
 from livebode.records.segments.limits import SegmentLimits
 
 NAME = "disk"

@@ -12,8 +12,8 @@ from livebode.configuration.axis import Axis
 from livebode.configuration.recorded import recorded_configuration
 from livebode.configuration.toml_file import parse_table, read_bytes
 from livebode.core import LivebodeError, UsageError
-from livebode.doctor.problem import problem_of
 from livebode.experiments.experiment import Experiment
+from livebode.preparation.plan import live_follower
 from livebode.records import RunRecord
 
 
@@ -107,5 +107,19 @@ def _check_experiment(path: Path) -> None:
 
 def _check_axes(axes: Mapping[str, Axis], path: Path) -> None:
     for name, axis in axes.items():
-        if (error := problem_of(axis)) is not None:
+        if (error := _problem_of(axis)) is not None:
             raise error.at(f"{path}, axis {name}" if name else str(path))
+
+
+def _problem_of(axis: Axis) -> LivebodeError | None:
+    """Why it could not begin: its lines, loop or baseline; None where nothing is found, or it takes samples to tell."""
+    try:
+        if axis.monitoring.baseline is not None:
+            from livebode.monitoring import Baseline  # with the simulation
+
+            Baseline.load(axis.monitoring.baseline)
+        if axis.source.url is not None and axis.source.rate_hz is not None:
+            live_follower(axis, axis.source.rate_hz)
+    except LivebodeError as error:
+        return error
+    return None

@@ -5,10 +5,12 @@ from livebode.estimation.movement import Movement
 from livebode.estimation.ripple import RippleOrder, RippleSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra_tracker import SpectraTracker
+from livebode.estimation.stream_estimator import Follower
 from livebode.estimation.tracker import Tracker
 from livebode.estimation.welch import welch
 
 __all__ = [
+    "Follower",
     "Movement",
     "RippleOrder",
     "RippleSpeed",

@@ -11,7 +11,8 @@ from scipy.signal import detrend
 from scipy.signal.windows import hann
 
 from livebode.core import SignalError
-from livebode.estimation.mains import HARMONICS, MAINS_HZ, prominence
+from livebode.core.mains import MAINS_HZ
+from livebode.estimation.mains import HARMONICS, prominence
 from livebode.estimation.silence import STEADY
 
 Floats = NDArray[np.float64]

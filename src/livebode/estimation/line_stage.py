@@ -19,7 +19,7 @@ from livebode.estimation.movement import Movement
 from livebode.estimation.quantities import convert
 from livebode.estimation.repeating import Repeating
 from livebode.estimation.settings import Settings
-from livebode.estimation.spectra import Rows
+from livebode.estimation.spectra import SpectraRows
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -117,7 +117,7 @@ class LineStage(StatefulBase):
 
     def process(
         self,
-        rows: Rows,
+        rows: SpectraRows,
         place: NDArray[np.int64],
         centre: Floats,
         channels: Sequence[Channel],
@@ -146,7 +146,7 @@ class LineStage(StatefulBase):
 
     def _responses(
         self,
-        rows: Rows,
+        rows: SpectraRows,
         place: NDArray[np.int64],
         centre: Floats,
         unit: str,

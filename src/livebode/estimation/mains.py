@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Lines
+from livebode.core.mains import MAINS_HZ
 
 Floats = NDArray[np.float64]
 
-MAINS_HZ = (50.0, 60.0)
 _ON_BIN = 0.1  # bins: a tone this close to a bin has nearly all its power there
 HARMONICS = 10
 _BESIDE = np.array([-4, -3, -2, -1, 1, 2, 3, 4])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, Event, QuantityKind, Stage, StatefulBase
+from livebode.core.steps import step_of
 from livebode.estimation.bounds import power
 from livebode.estimation.distortion import Distortion, reached
 from livebode.estimation.mains import Mains
@@ -17,8 +18,7 @@ from livebode.estimation.moments import Moments, PeriodMoments
 from livebode.estimation.movement import PLACES, Movement
 from livebode.estimation.settings import Settings
 from livebode.estimation.silence import SilentHum
-from livebode.estimation.spectra import Rows, after
-from livebode.estimation.steps import step_of
+from livebode.estimation.spectra import SpectraRows, after
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -118,7 +118,7 @@ class RepeatingErrors(StatefulBase):
     def process(
         self,
         data: Floats,
-        rows: Rows,
+        rows: SpectraRows,
         schedule: Floats,
         block: Block,
     ) -> Repeating:

@@ -23,7 +23,7 @@ _ROW_VALUES_MAX = 1 << 18  # complex numbers of one kernel call: 4 MiB, which fi
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class SpectraRows:
     """Line spectra at the hops of a stretch of samples.
 
     `spectrum` is (channels, rows, bins) with the phase of a fixed grid of period N, so that rows compare with each
@@ -91,7 +91,7 @@ class LineSpectra(StatefulBase):
         self._started = False
 
     def _fresh(self) -> SlidingDFT:
-        _check_instruction_set()
+        check_instruction_set()
         return SlidingDFT(self._window, self._bins, channels=self._differenced.size, dtype=self._dtype)
 
     def restart(self, sample: int) -> None:
@@ -112,7 +112,7 @@ class LineSpectra(StatefulBase):
         super()._load(state)
         self._dft.restore(state["dft"])
 
-    def process(self, data: Floats) -> Rows:
+    def process(self, data: Floats) -> SpectraRows:
         """Rows of the next samples, `data` (channels, samples); samples that are not finite make rows not whole."""
         with np.errstate(over="ignore", invalid="ignore"):  # a value too large for the dtype becomes infinite
             finite, not_finite = self._prepare(data)
@@ -134,7 +134,7 @@ class LineSpectra(StatefulBase):
         position = np.concatenate([p[1] for p in parts])
         whole = self._without(missing, 0, data.shape[1], position)
         clean = whole & self._without(spikes, 1, data.shape[1], position)
-        rows = Rows(spectrum, self._next + position, whole, clean, not_finite, implausible, spikes)
+        rows = SpectraRows(spectrum, self._next + position, whole, clean, not_finite, implausible, spikes)
         self._next += data.shape[1]
         return rows
 
@@ -191,7 +191,7 @@ def after(bins: NDArray[np.int64], window: int, differenced: NDArray[np.bool_], 
     return np.asarray(factor)
 
 
-def _check_instruction_set() -> None:
+def check_instruction_set() -> None:
     """UsageError if the environment names an instruction set that the kernel does not have."""
     try:
         instruction_set()

@@ -27,7 +27,7 @@ from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.ripple import HopSpeed, ripple_power
 from livebode.estimation.settings import Settings
-from livebode.estimation.spectra import Rows, after
+from livebode.estimation.spectra import SpectraRows, after
 from livebode.estimation.spectra_watch import SpectraInputStatistics
 from livebode.estimation.stream_estimator import StreamEstimator
 
@@ -119,7 +119,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
         not_whole, spike = (block.state & NOT_WHOLE != 0) | ~finite, block.state & SPIKE != 0
         self._watch.take(block, {"not-whole": not_whole, "implausible": implausible, "spike": spike})
         whole = ~(not_whole | implausible)
-        rows = Rows(spectrum, block.sample, whole, whole & ~spike, _NONE, _NONE, _NONE)
+        rows = SpectraRows(spectrum, block.sample, whole, whole & ~spike, _NONE, _NONE, _NONE)
         place = (block.place + hop * np.arange(len(block))) % window
         time_s = block.origin_s + (block.sample - (window - 1) / 2) / block.rate_hz
         schedule = block[self.settings.schedule] if self.settings.schedule else np.full(len(block), np.nan)

@@ -1,19 +1,42 @@
-"""Common part of Tracker and SpectraTracker: the line stage that follows them, and their snapshots."""
+"""Interface of what turns samples into responses; the common part of Tracker and SpectraTracker."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Emit, Event, Responses, StatefulBase, ignore
+from livebode.core import Block, Emit, Event, Responses, Stateful, StatefulBase, ignore
 from livebode.estimation.line_stage import LineStage
+from livebode.estimation.settings import Settings
 from livebode.estimation.stream_counters import StreamCounters
 
 Floats = NDArray[np.float64]
 W = TypeVar("W", bound=StreamCounters)
+
+
+class Follower(Stateful, Protocol):
+    """Turns the samples of a run into responses: a Tracker, or a MotionCorrection, which delays some of them.
+
+    For a drive that sends spectra it is a SpectraTracker.
+    """
+
+    settings: Settings
+
+    @property
+    def counts(self) -> dict[str, int]: ...
+
+    def found(self) -> dict[str, Any]: ...
+
+    def process(self, block: Block, emit: Emit = ignore, /) -> Responses: ...
+
+    def finish(self, emit: Emit = ignore, /) -> Responses | None: ...
+
+    def excitation_power(self) -> Floats: ...
+
+    def repeatability(self) -> Floats: ...
 
 
 class StreamEstimator(StatefulBase, Generic[W]):

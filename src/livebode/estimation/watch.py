@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import Block, Event, SignalError, Stage
-from livebode.estimation.spectra import Rows
+from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.stream_counters import StreamCounters
 
 _KINDS = {
@@ -48,7 +48,7 @@ class InputStatistics(StreamCounters):
             )
         return first or gap
 
-    def take(self, block: Block, rows: Rows) -> None:
+    def take(self, block: Block, rows: SpectraRows) -> None:
         """Count the excluded samples; one Event for all that are within a window of each other."""
         found = {"non-finite": rows.not_finite, "implausible": rows.implausible, "spike": rows.spikes}
         new: list[tuple[int, str]] = []

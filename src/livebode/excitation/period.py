@@ -11,6 +11,7 @@ from livebode.core import SignalError
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.evidence import log_chance
 from livebode.excitation.extent import extent
+from livebode.excitation.hum import without_mains
 from livebode.excitation.prepare import clipped, whitened
 from livebode.excitation.repetition import LAG_MIN, ROUNDING, best_lag, difference
 from livebode.excitation.significance import FALSE_ALARM, find_lines
@@ -29,7 +30,7 @@ _SIGMAS = 4.0  # one in 3e4 by chance, and the lags near the best are few
 _PART = 2**19  # samples; two minutes at 4 kHz
 
 
-def find_period(x: Floats) -> tuple[int, int, int]:
+def find_period(x: Floats, rate_hz: float, step: float) -> tuple[int, int, int]:
     """Period in samples, first sample of the periodic part and the sample after its last.
 
     1. Use the recording unchanged, and whitened, for robustness against a trajectory and few periods. 2. For each, find
@@ -37,7 +38,17 @@ def find_period(x: Floats) -> tuple[int, int, int]:
     power. 4. The version with the stronger evidence decides; reject it if a recording without a period would reach this
     with a probability above 1e-3 for all lags and both versions together. 5. Divide by the common factor of all excited
     bins; multiply by 2 or 3 where that finds lines in between. 6. Reject it if the lines change more than noise
-    explains, or if the recording repeats better after more than its half.
+    explains, or if the recording repeats better after more than its half. 7. Take the shortest divisor at whose
+    harmonics all lines are, except mains hum and the error of rounding.
+
+    Parameters
+    ----------
+    x
+        Finite samples, shape (samples,).
+    rate_hz
+        Samples per second.
+    step
+        The samples are multiples of it; 0 for none.
 
     Notes
     -----
@@ -62,7 +73,10 @@ def find_period(x: Floats) -> tuple[int, int, int]:
     calm -= calm.mean()
     period = _fundamental_of(calm)
     start, stop = extent(calm, period)
-    return period, start, stop
+    shorter = without_mains(calm[start:stop], period, rate_hz, step)
+    if shorter < period:
+        start, stop = extent(calm, shorter)
+    return shorter, start, stop
 
 
 def _fundamental_of(calm: Floats) -> int:
@@ -70,7 +84,7 @@ def _fundamental_of(calm: Floats) -> int:
     if calm.size > _PART:
         middle = calm[calm.size // 2 - _PART // 2 :][:_PART]
         try:
-            return _sharpened(calm, _fundamental_of(middle), 1)
+            return _sharpened(calm, difference(calm), _fundamental_of(middle), 1)
         except SignalError:
             pass
     flat, peaks = whitened(calm)
@@ -109,25 +123,32 @@ def _judged(view: Floats, d: Floats) -> tuple[float, int, Floats]:
     # The difference of samples one lag apart is the slope of a drift, without the periodic part.
     slope = float(np.mean(view[lag:] - view[:-lag])) / lag
     level = view - slope * (np.arange(view.size) - view.size / 2)
-    period = _sharpened(level, lag, width)
+    period = _sharpened(level, d, lag, width)
     return log_chance(level, period), period, level
 
 
-def _sharpened(flat: Floats, lag: int, width: int) -> int:
-    """The neighbour of a lag whose periods add up to the most power at the excited bins."""
+def _sharpened(flat: Floats, d: Floats, lag: int, width: int) -> int:
+    """The neighbour of a lag whose periods add up to the most power at the excited bins.
+
+    Only neighbours that repeat as well as the best of them, within what noise does to a difference: in a recording
+    with little noise the difference is more precise.
+    """
     reach = min(max(width, 2), _NEIGHBOURS_MAX)
     lines = _lines(flat, lag) or None
-    tried = [p for p in range(lag - reach, lag + reach + 1) if LAG_MIN <= p <= flat.size // 2]
-    # The same number of periods for each: with one more, even a wrong period would explain more.
-    count = flat.size // tried[-1]
+    tried = np.arange(max(lag - reach, LAG_MIN), min(lag + reach, flat.size // 2) + 1)
+    limit = max(float(d[tried].min()), 0.0) * (1 + _SIGMAS * 2 * np.sqrt(2 / (flat.size - tried[-1]))) + ROUNDING
+    tried = tried[d[tried] <= limit]
+    # A line of few cycles would leak into its image at a period that is not whole in the recording.
+    tapered = flat * np.hanning(flat.size)
 
     def power(period: int) -> float:
-        mean = np.fft.rfft(flat[: count * period].reshape(count, period).mean(axis=0))[1 : (period + 1) // 2]
+        folded = np.pad(tapered, (0, -flat.size % period)).reshape(-1, period).sum(axis=0)
+        bins = np.fft.rfft(folded)[1 : (period + 1) // 2]
         if lines:
-            mean = mean[[k - 1 for k in lines if k <= mean.size]]
-        return float(np.sum(np.abs(mean) ** 2)) / period**2
+            bins = bins[[k - 1 for k in lines if k <= bins.size]]
+        return float(np.sum(np.abs(bins) ** 2))
 
-    return max(tried, key=lambda p: (power(p), -abs(p - lag)))
+    return int(max(tried, key=lambda p: (power(p), -abs(p - lag))))
 
 
 def _lines(flat: Floats, period: int) -> list[int]:

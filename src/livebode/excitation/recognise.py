@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import Lines, SignalError, UsageError
+from livebode.core.steps import step_of
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.crest import peak_and_rms
+from livebode.excitation.extent import extent
+from livebode.excitation.hum import separate_hum
 from livebode.excitation.period import find_period
 from livebode.excitation.prepare import checked, clipped, filled
 from livebode.excitation.significance import FLOOR_DB, GAP_DB, BinClasses, find_lines
@@ -131,12 +134,13 @@ def recognise(
     """
     given, answer = _checked_together(excitation, rate_hz, output)
     x = filled(given)
-    period, start, stop = find_period(x)
+    step = step_of(x)
+    period, start, stop = find_period(x, rate_hz, step)
     if slips := find_slips(x, period):
         given = realigned(given, slips)
         answer = None if answer is None else realigned(answer, slips)
         x = filled(given)
-        period, start, stop = find_period(x)
+        period, start, stop = find_period(x, rate_hz, step)
     view = slice(start, stop)
     # Spikes are clipped for the first search of lines, but not for the search of periods with spikes.
     roughly = find_lines(spectra(cut(clipped(x[view]), period)), floor_db, gap_db).excited
@@ -147,15 +151,9 @@ def recognise(
         replies, also = _periods(answer[view], period, roughly)
         strange = strange | also
     steady = ~strange if np.sum(~strange) >= 2 else np.ones(len(blocks), dtype=np.bool_)
-    found = find_lines(spectra(blocks[steady]), floor_db, gap_db)
+    found = separate_hum(find_lines(spectra(blocks[steady]), floor_db, gap_db, step), rate_hz / period)
     if not found.excited.any():
-        raise SignalError(
-            "no-line-above-noise",
-            f"no line of the period of {period} samples exceeds the noise of {len(blocks)} periods",
-            "record more periods, or raise the amplitude",
-            period=period,
-            periods=len(blocks),
-        )
+        raise _no_line(period, len(blocks))
     peak, rms = peak_and_rms(blocks[steady].mean(axis=0))
     ahead = leading(strange)
     return Excitation(
@@ -171,6 +169,48 @@ def recognise(
         outlying=tuple(m for m in _numbers(strange) if m >= ahead),
         slips=slips,
         snr_db=None if replies is None else snr_db(spectra(replies[steady])[:, found.excited]),
+    )
+
+
+def lines_of_window(excitation: ArrayLike, window: int, rate_hz: float) -> Lines:
+    """The lines of an excitation in windows of a given length, where a person knows better than `recognise`.
+
+    Parameters
+    ----------
+    excitation
+        Reference or measured signal, shape (samples,).
+    window
+        Length of the window, samples; a multiple of the excitation's period.
+    rate_hz
+        Samples per second.
+
+    Raises
+    ------
+    LivebodeError
+        If the channel is empty, constant or not finite, or no line exceeds what differs between the windows.
+
+    Examples
+    --------
+    >>> from livebode.excitation import multisine
+    >>> period = multisine(Lines.parse("20:140:20", rate_hz=4000, window=200))
+    >>> lines_of_window(np.tile(period, 8), 400, 4000).bins
+    (2, 4, 6, 8, 10, 12, 14)
+    """
+    x = filled(checked(excitation, "excitation"))
+    start, stop = extent(clipped(x), window)
+    found = find_lines(spectra(cut(clipped(x[start:stop]), window)), step=step_of(x))
+    if not found.excited.any():
+        raise _no_line(window, x.size // window)
+    return _lines(found, window, rate_hz)
+
+
+def _no_line(period: int, periods: int) -> SignalError:
+    return SignalError(
+        "no-line-above-noise",
+        f"no line of the period of {period} samples exceeds the noise of {periods} periods",
+        "record more periods, or raise the amplitude",
+        period=period,
+        periods=periods,
     )
 
 

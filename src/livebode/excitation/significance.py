@@ -22,6 +22,9 @@ GAP_DB = 12.0
 _DISTORTION_SHARE = 0.1
 # No converter reaches 138 dB, the resolution of float32: a signal that repeats better is an undistorted reference.
 _REFERENCE_NOISE = float(np.finfo(np.float32).eps) ** 2
+# Mean square of the error of truncation toward zero, in squares of the step; rounding alone has a quarter of it.
+_TRUNCATION = 1 / 3
+_LEVELS_MIN = 4.0  # half steps in the root mean square of a signal that is rounded, not designed in levels
 # Complex degrees of freedom that the noise of a bin is estimated from. With 20 the F-test requires at most three times
 # the power that known noise would require (1e-3 in 1,000 bins), with 1 it would require 70,000 times.
 _NOISE_DOF = 20
@@ -81,7 +84,7 @@ def _averaged(power: Floats, reach: int) -> tuple[Floats, NDArray[np.int64]]:
     return (sums[last] - sums[np.minimum(first, last)]) / width, width
 
 
-def find_lines(periods: Complex, floor_db: float = FLOOR_DB, gap_db: float = GAP_DB) -> BinClasses:
+def find_lines(periods: Complex, floor_db: float = FLOOR_DB, gap_db: float = GAP_DB, step: float = 0.0) -> BinClasses:
     """The bins of the excitation among those with significant power.
 
     Parameters
@@ -94,10 +97,15 @@ def find_lines(periods: Complex, floor_db: float = FLOOR_DB, gap_db: float = GAP
         In a measured signal (not in a reference, which repeats without noise), the lines below a step of this height in
         the sorted amplitudes are distortion if they have less than a tenth of the power. ``inf`` switches it off.
 
+    step
+        The samples are multiples of this step, unit of the signal; 0 for none. The error of rounding or truncation
+        repeats with the excitation. The lines are then the bins above the highest step in the sorted amplitudes, among
+        those whose power together such an error can have.
+
     Notes
     -----
     A multisine with lines of very different design amplitudes, recorded as a measured current, can lose the
-    weak group to `gap_db`: record the reference, or switch it off.
+    weak group to `gap_db`: record the reference, or switch it off. A line of less than 0.8 steps can be lost to `step`.
     """
     mean = np.abs(periods.mean(axis=0))
     mean[0] = 0.0
@@ -106,12 +114,34 @@ def find_lines(periods: Complex, floor_db: float = FLOOR_DB, gap_db: float = GAP
     excited = power.copy()
     if excited.any() and _measured(periods, mean):
         excited &= mean >= _step(mean[excited], gap_db)
+    # Noise of half a step spreads the rounding evenly; a signal of a few levels is designed so (PRBS).
+    power_all = np.sum(mean**2) / 2
+    if excited.any() and _scatter(periods) < (step / 2) ** 2 < power_all / _LEVELS_MIN**2:
+        excited &= mean >= _above_rounding(mean[excited], step, mean.size)
     return BinClasses(mean, excited, power & ~excited)
 
 
 def _measured(periods: Complex, mean: Floats) -> bool:
-    scatter = np.median(np.sum(np.abs(periods[:, 1:] - periods[:, 1:].mean(axis=0)) ** 2, axis=1))
-    return bool(scatter > _REFERENCE_NOISE * np.sum(mean**2))
+    return bool(2 * _scatter(periods) > _REFERENCE_NOISE * np.sum(mean**2))
+
+
+def _scatter(periods: Complex) -> float:
+    """Mean square of what differs from period to period, in the signal's unit squared."""
+    away = periods[:, 1:] - periods[:, 1:].mean(axis=0)
+    return float(np.median(np.sum(np.abs(away) ** 2, axis=1))) / 2
+
+
+def _above_rounding(amplitudes: Floats, step: float, bins: int) -> float:
+    # The amplitude just above the highest step down, where rounding can explain all below it; 0 without one. The search
+    # ends where rounding, evenly distributed over the bins, would be.
+    falling = np.sort(amplitudes)[::-1]
+    below = np.cumsum(falling[::-1] ** 2)[::-1] / 2
+    explained = below <= _TRUNCATION * step**2
+    relevant = falling > step / np.sqrt(6 * bins)
+    cuts = 1 + np.flatnonzero(explained[1:] & relevant[:-1])
+    if not cuts.size:
+        return 0.0
+    return float(falling[cuts[np.argmax(falling[cuts - 1] / falling[cuts])] - 1])
 
 
 def _step(amplitudes: Floats, gap_db: float) -> float:

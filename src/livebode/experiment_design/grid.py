@@ -10,10 +10,10 @@ import numpy as np
 
 from livebode.core import GridError, Lines, counted
 from livebode.core.lines import WINDOW_MAX, check_window
+from livebode.core.mains import meets_mains
 from livebode.estimation.settings import default_hop
 from livebode.excitation import check_band, chirp_lines, odd_bins, odd_lines, stepped_lines
 from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
-from livebode.experiment_design.mains import meets_mains
 from livebode.experiment_design.spec import ExperimentSpec
 
 _PERIODS = 4  # of each line of a stepped sine: the first of them is its transient

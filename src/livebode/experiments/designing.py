@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from livebode.configuration.schema import axis_schema
 from livebode.core import ConfigError, OutputError, UsageError
+from livebode.core.files import whole_directory
+from livebode.core.writing import writing
 from livebode.experiment_design import FORMATS, Design, axis_text, choose, write
 from livebode.experiments.experiment import Experiment
 from livebode.records import to_json
@@ -79,52 +81,26 @@ def design_experiment(
     left_out = ""
     if kinds is None and lines.window > PERIOD_MAX:
         left_out = f"no .st: its {lines.window} samples are more than the {PERIOD_MAX} of a PLC's table"
-    try:
-        there = directory.absolute()  # "." has no parent in which a sibling can be created
-        there.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=f".{there.name[:100]}.partial-", dir=there.parent) as folder:
-            partial = Path(folder) / "whole"
-            partial.mkdir()
-            for kind in kinds or _all_that_hold(lines.window):
-                write(partial / f"{name}{kind}", design.waveform, name)
-            configuration = axis_text(
-                design,
-                signals=experiment.signal_names(),
-                log=experiment.log,
-                loop=experiment.loop_tables(),
-                motion=experiment.motion_table(lines.window / lines.rate_hz),
-                tracking=experiment.tracking(),
-            )
-            (partial / _AXIS).write_text(f"#:schema ./{_SCHEMA}\n{configuration}", encoding="utf-8")
-            (partial / _SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
-            if draw is not None:
-                draw(design, partial / f"{name}.png")
-            files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
-            facts = {"files": files} | design.plain()
-            (partial / _MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
-            _check_free(directory, force)
-            _put(partial, there, aside=Path(folder) / "before")
-    except OSError as error:
-        raise OutputError(
-            "not-written",
-            f"{str(directory)!r} could not be written: {error.strerror}; nothing was changed there",
-            "check the disk and its permissions",
-            path=str(directory),
-        ) from None
+    with writing(directory), whole_directory(directory, shutil.rmtree) as partial:
+        for kind in kinds or _all_that_hold(lines.window):
+            write(partial / f"{name}{kind}", design.waveform, name)
+        configuration = axis_text(
+            design,
+            signals=experiment.signal_names(),
+            log=experiment.log,
+            loop=experiment.loop_tables(),
+            motion=experiment.motion_table(lines.window / lines.rate_hz),
+            tracking=experiment.tracking(),
+        )
+        (partial / _AXIS).write_text(f"#:schema ./{_SCHEMA}\n{configuration}", encoding="utf-8")
+        (partial / _SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
+        if draw is not None:
+            draw(design, partial / f"{name}.png")
+        files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
+        facts = {"files": files} | design.plain()
+        (partial / _MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
+        _check_free(directory, force)
     return Designed(design, directory, files, left_out)
-
-
-def _put(made: Path, there: Path, aside: Path) -> None:
-    """Put it in its place; the previous directory is removed, or remains if this fails."""
-    before = there.exists()
-    if before:
-        there.rename(aside)
-    try:
-        made.rename(there)
-    except OSError:
-        if before:
-            aside.rename(there)
-        raise
 
 
 def _check_names(name: str, log: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from functools import cached_property
 from math import inf
@@ -13,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from livebode.configuration.axis import LoopSection, nearest
 from livebode.configuration.toml_file import read_table, shortened
-from livebode.core import ConfigError
+from livebode.core import ConfigError, nearest_name
 from livebode.experiment_design import ExperimentSpec, Machine, MachineLimits, belt_machine
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
@@ -132,7 +131,7 @@ class Experiment(BaseModel):
             raise ConfigError(
                 "key-unknown",
                 f"there is no [belt.{unknown[0]}]",
-                _near(unknown[0], BELT),
+                nearest_name(unknown[0], BELT, "Settings"),
                 key=f"belt.{unknown[0]}",
             )
         parts = {name: made_of(BELT[name], given, f"belt.{name}") for name, given in self.belt.items()}
@@ -186,7 +185,7 @@ class Experiment(BaseModel):
             raise ConfigError(
                 "key-unknown",
                 f"there is no signals.{unknown[0]}",
-                _near(unknown[0], (*SIGNALS, "schedule")),
+                nearest_name(unknown[0], (*SIGNALS, "schedule"), "Settings"),
                 key=f"signals.{unknown[0]}",
             )
         if self.belt is None:
@@ -227,7 +226,7 @@ def _first_of(error: ValidationError) -> ConfigError:
             meant = nearest(first["loc"])
         else:
             known = MeasuredSection if first["loc"][0] == "measured" else Experiment
-            meant = _near(place.split(".")[-1], known.model_fields)
+            meant = nearest_name(place.split(".")[-1], known.model_fields, "Settings")
         return ConfigError("key-unknown", f"there is no {place!r}", meant, key=place)
     if first["type"] == "missing" and all(isinstance(part, str) for part in first["loc"]):
         return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
@@ -251,18 +250,16 @@ def made_of(kind: type[T], given: Mapping[str, Any], section: str) -> T:
     for name, value in given.items():
         if name not in known:
             raise ConfigError(
-                "key-unknown", f"there is no {section}.{name}", _near(name, known), key=f"{section}.{name}"
+                "key-unknown",
+                f"there is no {section}.{name}",
+                nearest_name(name, known, "Settings"),
+                key=f"{section}.{name}",
             )
         try:
             TypeAdapter(known[name], config=ConfigDict(strict=True)).validate_python(value)
         except ValidationError as error:
             raise _unusable(f"{section}.{name}", value, error.errors()[0]["msg"]) from None
     return kind(**given)
-
-
-def _near(name: str, known: Any) -> str:
-    near = difflib.get_close_matches(name, list(known), n=1)
-    return f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(known)}"
 
 
 def _finite(table: Mapping[str, Any]) -> dict[str, Any]:

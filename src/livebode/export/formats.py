@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 import pyarrow as pa
 
 from livebode.core import OutputError, Responses
+from livebode.core.files import whole_file
+from livebode.core.writing import writing
 from livebode.export.delimited import write_csv
 from livebode.export.labelled import write_netcdf
 from livebode.export.matlab import write_mat
@@ -36,7 +35,6 @@ TABLES: Mapping[str, Callable[[Path, Iterable[pa.RecordBatch]], WriteResult]] = 
 ENDINGS: Mapping[str, str] = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc", "uff": ".uff"}
 
 Done = TypeVar("Done")
-_DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
 
 
 def save(path: Path, write: Callable[[Path], Done], *, force: bool = False) -> Done:
@@ -47,7 +45,7 @@ def save(path: Path, write: Callable[[Path], Done], *, force: bool = False) -> D
     path
         Path of the file; missing parent directories are created.
     write
-        Called with the path to write to, which has the name of `path`.
+        Called with the path of an empty file beside `path` to write to; its name has another suffix.
     force
         Whether to replace an existing file.
 
@@ -58,23 +56,11 @@ def save(path: Path, write: Callable[[Path], Done], *, force: bool = False) -> D
         then, and an existing file is unchanged.
     """
     _check_free(path, force)
-    try:
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=f".{path.name[:100]}.partial-", dir=path.parent) as folder:
-            partial = Path(folder) / path.name
+        with whole_file(path) as partial:
             written = write(partial)
             _check_free(path, force)
-            partial.replace(path)
-    except OSError as error:
-        why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
-        raise OutputError(
-            "not-written",
-            f"{str(path)!r} could not be written: {why}; nothing was changed there",
-            "free some space, or choose another path",
-            path=str(path),
-            reason=why,
-            errno=error.errno,
-        ) from None
     return written
 
 

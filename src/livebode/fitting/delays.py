@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -98,10 +99,10 @@ def fitted_freely(
     """Rows fitted with a free delay, started from the fit without; where both failed, from several delays."""
     best = fit_rows(freed, measured, noise_dof, found.ended)
     lost = np.flatnonzero((found.status != OK) & (found.status != FRICTION) & (best.status != OK))
-    some, dof = measured.rows(lost), noise_dof[lost]
+    some, dof = measured[lost], noise_dof[lost]
     for ticks in _TRIED_TICKS if lost.size else ():
         late_s = ticks / freed.grid.rate_hz
-        turned = some._replace(value=some.value * np.exp(2j * np.pi * freed.grid.frequency_hz * late_s))
+        turned = replace(some, value=some.value * np.exp(2j * np.pi * freed.grid.frequency_hz * late_s))
         start = fit_rows(held, turned, dof).ended
         start[:, freed.model.names.index(DELAY)] = late_s
         again = fit_rows(freed, some, dof, start)

@@ -27,7 +27,7 @@ def held_by_friction(problem: Problem, measured: Measured, without: Solution, do
     lacking = np.flatnonzero(lacks_more_than(_FROM, measured, without.response, dof))
     if not (lacking.size and frictions):
         return found
-    some = measured.rows(lacking)
+    some = measured[lacking]
     eps = own_epsilon(some, without.response[lacking], dof[lacking])
     for name in frictions:
         wider = problem.variant(free=(name,))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,7 +46,7 @@ def follows_pattern(measured: Measured, fitted: FittedRows, noise_dof: Floats) -
         return False  # residual of the iteration for exact data
     if correlation(measured, fitted) * np.sqrt(2 * lines) > _RUNS:
         return True
-    known = measured._replace(use=measured.use & (measured.sigma > 0))
+    known = replace(measured, use=measured.use & (measured.sigma > 0))
     if lines >= _FEW or not known.use.any():
         return False
     alone = misfit(known, fitted.response, np.full(1, np.inf), noise_dof)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import UsageError, nearest_name
+from livebode.core import RowArrays, UsageError, nearest_name
 from livebode.fitting.least_squares import Minimum, minimise
 from livebode.fitting.physical import EvaluationGrid, PhysicalModel
 
@@ -20,18 +21,16 @@ _ENOUGH = 1e-4  # of chi²: a step of 1 % of sigma, after which the remaining er
 _AT_BOUND = 1e-6
 
 
-class Measured(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Measured(RowArrays):
     """Values (rows, lines), their standard deviations E|e|² = sigma² (NaN: not known), and which are used."""
 
     value: Complex
     sigma: Floats
     use: NDArray[np.bool_]
 
-    def rows(self, which: NDArray[Any]) -> Measured:
-        return Measured(self.value[which], self.sigma[which], self.use[which])
-
     def repeated(self, times: int) -> Measured:
-        return Measured(*(np.tile(x, (times, 1)) for x in (self.value, self.sigma, self.use)))  # type: ignore[arg-type]
+        return self[np.tile(np.arange(len(self)), times)]
 
 
 class Solution(NamedTuple):

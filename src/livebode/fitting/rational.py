@@ -110,7 +110,7 @@ def _fitted(equations: _Equations, method: Method, names: tuple[str, ...], respo
     covariance = np.full((len(dof), len(names), len(names)), np.nan)
     chi2, epsilon = np.full(len(dof), np.nan), np.full(len(dof), np.nan)
     if ok.any():
-        some = equations._replace(measured=measured.rows(ok))
+        some = equations._replace(measured=measured[ok])
         found, weight = _solved(some, method)
         value = _ratio(some, found)
         eps = own_epsilon(some.measured, value, dof[ok])

@@ -83,7 +83,7 @@ def fit_rows(
     whole = _none(problem, measured, dof)
     if some.size:
         begin, eps = (None if x is None else x[some] for x in (start, epsilon))
-        found = _fitted(problem, measured.rows(some), noise_dof[some], begin, eps, dof[some])
+        found = _fitted(problem, measured[some], noise_dof[some], begin, eps, dof[some])
         for kept, other in zip(whole, found):
             kept[some] = other
     return whole
@@ -133,7 +133,7 @@ def _begun(problem: Problem, measured: Measured, weight: Floats, start: Floats |
     found, cost = problem.solve(measured, weight, start, _WARM_ROUNDS)
     lost = ~found.settled | (cost > _SUSPICIOUS * dof)
     if lost.any():
-        again = _scanned(problem, measured.rows(lost), weight[lost])
+        again = _scanned(problem, measured[lost], weight[lost])
         rest = np.abs(weight[lost] * np.where(measured.use[lost], again.response - measured.value[lost], 0.0)) ** 2
         better = (rest.sum(axis=1) < cost[lost]) | ~found.settled[lost]
         rows = np.flatnonzero(lost)[better]

@@ -5,6 +5,9 @@ kinds of events, the names of parameters and the statuses here with those of the
 """
 
 SENTENCES = (
+    "{channel} repeats every {period} samples rather than every {window}: {share} % of its power changes from one "
+    "window to the next, {rest} % from one such period to the next",
+    "compare lines.window with the design of the excitation",
     "{count} samples are missing before sample {sample}",
     "an unknown number of samples is missing before sample {sample}",
     "responses are invalid until a window of {window} samples is complete again",
@@ -297,7 +300,8 @@ NAMES = (
     "phase-slips", "record-closed", "record-continued", "record-damaged", "record-paused", "record-removed",
     "record-resumed", "record-stopped", "record-unclosed", "record-unfinished", "reordered", "repeat", "replaced",
     "restart", "resumed", "roles-doubtful", "spike", "steps", "thinned", "transient", "unit-changed", "waiting",
-    "wrong-rate", "a delay", "viscous friction at the motor (B)", "viscous friction at the load (BL)", "a lag",
+    "window-doubtful", "wrong-rate", "a delay", "viscous friction at the motor (B)",
+    "viscous friction at the load (BL)", "a lag",
     "the compliance of modes above the band", "a further mode", "output", "plant input",
 )  # fmt: skip
 """Names and phrases without values."""

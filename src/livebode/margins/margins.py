@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Parameters, UsageError, counted
 from livebode.core.parameters import OK, half_width
-from livebode.core.rows import joined
+from livebode.core.rows import RowArrays
 
 Floats = NDArray[np.float64]
 
-NAMES = (
-    "gain_margin",
-    "gain_reduction",
-    "phase_margin",
-    "delay_margin",
-    "peak_sensitivity",
-    "bandwidth",
-)
+WORDS = {
+    "gain_margin": "gain may rise by",
+    "gain_reduction": "gain may fall by",
+    "phase_margin": "phase margin",
+    "delay_margin": "delay margin",
+    "peak_sensitivity": "peak sensitivity Ms",
+    "bandwidth": "bandwidth",
+}
+"""The margins, with their names for people."""
+NAMES = tuple(WORDS)
 UNITS = ("dB", "dB", "deg", "ms", "", "Hz")
 UNSTABLE = "unstable by the fit"
 CONTRADICTED = "contradicted by the lines"
 NONE, INTERPOLATED, EXTRAPOLATED = "none", "interpolated", "extrapolated"
 
-PER_ROW = ("value", "sigma", "frequency_hz", "frequency_sigma_hz", "place", "status", "sample", "time_s", "schedule")
-
 
 @dataclass(frozen=True, eq=False)
-class Margins:
+class Margins(RowArrays):
     """Margins of the closed loop, a row for each fit. Immutable.
 
     Attributes
@@ -74,12 +73,6 @@ class Margins:
         last = zip(self.names, self.value[-1], self.bound()[-1], self.units)
         words = ", ".join(f"{name} {value:.4g} ± {bound:.2g} {unit}".strip() for name, value, bound, unit in last)
         return f"<Margins: {counted(len(self), 'row')}; {words}>"
-
-    def __len__(self) -> int:
-        return len(self.sample)
-
-    def __getitem__(self, at: slice | NDArray[Any]) -> Margins:
-        return replace(self, **{name: getattr(self, name)[at] for name in PER_ROW})
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -136,8 +129,3 @@ class Margins:
                 )
             )
         return tuple(found)
-
-    @classmethod
-    def join(cls, parts: list[Margins]) -> Margins:
-        """Join parts of one run, in order."""
-        return cls(**joined(parts, PER_ROW, "margins"))

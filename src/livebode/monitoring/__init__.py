@@ -8,7 +8,7 @@ from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.machine_detector import MachineDetector
 from livebode.monitoring.machine_monitor import MachineMonitor
 from livebode.monitoring.monitor import Monitor
-from livebode.monitoring.rows import PLACES, NonOverlappingWindows, Rows, places
+from livebode.monitoring.rows import PLACES, NonOverlappingWindows, WindowRows, places
 from livebode.monitoring.table import ScheduleTable
 from livebode.monitoring.table_learning import learn_table
 from livebode.monitoring.table_monitor import TableMonitor
@@ -23,9 +23,9 @@ __all__ = [
     "MachineMonitor",
     "Monitor",
     "NonOverlappingWindows",
-    "Rows",
     "ScheduleTable",
     "TableMonitor",
+    "WindowRows",
     "learn_machine",
     "learn_table",
     "places",

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -13,7 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import BaselineError, Lines, LivebodeError, OutputError
+from livebode.core import BaselineError, Lines, LivebodeError
+from livebode.core.files import write_whole
+from livebode.core.writing import writing
 from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.baseline_part import BaselinePart
 from livebode.monitoring.between_runs import BetweenRuns
@@ -33,28 +33,11 @@ _COVARIATE_ARRAYS = {"mean": 1, "low": 1, "high": 1, "slope": 2, "covariance": 3
 
 
 def save(baseline: Mapping[str, Any], path: Path) -> None:
-    """Write the fields of a Baseline to a temporary file beside it, and move it into place when it is complete."""
+    """Write the fields of a Baseline, whole or not at all."""
     text = json.dumps(_plain(baseline), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
-    try:
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.partial-", dir=path.parent)
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-            Path(name).chmod(0o644)
-            Path(name).replace(path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise OutputError(
-            "not-written",
-            f"the baseline could not be written to {str(path)!r}: {error.strerror}",
-            "make room, or choose another path",
-            path=str(path),
-            reason=error.strerror,
-            errno=error.errno,
-        ) from None
+        write_whole(path, text.encode())
 
 
 def load(path: Path) -> dict[str, Any]:

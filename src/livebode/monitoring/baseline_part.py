@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import BaselineError
+from livebode.core import BaselineError, counted
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class BaselinePart:
         except (TypeError, ValueError):
             raise self.wrong(name, "not an array of numbers") from None
         if array.ndim != dimensions or (known and not np.isfinite(array).all()):
-            raise self.wrong(name, f"not an array of numbers in {dimensions} dimension{'s' * (dimensions > 1)}")
+            raise self.wrong(name, f"not an array of numbers in {counted(dimensions, 'dimension')}")
         if np.any(array < least):
             raise self.wrong(name, f"below {least:g} in one place", float(np.nanmin(array)))
         return array

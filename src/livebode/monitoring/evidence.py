@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from livebode.core import RowArrays
 
 Floats = NDArray[np.float64]
 
@@ -19,7 +20,7 @@ OFFSET = "offset"
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class Evidence(RowArrays):
     """Score and information of a change in each direction, of windows that do not overlap.
 
     To second order the log-likelihood of a window under the change δ is δ·score − δ·information·δ/2.
@@ -64,18 +65,6 @@ class Evidence:
     ripple_gain: Floats
     covariate: Floats
 
-    def __len__(self) -> int:
-        return len(self.sample)
-
     @property
     def judged(self) -> NDArray[np.bool_]:
         return np.asarray(self.status == JUDGED)
-
-    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Evidence:
-        """Some of the windows."""
-        return Evidence(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
-
-    @classmethod
-    def join(cls, parts: Sequence[Evidence]) -> Evidence:
-        """Parts in order as one; at least one."""
-        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))

@@ -22,7 +22,7 @@ from livebode.monitoring.order_search import find_orders
 from livebode.monitoring.ripple import Ripple, amplitudes, noise_power
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.stretches import Stretches
-from livebode.motion.fit import MotionFitOptions, Rows
+from livebode.motion.fit import MotionFitOptions, WeightedResponses
 
 Floats = NDArray[np.float64]
 Run = Callable[[], Iterable[Block]]
@@ -145,7 +145,7 @@ def _with_noise(machine: LearnedMachine, seen: Evidence) -> LearnedMachine:
     return replace(machine, ripple=ripple.only(matters), noise_power=noise)
 
 
-def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tuple[Rows, Floats, Floats]:
+def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tuple[WeightedResponses, Floats, Floats]:
     """Responses of single steady windows that are fast enough, their speeds, and covariates' known values by time."""
     u, y, centre, speed, covariate = (np.concatenate(part) for part in zip(*_spectra(runs, lines, names)))
     fastest = np.max(np.abs(speed), initial=0.0)
@@ -163,7 +163,7 @@ def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tu
     known = covariate[use][np.isfinite(covariate[use]).all(axis=1)]
     use = use[np.argsort(centre[use], kind="stable")]
     chosen = use[np.unique(np.linspace(0, use.size - 1, _ROWS_MAX).round().astype(int))]
-    return Rows(y[chosen] / u[chosen], np.abs(u[chosen]), centre[chosen]), speed[use], known
+    return WeightedResponses(y[chosen] / u[chosen], np.abs(u[chosen]), centre[chosen]), speed[use], known
 
 
 def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> Iterator[tuple[NDArray[Any], ...]]:
@@ -205,7 +205,7 @@ def _seen(run: Run, machine: LearnedMachine, lines: Lines, names: tuple[str, ...
             window=lines.window,
         )
     seen = Evidence.join(parts)
-    return seen.rows(seen.judged)
+    return seen[seen.judged]
 
 
 def _with_uncertainty(parts: Sequence[Evidence], machine: LearnedMachine, rate_hz: float) -> LearnedMachine:
@@ -217,7 +217,7 @@ def _with_uncertainty(parts: Sequence[Evidence], machine: LearnedMachine, rate_h
     gradient, matrix = normal_of(seen, machine, rate_hz)
     slopes = []
     for part in parts_of([len(run) for run in parts]):
-        without = normal_of(seen.rows(part), machine, rate_hz)
+        without = normal_of(seen[part], machine, rate_hz)
         step = step_of((gradient - without[0], matrix - without[1]), machine)
         slopes.append(step[-1 - len(DIRECTIONS) * c : -1])
     scale = np.tile(1 / covariates.half_range, len(DIRECTIONS))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from livebode.core import Block, Event, Parameters, Responses, Stage, StatefulBase, UsageError
+from livebode.core import Block, Event, Parameters, Responses, Stage, StatefulBase, UsageError, counted
 from livebode.estimation import Settings
 from livebode.monitoring.baseline import Baseline
 from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S
@@ -168,6 +168,6 @@ def _message(summary: dict[str, Any], together: str) -> str:
         return "Nothing of the run could be judged: the baseline does not cover what the machine did."
     if not summary["changes"]:
         return f"No change against the baseline ({judged})."
-    alarms = f"{summary['changes']} change{'s' * (summary['changes'] > 1)} against the baseline"
+    alarms = f"{counted(summary['changes'], 'change')} against the baseline"
     standing = f"{len(summary['standing']) or 'none'} of them active at the end ({judged})"
     return f"{alarms}, {standing}{together}."

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Parameters, Responses, Stage, StatefulBase
+from livebode.core import Parameters, Responses, RowArrays, Stage, StatefulBase
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class WindowRows(RowArrays):
     """One row for every window length, (rows, columns) for values.
 
     `variance` is the row's own estimate of E|error|²; `step` is the schedule's change since the previous row; `ok` is
@@ -28,18 +27,6 @@ class Rows:
     time_s: Floats
     sample: NDArray[np.int64]
     ok: NDArray[np.bool_]
-
-    def __len__(self) -> int:
-        return len(self.sample)
-
-    def some(self, chosen: NDArray[np.bool_]) -> Rows:
-        """Some of the rows."""
-        return Rows(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
-
-    @classmethod
-    def join(cls, parts: Sequence[Rows]) -> Rows:
-        """Join parts in order; at least one."""
-        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))
 
 
 PLACES = 5
@@ -78,7 +65,7 @@ class NonOverlappingWindows(StatefulBase):
         self._apart, self._place = apart, place
         self._sample, self._schedule = -2 * apart, np.nan  # no row is so far after it
 
-    def of_responses(self, responses: Responses) -> Rows:
+    def of_responses(self, responses: Responses) -> WindowRows:
         """Rows of complex values at the lines."""
         use = self._chosen(responses.sample)
         ok = np.all(responses.valid[use] & np.isfinite(responses.sigma[use]), axis=1)
@@ -87,7 +74,7 @@ class NonOverlappingWindows(StatefulBase):
             responses.sample[use], ok,
         )  # fmt: skip
 
-    def of_parameters(self, parameters: Parameters) -> Rows:
+    def of_parameters(self, parameters: Parameters) -> WindowRows:
         """Rows of parameters."""
         use = self._chosen(parameters.sample)
         variance = np.einsum("rii->ri", parameters.covariance[use])
@@ -102,11 +89,11 @@ class NonOverlappingWindows(StatefulBase):
     def _rows(
         self, value: NDArray[np.complex128], variance: Floats, schedule: Floats, time_s: Floats,
         sample: NDArray[np.int64], ok: NDArray[np.bool_],
-    ) -> Rows:  # fmt: skip
+    ) -> WindowRows:  # fmt: skip
         before = np.concatenate([[self._schedule], schedule])
         follows = np.diff(np.concatenate([[self._sample], sample])) == self._apart
         if len(sample):
             self._sample, self._schedule = int(sample[-1]), float(schedule[-1])
         step = np.diff(before)
         known = (follows & np.isfinite(step)) | ~np.isfinite(schedule)
-        return Rows(value, variance, schedule, np.where(follows, step, np.nan), time_s, sample, ok & known)
+        return WindowRows(value, variance, schedule, np.where(follows, step, np.nan), time_s, sample, ok & known)

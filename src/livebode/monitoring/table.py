@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring.accuracy import ChangeAccuracy
-from livebode.monitoring.rows import Rows
+from livebode.monitoring.rows import WindowRows
 
 Floats = NDArray[np.float64]
 
@@ -61,12 +61,12 @@ class ScheduleTable:
     count: NDArray[np.int64]
     accuracy: ChangeAccuracy
 
-    def place(self, rows: Rows) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    def place(self, rows: WindowRows) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """Flat number of the cell (bin and direction) of each row, and whether the cell was learned."""
         cell, inside = cells(rows, self.low, self.step, self.still, len(self.count))
         return cell, inside & (self.count.ravel()[cell] >= WINDOWS_MIN)
 
-    def deviation(self, rows: Rows, cell: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    def deviation(self, rows: WindowRows, cell: NDArray[np.intp]) -> tuple[Floats, Floats]:
         """Relative deviation of every component, and its variance, (rows, components) each.
 
         Where a row's own estimate exceeds the learned variance, the excess is added.
@@ -74,7 +74,7 @@ class ScheduleTable:
         deviation, own, more = self.deviation_parts(rows, cell)
         return deviation, own + more
 
-    def deviation_parts(self, rows: Rows, cell: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+    def deviation_parts(self, rows: WindowRows, cell: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
         """Relative deviation, its learned variance, and the row's own excess over it, (rows, components) each.
 
         A mean of n windows has
@@ -97,7 +97,9 @@ class ScheduleTable:
         return deviation, np.where(unknown | ~np.isfinite(deviation + more), np.inf, own), np.nan_to_num(more)
 
 
-def cells(rows: Rows, low: float, step: float, still: float, bins: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+def cells(
+    rows: WindowRows, low: float, step: float, still: float, bins: int
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Flat number of the cell of each row, and whether it is inside of the bins; without a schedule all are in one."""
     if step == 0:
         return np.full(len(rows), STILL, dtype=np.intp), np.ones(len(rows), dtype=bool)

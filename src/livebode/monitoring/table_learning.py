@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.core import BaselineError
 from livebode.monitoring.accuracy import STRETCH, ChangeAccuracy, accuracy
-from livebode.monitoring.rows import Rows
+from livebode.monitoring.rows import WindowRows
 from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, ScheduleTable, cells
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ _STILL = 0.05  # of the fastest usual step
 _ENOUGH = 0.9  # of the cells are to be known well enough for the smallest change
 
 
-def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: int = 1) -> ScheduleTable:
+def learn_table(what: str, names: Sequence[str], runs: Sequence[WindowRows], overlap: int = 1) -> ScheduleTable:
     """Mean and covariance in 24 bins of the schedule, by direction.
 
     The runs should contain the usual speeds, directions and temperatures. The correlation of consecutive windows and
@@ -45,11 +45,11 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: 
             windows=windows,
             windows_min=3 * WINDOWS_MIN,
         )
-    rows = Rows.join(runs)
-    rows = rows.some(rows.ok)
+    rows = WindowRows.join(runs)
+    rows = rows[rows.ok]
     low, step, still, bins = _grid(rows)
     cell, inside = cells(rows, low, step, still, bins)
-    rows, cell = rows.some(inside), cell[inside]
+    rows, cell = rows[inside], cell[inside]
     table = _moments(what, tuple(names), (low, step, still), bins, rows, cell, overlap)
     if not np.any(table.count >= WINDOWS_MIN):
         raise BaselineError(
@@ -68,7 +68,7 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: 
     return replace(table, accuracy=accuracy(score, information, table.accuracy.smallest, off))
 
 
-def _grid(rows: Rows) -> tuple[float, float, float, int]:
+def _grid(rows: WindowRows) -> tuple[float, float, float, int]:
     if not np.isfinite(rows.schedule).any():
         return 0.0, 0.0, 0.0, 1
     low, high = float(np.nanmin(rows.schedule)), float(np.nanmax(rows.schedule))
@@ -78,7 +78,7 @@ def _grid(rows: Rows) -> tuple[float, float, float, int]:
 
 
 def _moments(
-    what: str, names: tuple[str, ...], grid: tuple[float, float, float], bins: int, rows: Rows,
+    what: str, names: tuple[str, ...], grid: tuple[float, float, float], bins: int, rows: WindowRows,
     cell: NDArray[np.intp], overlap: int,
 ) -> ScheduleTable:  # fmt: skip
     number, columns = bins * WAYS, rows.value.shape[1]

@@ -11,7 +11,7 @@ from livebode.core import Event, Stage, StatefulBase
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.noise_level import NoiseLevel
-from livebode.monitoring.rows import Rows
+from livebode.monitoring.rows import WindowRows
 from livebode.monitoring.table import ScheduleTable
 from livebode.monitoring.table_sentences import cleared, differs, unknown
 
@@ -65,7 +65,7 @@ class TableMonitor(StatefulBase):
         """Whether an alarm is active."""
         return bool(self._standing.any())
 
-    def process(self, rows: Rows) -> list[Event]:
+    def process(self, rows: WindowRows) -> list[Event]:
         """Events of these rows."""
         cell, known = self._table.place(rows)
         deviation, own, more = self._table.deviation_parts(rows, cell)

@@ -21,7 +21,7 @@ _SCANNED_ROWS = 24
 _SMOOTH = 1e-3  # of a third difference of the splines' weights, against the weight of all responses
 
 
-class Rows(NamedTuple):
+class WeightedResponses(NamedTuple):
     """Responses (rows, lines), one over their standard deviations up to a factor, and positions (rows,)."""
 
     value: Complex
@@ -52,7 +52,7 @@ class MotionFitOptions:
     damping_splines: int
     delayed: bool = False
 
-    def start(self, rows: Rows) -> MovingModel:
+    def start(self, rows: WeightedResponses) -> MovingModel:
         """From a scan of ten stiffnesses at up to 24 places: medians of the masses, curves through the rest."""
         chosen = np.unique(np.linspace(0, len(rows.value) - 1, _SCANNED_ROWS).round().astype(int))
         order = np.argsort(rows.position_m, kind="stable")[chosen]
@@ -92,12 +92,12 @@ class MotionFitOptions:
         known = self._unknowns(model)
         return self._model(np.concatenate([known[:2], *weights, known[-1:]]), low, high)
 
-    def misfit(self, rows: Rows, model: MovingModel) -> float:
+    def misfit(self, rows: WeightedResponses, model: MovingModel) -> float:
         """Residual of the model as a share of the weighted responses, rms."""
         rest = sampled(model, rows.position_m, self.z, self.rate_hz) - rows.value
         return float(np.linalg.norm(rows.weight * rest) / np.linalg.norm(rows.weight * rows.value))
 
-    def refine(self, rows: Rows, model: MovingModel, *, masses_known: bool = False) -> MovingModel:
+    def refine(self, rows: WeightedResponses, model: MovingModel, *, masses_known: bool = False) -> MovingModel:
         """Weighted least squares over all rows, started from a model; `masses_known` fixes Js, mL and the delay."""
         low, high = model.low_m, model.high_m
         known = self._unknowns(model)
@@ -131,7 +131,7 @@ class MotionFitOptions:
         design[:, 3, 2 + self.stiffness_splines : -1] = damping
         return design
 
-    def _smoothness(self, rows: Rows) -> Floats:
+    def _smoothness(self, rows: WeightedResponses) -> Floats:
         n, k = 2 + self.stiffness_splines + self.damping_splines, 2 + self.stiffness_splines
         penalty = np.zeros((n + 1, n + 1))
         penalty[2:k, 2:k] = _third_differences(self.stiffness_splines)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from livebode.core import Responses, Stage, StatefulBase
 from livebode.estimation import Settings
 from livebode.motion.chunk import Chunk
-from livebode.motion.fit import MotionFitOptions, Rows, sampled
+from livebode.motion.fit import MotionFitOptions, WeightedResponses, sampled
 from livebode.motion.model import MovingModel, PositionCurve
 from livebode.motion.residual import Residual
 from livebode.motion.standstill import turns
@@ -104,7 +104,7 @@ class Learner(StatefulBase):
             model = fit.follow(self.model, float(at.min()), float(at.max()))
             best = self._refined(fit, replay(model), tracked, rows, chunk, replay, max(self._passes - 2, 1))
         if best is None or best[1] > _WORSE * self._misfit:
-            raw = Rows(tracked.value[rows], chunk.torque(self._settings.lines, tracked.sample[rows]), at)
+            raw = WeightedResponses(tracked.value[rows], chunk.torque(self._settings.lines, tracked.sample[rows]), at)
             first = fit.refine(raw, fit.start(raw))
             if self._sound(first):
                 anew = self._refined(fit, replay(first), tracked, rows, chunk, replay, self._passes - 1)
@@ -144,11 +144,11 @@ class Learner(StatefulBase):
         onward = used[inside == 0]
         return onward if onward.size >= max(_ROWS_MIN, used.size // 4) else used
 
-    def _rows(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> Rows:
+    def _rows(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> WeightedResponses:
         # The error of a response is n/|U|: white noise on y divided by the torque at the line.
         weight = chunk.torque(self._settings.lines, tracked.sample[used])
         value = np.where(np.isfinite(now.value[used]), now.value[used], tracked.value[used])
-        return Rows(value, weight, tracked.schedule[used])
+        return WeightedResponses(value, weight, tracked.schedule[used])
 
     def _usable(self, tracked: Responses) -> NDArray[np.intp]:
         return np.flatnonzero(tracked.valid.all(axis=1) & np.isfinite(tracked.schedule))

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import NOT_WHOLE, Block, SignalError, Spectra, Stage, StatefulBase, rms
-from livebode.estimation import Settings
-from livebode.preparation.follower import Follower
+from livebode.estimation.stream_estimator import Follower
 
 # Rounding of a DFT gives 1e-30 of a signal's power at an empty line.
 POWERLESS_SHARE = 1e-20
@@ -14,9 +13,6 @@ POWERLESS_SHARE = 1e-20
 _POWERLESS_DB = -80.0
 _REPEATS = 0.5  # noise alone repeats by 1/m over m periods
 _PERIODS_TO_JUDGE = 4
-_LAGS = 8  # samples around the window in which the true period is searched
-_ROUNDING = 1e-12
-PERIODS_COMPARED = 4
 
 
 class ChannelCheck(StatefulBase):
@@ -149,38 +145,6 @@ _SPOILS = {
     "gaps": "gaps", "non-finite": "samples that are not finite", "implausible": "implausibly large samples",
     "spike": "spikes",
 }  # fmt: skip
-
-
-def check_period(samples: np.ndarray, settings: Settings) -> None:
-    """SignalError if the beginning of an excitation repeats after another number of samples than the window.
-
-    With a window that is wrong by one sample, every estimate is wrong by more than its bounds, without other symptoms.
-    """
-    window = settings.lines.window
-    lags = range(max(1, window - _LAGS), window + _LAGS + 1)
-    if samples.size < window + _LAGS + window // 2:
-        return
-    differences = {lag: _difference(samples, lag, window + _LAGS) for lag in lags}
-    best = min(differences, key=lambda lag: (differences[lag], abs(lag - window)))
-    if differences[window] > _ROUNDING and differences[best] < differences[window] / 2:
-        raise SignalError(
-            "wrong-period",
-            f"{settings.excitation!r} repeats every {best} samples, not every {window}",
-            f"set lines.window to {best} or 'auto'",
-            channel=settings.excitation,
-            key="lines.window",
-            period=best,
-            window=window,
-        )
-
-
-def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
-    """Mean square of x(n + lag) − x(n) over that of x, over as many samples for every lag up to `ahead`."""
-    n = samples.size - ahead
-    rest = samples[lag : lag + n] - samples[:n]
-    rest = rest[np.isfinite(rest)]
-    power = float(np.nanvar(samples))
-    return float(np.dot(rest, rest)) / (rest.size * power) if rest.size and power > 0 else 0.0
 
 
 def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:

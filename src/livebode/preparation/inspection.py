@@ -10,7 +10,7 @@ import numpy as np
 
 from livebode.core import Block, Lines, LivebodeError, QuantityKind
 from livebode.estimation.settings import nearest_hop
-from livebode.excitation import Excitation, recognise
+from livebode.excitation import Excitation, pattern, recognise
 from livebode.preparation.plan import LIVE_RESPONSES_PER_S, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
 from livebode.sources import Log, open_log
@@ -70,6 +70,7 @@ class Inspection:
             "timing": asdict(log.timing) if log.timing else None,
             "channels": [asdict(channel) for channel in self.channels],
             "skipped": [asdict(skipped) for skipped in log.skipped],
+            "other_clocks": {clock: list(names) for clock, names in log.other_clocks.items()},
         }
         if self.quiet is not None:
             plain["without_excitation"] = self.quiet.plain()
@@ -82,6 +83,7 @@ class Inspection:
                 "rms": found.rms,
                 "peak": found.peak,
                 "live_hop": self.live_hop,
+                "design": pattern(found.lines.bins),
                 "frequency_hz": found.lines.frequency_hz.tolist(),
                 "amplitude": found.amplitude.tolist(),
                 "snr_db": None if found.snr_db is None else found.snr_db.tolist(),

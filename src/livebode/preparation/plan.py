@@ -8,13 +8,14 @@ from typing import Protocol
 import numpy as np
 
 from livebode.configuration.axis import Axis
-from livebode.core import Block, ConfigError, Lines, SignalError, SpectraLayout
+from livebode.core import Block, ConfigError, Event, Lines, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.estimation.settings import nearest_hop
-from livebode.preparation.checks import PERIODS_COMPARED, check_length, check_period
-from livebode.preparation.follower import Follower
+from livebode.estimation.stream_estimator import Follower
+from livebode.preparation.checks import check_length
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
 from livebode.preparation.spectra_plan import check_spectra
+from livebode.preparation.window_check import WINDOWS_COMPARED, window_doubt
 from livebode.sources import Log
 
 LIVE_RESPONSES_PER_S = 20.0
@@ -76,10 +77,15 @@ def _follower(axis: Axis, settings: Settings) -> Follower:
 
 def make_settings(axis: Axis, log: Log) -> Settings:
     """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
-    settings = _settings(axis, log.rate_hz, _lines(axis, log))
-    if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
-        check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
-    return settings
+    return _settings(axis, log.rate_hz, _lines(axis, log))
+
+
+def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
+    """An event if the excitation does not repeat with the window that the configuration specifies."""
+    if settings.method.reference != "excitation" or not settings.excitation or axis.lines.window == "auto":
+        return []
+    samples = beginning(log, settings.excitation, WINDOWS_COMPARED * settings.lines.window)
+    return window_doubt(samples, settings)
 
 
 def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) -> Settings:
@@ -136,27 +142,13 @@ def _lines(axis: Axis, log: Log) -> Lines:
             key="signals.input" if axis.tracking.estimator == "direct" else "signals.excitation",
         )
     # Its statistics take half a second to import; a run with known lines does not need them.
-    from livebode.excitation import recognise
+    from livebode.excitation import lines_of_window, recognise
 
-    found = recognise(beginning(log, reference), log.rate_hz)
-    if window == "auto":
-        window = found.period
-    if frequencies != "auto":
-        return Lines.parse(frequencies, log.rate_hz, window)
-    if window % found.period:
-        raise SignalError(
-            "wrong-period",
-            f"the excitation repeats every {found.period} samples, which does not divide the {window=}",
-            f"set lines.window to a multiple of {found.period}, or to 'auto'",
-            channel=reference,
-            key="lines.window",
-            period=found.period,
-            window=window,
-        )
-    times = window // found.period
-    return Lines(
-        tuple(k * times for k in found.lines.bins), window, log.rate_hz, tuple(k * times for k in found.lines.quiet)
-    )
+    samples = beginning(log, reference)
+    if window != "auto":
+        return lines_of_window(samples, window, log.rate_hz)
+    found = recognise(samples, log.rate_hz)
+    return found.lines if frequencies == "auto" else Lines.parse(frequencies, log.rate_hz, found.period)
 
 
 def beginning(log: Log, channel: str, samples: int = _LOOKED_AT) -> np.ndarray:

@@ -7,7 +7,7 @@ import pyarrow as pa
 
 from livebode.arrow import from_numpy, text
 from livebode.core import Parameters
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 
 SCHEMA = pa.schema(
     [

@@ -13,13 +13,12 @@ from livebode.records.inside import is_folder
 from livebode.records.summary_file import read_summary
 
 _SHOWN = 5
-_FILES = re.compile(
-    r"(run|run-copy)\.json|(events|manifest)\.jsonl|(responses|parameters)\.parquet|report\.(html|pdf)"
-    r"|(bode|tracking|margins|validation)\.png|\.(run|run-copy)\.json\.partial|\.report\.(html|pdf)\.partial"
-)
+_PARTIAL = r"\.partial(-[0-9a-f]{8})?"  # of livebode.core.files
+_REPLACED = r"(run|run-copy)\.json|report\.(html|pdf)|(bode|tracking|margins|validation)\.png"
+_FILES = re.compile(rf"{_REPLACED}|\.({_REPLACED}){_PARTIAL}|(events|manifest)\.jsonl|(responses|parameters)\.parquet")
 _SEGMENT = re.compile(r"\d{6,9}\.parquet|\.\d{6,9}\.parquet\.partial")
 _JOURNAL = re.compile(r"\d{6,9}\.journal|\.\d{6,9}\.journal\.partial")
-_PICTURE = re.compile(r"[a-z]+\.png")
+_PICTURE = re.compile(rf"[a-z]+\.png|\.[a-z]+\.png{_PARTIAL}")
 _FOLDERS = {
     "responses": _SEGMENT, "parameters": _SEGMENT, "samples": _SEGMENT, "open": _JOURNAL, "damaged": _JOURNAL,
     ".pictures.partial": _PICTURE,

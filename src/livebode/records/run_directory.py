@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import logging
-import os
-import shutil
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,6 +12,8 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.core import Event, Parameters, RecordError, Responses
+from livebode.core.files import whole_directory
+from livebode.core.writing import writing
 from livebode.records.parameter_table import PARAMETERS, parameter_rows
 from livebode.records.piece import parts_of
 from livebode.records.removal import check_removable, remove
@@ -24,8 +21,6 @@ from livebode.records.response_table import RESPONSES, as_batch
 from livebode.records.segments.json_lines import to_line
 from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table_file import TableFile
-
-_DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
 
 _logger = logging.getLogger(__name__)
 
@@ -56,44 +51,37 @@ class RunDirectory:
 
     def __enter__(self) -> RunDirectory:
         self._check_free()
-        with _disk_errors(self.path):
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.partial = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.partial-", dir=self.path.parent))
-            try:
-                self.partial.chmod(0o755)
-                self._events = (self.partial / "events.jsonl").open("wb")
-                self._responses = TableFile(self.partial / "responses.parquet", RESPONSES)
-                self._parameters: TableFile | None = None
-            except BaseException:
-                shutil.rmtree(self.partial, ignore_errors=True)
-                raise
+        with writing(self.path, RecordError), contextlib.ExitStack() as undo:
+            self.partial = undo.enter_context(whole_directory(self.path, remove))
+            self._events = (self.partial / "events.jsonl").open("wb")
+            self._responses = TableFile(self.partial / "responses.parquet", RESPONSES)
+            self._parameters: TableFile | None = None
+            self._place = undo.pop_all()
         _logger.info("%s: the record begins", self.path)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        try:
-            if kind is not None:
+        with writing(self.path, RecordError):
+            if error is not None:
                 with contextlib.suppress(OSError, pa.ArrowException):  # the closed files are removed below
                     self._close()
-            else:
-                with _disk_errors(self.path):
-                    self._close()
-                    self._check_free()
-                    self._put_in_place()
-                _logger.info("%s: the record is complete", self.path)
-        finally:
-            shutil.rmtree(self.partial, ignore_errors=True)
-        if isinstance(error, OSError):
-            raise _disk_sentence(self.path, error) from None
+                self._place.__exit__(kind, error, error.__traceback__)
+                if isinstance(error, OSError):
+                    raise error
+                return
+            with self._place:
+                self._close()
+                self._check_free()
+        _logger.info("%s: the record is complete", self.path)
 
     def write(self, responses: Responses) -> None:
         """Append responses."""
-        with _disk_errors(self.path):
+        with writing(self.path, RecordError):
             self._responses.write(as_batch(responses))
 
     def write_parameters(self, *parts: Parameters) -> None:
         """Append fitted parameters and derived quantities; the first ones create ``parameters.parquet``."""
-        with _disk_errors(self.path):
+        with writing(self.path, RecordError):
             if self._parameters is None:
                 self._parameters = TableFile(self.partial / "parameters.parquet", PARAMETERS)
             for parameters in parts:
@@ -101,12 +89,12 @@ class RunDirectory:
 
     def write_event(self, event: Event) -> None:
         """Append an event."""
-        with _disk_errors(self.path):
+        with writing(self.path, RecordError):
             self._events.write(to_line(asdict(event)))
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
         """Close the tables, write run.json with their checksums, and let `draw` add pictures to the directory."""
-        with _disk_errors(self.path):
+        with writing(self.path, RecordError):
             self._close()
             files = {path.name: parts_of(path) for path in sorted(self.partial.glob("*.parquet"))}
             data = to_document(summary | {"files": files})
@@ -144,41 +132,3 @@ class RunDirectory:
             from livebode.records.segments.lock import Lock  # needs a POSIX system, as the run that wrote them did
 
             Lock(self.path).release()
-
-    def _put_in_place(self) -> None:
-        old = None
-        if self.path.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.old-", dir=self.path.parent))
-            self.path.rename(old / "run")
-        try:
-            self.partial.rename(self.path)
-        except OSError:
-            if old is not None:
-                (old / "run").rename(self.path)
-            raise
-        finally:
-            if old is not None:
-                with contextlib.suppress(OSError):
-                    remove(old / "run")
-                with contextlib.suppress(OSError):
-                    old.rmdir()
-
-
-def _disk_sentence(path: Path, error: OSError) -> RecordError:
-    why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
-    return RecordError(
-        "not-written",
-        f"the run could not be written to {str(path)!r}: {why}; nothing was changed there",
-        "free some space, or choose another path",
-        path=str(path),
-        reason=why,
-        errno=error.errno,
-    )
-
-
-@contextmanager
-def _disk_errors(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise _disk_sentence(path, error) from None

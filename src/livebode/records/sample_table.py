@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from livebode.arrow import from_numpy
 from livebode.core import Block, Channel
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 
 _OWN = ("sample", "time_s")
 

@@ -1,15 +1,26 @@
-"""A table as one Parquet file, readable with any tool."""
+"""Layout of a table, and a table as one Parquet file, readable with any tool."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.records.table import ColumnTable
-
 _GROUP_ROWS = 1 << 18
+
+
+@dataclass(frozen=True)
+class ColumnTable:
+    """The columns of a table, with ``sample`` (int64) and ``time_s`` among them.
+
+    `repeating` names those whose values repeat over lines or rows: they compress by a dictionary; measured ones never
+    do.
+    """
+
+    schema: pa.Schema
+    repeating: tuple[str, ...] = ()
 
 
 class TableFile:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from livebode.core import Model, Responses
+from livebode.core.files import whole_file
 from livebode.report.style import Style, drawing, quiet_about_letters, style
 
 if TYPE_CHECKING:
@@ -43,8 +44,7 @@ def save_pictures(
 
 
 def save(figure: Figure, path: Path, look: Style) -> Path:
-    """Write a figure; the same figure gives the same bytes."""
-    path.unlink(missing_ok=True)  # a symbolic link in a run from a stranger could point to another file
-    with drawing(look), quiet_about_letters():
-        figure.savefig(path, format="png", metadata={"Software": None})
+    """Write a figure; the same figure gives the same bytes. OSError, and nothing has changed, if it is not written."""
+    with whole_file(path) as partial, drawing(look), quiet_about_letters():
+        figure.savefig(partial, format="png", metadata={"Software": None})
     return path

@@ -13,7 +13,7 @@ from livebode.core.clock import moment
 from livebode.core.document import Listing, Paragraph, Part, Picture, Section, Table
 from livebode.fitting import Fit
 from livebode.language import listed, marked, number, recognised, tr
-from livebode.margins.words import WORDS
+from livebode.margins.margins import WORDS
 from livebode.reporting.alarms import alarms
 from livebode.reporting.report_data import ReportData, by_schedule
 from livebode.reporting.wording import (

@@ -79,7 +79,7 @@ class StreamPosition:
 
 def stream_position(run: Path) -> StreamPosition:
     """Position at which the source continues, from the newest commit of this run; of a new run if there is none."""
-    from livebode.records.segments.last_commit import last_commit  # needs a POSIX system
+    from livebode.records.segments.journal import last_commit  # needs a POSIX system
 
     commit = last_commit(run)
     return StreamPosition(b"" if commit is None else commit.states.get(SOURCE, b""))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from livebode.configuration.axis import Axis
 from livebode.core import Channel, LivebodeError, SignalError, Stateful, nearest_name
 from livebode.estimation import plant_kinds
-from livebode.preparation.follower import Follower
+from livebode.estimation.stream_estimator import Follower
 from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection, change_detection
 from livebode.runtime.fits import Fits

@@ -11,7 +11,7 @@ from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
 from livebode.preparation.aligned import AlignedLog, slip_event, slips_of
 from livebode.preparation.early_spikes import early_spikes
-from livebode.preparation.plan import make_follower, roles_in_doubt
+from livebode.preparation.plan import make_follower, roles_in_doubt, window_in_doubt
 from livebode.preparation.transients import leading_transient, transient_event
 from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
@@ -37,6 +37,7 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
+    noticed += window_in_doubt(axis, log, settings)
     slips = slips_of(log, settings)
     if slips:
         noticed.append(slip_event(slips, settings))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -13,11 +12,12 @@ from typing import Any, Self
 from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Event, RecordError, Responses, Stateful
 from livebode.core.clock import RunClock
+from livebode.core.files import whole_files
+from livebode.core.writing import why, writing
 from livebode.records import PARAMETERS, RESPONSES, RunRecord, as_batch, parameter_rows, to_json
 from livebode.records.inside import check_folder
 from livebode.records.removal import check_removable, remove
 from livebode.records.sample_table import as_rows, samples_of
-from livebode.records.segments.disk import why
 from livebode.records.segments.journal import FOLDER
 from livebode.records.segments.limits import SegmentLimits
 from livebode.records.segments.lock import Lock
@@ -27,6 +27,7 @@ from livebode.runtime.documents import Document, FitResults
 from livebode.runtime.run_control import StoppedError
 
 FOUND_ON_THE_WAY = "clock", "left_out_samples"
+_PICTURES = "pictures"
 _INTERVAL_S = 0.5
 _PIECE_S = 0.25  # with the interval 0.75 s: most data that a kill can cost
 _SEEN_AGAIN_BYTES = 256 << 20  # previous responses for a picture of a continued run, in addition to new ones
@@ -98,7 +99,6 @@ class SegmentedRecord:
         self._store = Store(path, tables, self._limits(section), publish)
         self._due_from = 0
         self._piece = max(1, round(_PIECE_S * rate_hz))
-        self.partial = path / ".pictures.partial"
 
     def __enter__(self) -> Self:
         if self._force:
@@ -209,22 +209,12 @@ class SegmentedRecord:
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
         """Draw the pictures, close open files and write run.json."""
-        check_folder(self.path, f"{self.partial.name}/bode.png")  # rmtree would block at a pipe of that name
-        try:
-            shutil.rmtree(self.partial, ignore_errors=True)
-            os.mkdir(self.partial)
-            draw(self.partial)
-            for picture in self.partial.iterdir():
-                os.replace(picture, self.path / picture.name)
-        except OSError as error:
-            raise RecordError(
-                "not-written",
-                f"the pictures could not be written to {str(self.path)!r}: {why(error)}",
-                "check the disk and its permissions",
-                path=str(self.path),
-            ) from None
-        finally:
-            shutil.rmtree(self.partial, ignore_errors=True)
+        check_folder(self.path, f".{_PICTURES}.partial/bode.png")  # rmtree would block at a pipe of that name
+        with (
+            writing(self.path, RecordError, unchanged=False),
+            whole_files(self.path, _PICTURES, locked=True) as partial,
+        ):
+            draw(partial)
         last = self._store.last
         assert last is not None
         # Results that were delayed until the end were written after the last commit, and belong to the present states.

@@ -13,9 +13,9 @@ import numpy as np
 from livebode.analysis.loop_report import loop_report
 from livebode.core import PlantKinds, Responses
 from livebode.core.clock import moment
+from livebode.estimation.stream_estimator import Follower
 from livebode.fitting import Fit
 from livebode.kernel import instruction_set
-from livebode.preparation.follower import Follower
 from livebode.runtime.fits import Fits
 from livebode.runtime.run_counts import RunCounts
 from livebode.sources.live import LiveSource

@@ -17,6 +17,7 @@ from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import resolve
 from livebode.sources.recording import Column, Recording, guarded, located
 from livebode.sources.timing import Clock, clock_from_time, find_time, rate_in_file
+from livebode.sources.units import split_unit
 
 _logger = logging.getLogger(__name__)
 
@@ -42,7 +43,7 @@ def open_log(
         Samples per second, treated as exact. Default: from a time column or from the file's metadata.
     time
         Name of the time column, with its unit if the file does not contain it: "clock [us]". Default: found by
-        name; "none" ignores the time column.
+        name; "none" ignores the time column. A column of a group selects its channels.
     channels
         Channels to read; selects the series that belong together if the file has series of several lengths or clocks.
     dbc
@@ -103,7 +104,7 @@ def log_of(
     clock_kind: ClockKind | None,
 ) -> Log:
     """The log of an open recording; parameters as in `open_log`."""
-    columns = together(recording, channels)
+    columns = together(recording, channels, time)
     time_column, unit = find_time(columns, time)
     chosen = channels or [c.name for c in columns if c is not time_column and not c.temporal]
     if not chosen:
@@ -159,8 +160,8 @@ def find_clock(
     return Clock(*stated)
 
 
-def together(recording: Recording, channels: Sequence[str] | None) -> list[Column]:
-    """The columns of one group and length: those of `channels`, or the ones with most of the file's values."""
+def together(recording: Recording, channels: Sequence[str] | None, time: str | None) -> list[Column]:
+    """The columns of one group and length: of `channels`, of the time column, or with most of the file's values."""
     everything = recording.columns
     if channels:
         asked = [resolve(name, everything, everything) for name in channels]
@@ -176,6 +177,10 @@ def together(recording: Recording, channels: Sequence[str] | None) -> list[Colum
                 samples=[column.samples for column in asked],
             )
         group, length = asked[0].group, asked[0].samples
+    elif timed := [
+        column for column in everything if column.group and column.name in (time, split_unit(time or "")[0])
+    ]:
+        group, length = timed[0].group, timed[0].samples
     else:
         values: Counter[tuple[str, int | None]] = Counter()
         for column in everything:

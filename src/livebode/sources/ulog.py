@@ -16,6 +16,7 @@ from livebode.sources.ulogcheck import check
 
 TIME = "timestamp"
 US_PER_S = 1e6
+UNITS = {TIME: "s"}
 
 
 class ULogRecording(Recording):
@@ -54,7 +55,7 @@ def add_topic(topic: Any, columns: list[Column], skipped: list[Skipped]) -> None
             clock = name == TIME
             indexed = () if topic.multi_id else (f"{topic.name}[0].{name}",)
             values = topic.data[name]
-            unit = "s" if clock else "us" if name.startswith(TIME) else ""
+            unit = UNITS.get(name, "us" if name.startswith(TIME) else "")
             columns.append(Column(f"{group}.{name}", unit, len(values), (name, *indexed), False, values, group, clock))
 
 

@@ -22,7 +22,7 @@ _UNKNOWN = 0xFFFFFFFF
 
 
 @dataclass(frozen=True)
-class Layout:
+class WavLayout:
     """Byte order, content of the format chunk, and where the samples are."""
 
     order: str
@@ -66,7 +66,7 @@ class WavRecording(Recording):
                 yield [data[:, column.key] for column in columns]
 
 
-def complete_file(layout: Layout, raw: bytes) -> bytes:
+def complete_file(layout: WavLayout, raw: bytes) -> bytes:
     """A WAV file of these samples only, so that SciPy never holds more than one block."""
     size = layout.order + "I"
     chunks = b"".join(
@@ -76,7 +76,7 @@ def complete_file(layout: Layout, raw: bytes) -> bytes:
     return (b"RIFF" if layout.order == "<" else b"RIFX") + struct.pack(size, 4 + len(chunks)) + b"WAVE" + chunks
 
 
-def find_layout(file: IO[bytes], file_bytes: int) -> Layout:
+def find_layout(file: IO[bytes], file_bytes: int) -> WavLayout:
     """Format and place of the samples; RecordingError if the file does not contain what its header declares."""
     order = ">" if file.read(12).startswith(b"RIFX") else "<"
     format_, long_bytes = b"", _UNKNOWN
@@ -112,7 +112,7 @@ def read_format(file: IO[bytes], order: str, size: int) -> bytes:
     return format_
 
 
-def samples_at(order: str, format_: bytes, at: int, size: int, file_bytes: int) -> Layout:
+def samples_at(order: str, format_: bytes, at: int, size: int, file_bytes: int) -> WavLayout:
     if not format_:
         raise damaged("it has no format chunk before its samples")
     (frame_bytes,) = struct.unpack_from(order + "12xH", format_)
@@ -123,7 +123,7 @@ def samples_at(order: str, format_: bytes, at: int, size: int, file_bytes: int) 
         raise truncated(f"the samples end {missing} bytes early", missing_bytes=missing)
     if size % frame_bytes:
         raise damaged(f"its samples have {size} bytes, not a multiple of {frame_bytes}", size=size)
-    return Layout(order, format_, at, frame_bytes, size // frame_bytes)
+    return WavLayout(order, format_, at, frame_bytes, size // frame_bytes)
 
 
 READER = WavRecording

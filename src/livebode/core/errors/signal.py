@@ -44,6 +44,5 @@ class SignalError(LivebodeError):
         "role-wrong": "The samples of a channel contradict the role that it was given.",
         "too-few-lines": "The responses have too few valid lines.",
         "too-short": "There are too few samples.",
-        "wrong-period": "The excitation repeats after another number of samples than the window.",
         "wrong-quantity": "The responses are of another quantity than the one that is needed.",
     }

@@ -15,6 +15,7 @@ const ALARMS = new Set([
   "baseline-unknown",
   "doubtful",
   "roles-doubtful",
+  "window-doubtful",
   "phase-slip",
   "gap",
   "loss",

@@ -30,7 +30,8 @@ def _arrays(waveform: Waveform) -> dict[str, Any]:
 
 def write_npz(path: Path, waveform: Waveform, name: str) -> None:
     """Arrays `samples` (window,), `frequency_hz`, `amplitude` and `phase` (lines,), `rate_hz`, `name`, `facts`."""
-    np.savez(path, name=name, **_arrays(waveform))
+    with path.open("wb") as file:  # NumPy adds a suffix to a path
+        np.savez(file, name=name, **_arrays(waveform))
 
 
 def write_mat(path: Path, waveform: Waveform, name: str) -> None:

@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from livebode.core import UsageError
+from livebode.core.files import whole_file
 from livebode.experiment_design.files.arrays import write_mat, write_npz
 from livebode.experiment_design.files.c_header import write_c_header
 from livebode.experiment_design.files.delimited import write_csv
@@ -24,7 +25,7 @@ FORMATS: Mapping[str, Callable[[Path, Waveform, str], None]] = {
 
 
 def write(path: str | PathLike[str], waveform: Waveform, name: str = "excitation") -> None:
-    """Write one period in the format of the suffix.
+    """Write one period in the format of the suffix, whole or not at all.
 
     Raises
     ------
@@ -32,6 +33,8 @@ def write(path: str | PathLike[str], waveform: Waveform, name: str = "excitation
         If the suffix is not supported.
     DesignError
         If the format forbids the name.
+    OSError
+        If the file cannot be written; an existing file is unchanged then.
     """
     place = Path(path)
     if place.suffix not in FORMATS:
@@ -43,4 +46,5 @@ def write(path: str | PathLike[str], waveform: Waveform, name: str = "excitation
             value=place.suffix,
             allowed=list(FORMATS),
         )
-    FORMATS[place.suffix](place, waveform, name)
+    with whole_file(place) as partial:
+        FORMATS[place.suffix](partial, waveform, name)

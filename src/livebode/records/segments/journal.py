@@ -15,12 +15,12 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.core import RecordError
+from livebode.core.files import sync_directory
 from livebode.records.inside import check_folder, open_read
 from livebode.records.segments.damage import Damage
-from livebode.records.segments.disk import sync_directory
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE, Frame, frames, to_frame
 from livebode.records.segments.plain_batch import check_schema, plain_batch
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 from livebode.records.versions import check_version, format_of
 
 FOLDER, ASIDE = "open", "damaged"
@@ -290,3 +290,9 @@ def numbers(run: Path) -> list[int]:
     names = {path.name for path in (run / FOLDER).glob("*.journal") if path.stem.isdecimal() and path.stem.isascii()}
     found = sorted(int(name.removesuffix(".journal")) for name in names if len(name) < 20)
     return [number for number in found if Path(name_of(number)).name in names]
+
+
+def last_commit(run: Path) -> Commit | None:
+    """Commit from which an unfinished run in this directory is continued, as in `recover`; None if there is none."""
+    newest = [Journal.read(run, number).commit for number in numbers(run)[-2:]]
+    return max((commit for commit in newest if commit is not None), key=lambda commit: commit.position, default=None)

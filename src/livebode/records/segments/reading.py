@@ -13,8 +13,7 @@ from livebode.core import Event, RecordError
 from livebode.records.inside import is_folder
 from livebode.records.segments import journal
 from livebode.records.segments.damage import KIND, event_of
-from livebode.records.segments.journal import Journal
-from livebode.records.segments.last_commit import last_commit
+from livebode.records.segments.journal import Journal, last_commit
 from livebode.records.segments.manifest import NAME, Manifest, Segment
 from livebode.records.segments.segment_file import open_segment
 

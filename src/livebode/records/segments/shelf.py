@@ -13,11 +13,12 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from livebode.core.files import sync_directory, write_whole
 from livebode.records.inside import check_folder, is_folder
 from livebode.records.segments import journal, manifest
-from livebode.records.segments.disk import AppendFile, put_whole, sync_directory
+from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.manifest import Manifest, Retained, Segment
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 
 FIRST_TO_GO = "samples"
 _logger = logging.getLogger(__name__)
@@ -128,7 +129,7 @@ class Shelf:
         pq.write_table(rows, sink, compression="lz4", use_dictionary=list(self._tables[table].repeating))
         data = memoryview(sink.getvalue())
         name = manifest.name_of(table, number)
-        put_whole(self._run / name, data)
+        write_whole(self._run / name, data, locked=True)
         sample, time_s = rows["sample"], rows["time_s"]
         return Segment(
             name=name,

@@ -6,19 +6,21 @@ import contextlib
 import logging
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
-from livebode.core import Emit, Event, LivebodeError, RecordError, ignore
+from livebode.core import Emit, Event, LivebodeError, RecordError, counted, ignore
+from livebode.core.files import sync_directory, write_whole
+from livebode.core.writing import why, writing
 from livebode.records.inside import check_own
 from livebode.records.segments import journal
 from livebode.records.segments.closing import Closing
 from livebode.records.segments.damage import total
-from livebode.records.segments.disk import AppendFile, put_whole, sync_directory, why
+from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.event_log import EventLog
 from livebode.records.segments.journal import Commit
 from livebode.records.segments.limits import JOURNALS, SegmentLimits
@@ -29,7 +31,7 @@ from livebode.records.segments.shelf import Shelf
 from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import UnsyncedRows
 from livebode.records.summary_file import COPY, RUN, to_document
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 
 _logger = logging.getLogger(__name__)
 
@@ -78,7 +80,7 @@ class Store:
         self._syncing = Syncing()
 
     def __enter__(self) -> Store:
-        with _refusing(self.path, "cannot be recorded in"), contextlib.ExitStack() as files:
+        with self._writing(), contextlib.ExitStack() as files:
             self.path.mkdir(parents=True, exist_ok=True)
             files.callback(Lock(self.path).release)
             self._files = files
@@ -94,7 +96,7 @@ class Store:
     def begin(self, summary: dict[str, Any], sample: int, time_s: float, states: Mapping[str, bytes]) -> None:
         """Start a run in the directory, with this run.json, at this sample; RecordError after a disk error."""
         commit = Commit(sample, time_s, time.time(), 0, dict(states))
-        with _refusing(self.path, "cannot be recorded in"):
+        with self._writing():
             os.mkdir(self.path / journal.FOLDER)
             self._open_files(Manifest(), [], 0)
             self._shelf.begin()
@@ -107,7 +109,7 @@ class Store:
 
     def renew(self, summary: dict[str, Any]) -> None:
         """Write run.json for a run that continues: the results at its end were previous ones."""
-        with _refusing(self.path, "cannot be recorded in"):
+        with self._writing():
             self._write_summary(summary, finished=False)
 
     def write(self, table: str, rows: pa.RecordBatch) -> None:
@@ -169,7 +171,7 @@ class Store:
         RecordError
             After a disk error; the record is then as after a kill.
         """
-        with _refusing(self.path, "could not be finished in"):
+        with self._writing():
             assert self.last is not None
             self._not_paused()
             self._sync()
@@ -182,6 +184,9 @@ class Store:
             if finished:
                 self._shelf.discard(journal.name_of(self._number))
         _logger.info("%s: the record ends, %s", self.path, "finished" if finished else "to be continued")
+
+    def _writing(self) -> contextlib.AbstractContextManager[None]:
+        return writing(self.path, RecordError, unchanged=False)
 
     def _not_paused(self) -> None:
         if self._pause is not None:
@@ -242,12 +247,12 @@ class Store:
             record["damaged"] = {"files": [journal.set_aside_name(one.number) for one in retained], **total(places)}
         data = to_document(summary | {"record": record})
         for name in (RUN, COPY):
-            put_whole(self.path / name, data)
+            write_whole(self.path / name, data, locked=True)
 
     def _open_journal(self, number: int, commit: Commit) -> None:
         name = journal.name_of(number)
         check_own(self.path, name)
-        put_whole(self.path / name, journal.head(self._tables, commit))
+        write_whole(self.path / name, journal.head(self._tables, commit), locked=True)
         self._journal, self._number = AppendFile(self.path, name), number
         self._safe_bytes = self._journal.length
         self._began = self._committed = commit.sample
@@ -319,7 +324,7 @@ class Store:
             self.last.sample,
             self.last.time_s,
             f"no segment could be closed: {why(error)} (attempt {self._attempts}); it is retried {retried}, and the "
-            f"record remains in {len(waiting)} journal{'s' * (len(waiting) > 1)}",
+            f"record remains in {counted(len(waiting), 'journal')}",
             attempts=self._attempts,
             journals=waiting,
             errno=getattr(error, "errno", None),
@@ -327,7 +332,7 @@ class Store:
 
     def _report_closed(self) -> None:
         assert self.last is not None
-        message = f"segments are closed again, after {self._attempts} failed attempt{'s' * (self._attempts > 1)}"
+        message = f"segments are closed again, after {counted(self._attempts, 'failed attempt')}"
         self._log.report("record-closed", self.last.sample, self.last.time_s, message, attempts=self._attempts)
         self._attempts = 0
 
@@ -363,18 +368,3 @@ class Store:
             lost_events=self._log.take_given_up(),
         )
         self._pause = None
-
-
-@contextlib.contextmanager
-def _refusing(path: Path, what: str) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise RecordError(
-            "not-written",
-            f"{str(path)!r} {what}: {why(error)}",
-            "check the disk, or choose another path",
-            path=str(path),
-            reason=why(error),
-            errno=error.errno,
-        ) from None

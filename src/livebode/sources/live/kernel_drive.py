@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.core import NOT_WHOLE, Block, SpectraLayout
 from livebode.estimation.centre import Centre
+from livebode.estimation.spectra import check_instruction_set
 from livebode.kernel import SlidingDFT
 from livebode.sources.live.spectra_batch import SpectraBatch
 
@@ -22,10 +23,16 @@ class KernelDrive:
         Signals, bins, window and hop of the spectra.
     dtype
         Number type of the kernel, `float32` or `float64`.
+
+    Raises
+    ------
+    UsageError
+        If the environment names an instruction set that the kernel does not have.
     """
 
     def __init__(self, layout: SpectraLayout, dtype: str = "float32") -> None:
         self._layout, self._dtype = layout, np.dtype(dtype)
+        check_instruction_set()
         self._dft = SlidingDFT(layout.window, list(layout.bins), channels=len(layout.signals), dtype=dtype)
         self._centres = [Centre(layout.window) for _ in layout.values]
         self._next, self._last_bad = 0, -1

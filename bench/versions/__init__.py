@@ -1,0 +1,1 @@
+"""Speed of two versions of livebode, measured alternately."""

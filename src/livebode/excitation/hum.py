@@ -1,0 +1,69 @@
+"""The period of an excitation without the mains hum beside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core.mains import MAINS_HZ, meets_mains
+from livebode.excitation.blocks import cut, spectra
+from livebode.excitation.significance import BinClasses, find_lines
+
+Floats = NDArray[np.float64]
+
+_MAINS_DRIFT = 2e-3  # of its frequency
+_NEAR_BINS = 0.1  # the period is a multiple of the hum's, otherwise the recording would not repeat after it
+# Hum has at most a tenth of the power, and half of the amplitude of the middle line. Otherwise a design with lines at
+# multiples of 50 or 60 Hz would lose them.
+_POWER_MAX, _LEVEL_MAX = 0.1, 0.5
+_WEAK = 0.1  # of the strongest line
+_ORDER_MIN = 2  # of hum: 50 Hz, or 100 Hz of a rectifier
+_FAR_BELOW = 0.05  # 26 dB: few designs have lines that far apart, and then hardly at the mains alone
+
+
+def without_mains(calm: Floats, period: int, rate_hz: float, step: float) -> int:
+    """The shortest divisor of a period at whose harmonics all lines are, except hum at harmonics of the mains.
+
+    Parameters
+    ----------
+    calm
+        Periodic part of the recording, shape (samples,).
+    period
+        Samples after which the excitation and the hum together repeat.
+    rate_hz
+        Samples per second.
+    step
+        The samples are multiples of it; 0 for none.
+    """
+    found = find_lines(spectra(cut(calm, period)), step=step)
+    bins = np.flatnonzero(found.excited)
+    level, resolution_hz = found.amplitude[bins], rate_hz / period
+    at_mains = [meets_mains(bins, resolution_hz, (f,), _NEAR_BINS + _MAINS_DRIFT * bins) for f in MAINS_HZ]
+    for shorter in (divisor for divisor in range(1, period) if period % divisor == 0):
+        on = bins % (period // shorter) == 0
+        if on.all() and bins.size:
+            return shorter
+        if on.any() and any(at[~on].all() for at in at_mains) and _weaker(level[~on], level[on]):
+            return shorter
+    return period
+
+
+def separate_hum(found: BinClasses, resolution_hz: float) -> BinClasses:
+    """Count weak lines at harmonics of the mains as distortion, if all other lines are much stronger."""
+    bins = np.flatnonzero(found.excited)
+    for mains_hz in MAINS_HZ:
+        at = meets_mains(bins, resolution_hz, (mains_hz,), _NEAR_BINS + _MAINS_DRIFT * bins)
+        level = found.amplitude[bins]
+        weak = at & (level <= _FAR_BELOW * level.max())
+        order = np.rint(bins[weak] * resolution_hz / mains_hz)
+        if np.any(order <= _ORDER_MIN) and level[weak].max() <= _FAR_BELOW * level[~weak].min():
+            hum = np.isin(np.arange(found.excited.size), bins[weak])
+            return replace(found, excited=found.excited & ~hum, distortion=found.distortion | hum)
+    return found
+
+
+def _weaker(hum: Floats, lines: Floats) -> bool:
+    middle = np.median(lines[lines >= _WEAK * lines.max()])
+    return bool(np.sum(hum**2) <= _POWER_MAX * np.sum(lines**2) and hum.max() <= _LEVEL_MAX * middle)

@@ -1,0 +1,1 @@
+"""The check-list of a release (CONTRIBUTING.md, "Making a release")."""
