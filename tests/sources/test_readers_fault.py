@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import random
+import re
 import struct
 import subprocess
 import sys
@@ -28,6 +29,7 @@ from livebode.sources import sinumerik_spectra
 from livebode.sources.safexml import parse
 from tests.support.errors import refused
 from tests.support.recordings import (
+    DBC,
     OWN_RATE,
     WRITERS,
     Mf4Writer,
@@ -373,6 +375,17 @@ def test_damaged_files_are_read_or_refused(module, tmp_path):
         rng = random.Random(f"{module} {round_}")
         path = text(tmp_path, damaged(whole, rng) or b"x", "damaged.bin")
         survives(path, rate_hz=rng.choice([None, 4000.0]), time=rng.choice([None, "none"]))
+
+
+def test_damaged_dbc_files_are_read_or_refused(tmp_path):
+    path = write("blf", tmp_path, with_time(signals(20)))
+    whole = (tmp_path / DBC).read_bytes()
+    for round_ in range(ROUNDS):
+        rng = random.Random(f"dbc {round_}")
+        raw = damaged(whole, rng) or b"x"
+        at = rng.choice([match.start() for match in re.finditer(rb"\d", raw)] or [0])
+        (tmp_path / DBC).write_bytes(raw[:at] + rng.choice([b"", b"", b"99", b"4000000000"]) + raw[at:])
+        survives(path)
 
 
 MEASURE = """

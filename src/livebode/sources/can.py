@@ -68,7 +68,7 @@ class CanRecording(Recording):
                     f"a frame of message {message.name!r} has {len(data)} bytes, the DBC defines {message.length}",
                     part=message.name,
                 )
-            values = message.decode(data, decode_choices=False)
+            values = message.decode(data, decode_choices=False) if any(signals) else {}
             held.append([time_s if signal is None else values[signal] for signal in signals])
             if len(held) == rows:
                 yield list(np.array(held, dtype=np.float64).T)
