@@ -18,7 +18,7 @@ def responses(log: Path, out: Path, channels: dict[str, str], *options: object) 
     return pq.read_table(out / "responses.parquet").to_pydict()
 
 
-@pytest.mark.parametrize(("module", "prefix"), [("ulog", "log."), ("blf", "Log."), ("mcap", "/log.")])
+@pytest.mark.parametrize(("module", "prefix"), [("ulog", "log.")])
 def test_responses_equal_those_of_parquet(tmp_path, module, prefix):
     roles = {"excitation": "w", "input": "u", "output": "y"}
     expected = responses(write_parquet(tmp_path / "a.parquet", signals()), tmp_path / "expected", roles)

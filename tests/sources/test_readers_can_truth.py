@@ -100,28 +100,30 @@ def test_a_message_on_two_buses_is_two_groups(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", sorted(WRITERS))
-def test_without_a_dbc_the_command_says_that_it_is_needed(tmp_path, name):
-    path, dbc = written(tmp_path, name, frames())
+def test_a_dbc_is_needed_and_only_for_frames(tmp_path, name):
+    path, dbc = written(tmp_path, name, frames()[:9])
     with refused(RecordingError, "dbc-missing", path=str(path), argument="dbc"):
         open_log(path)
+    with refused(RecordingError, "not-found", path=str(tmp_path / "none.dbc")):
+        open_log(path, dbc=tmp_path / "none.dbc")
+    with refused(RecordingError, "no-frames", path=str(dbc)):
+        open_log(dbc, dbc=dbc)
+
+
+def test_the_commands_take_the_dbc_as_an_option_and_from_the_configuration(tmp_path):
+    path, dbc = written(tmp_path, "a.blf", frames())
     result = livebode("inspect", path)
     assert (result.code, result.err.count("\n")) == (2, 1)
     assert "set dbc to the file that defines them (option --dbc)" in result.err
-    result = livebode("inspect", path, "--dbc", dbc)
-    assert (result.code, "Drive.Torque" in result.out) == (0, True)
-    assert "on the clock --time 'Position.time': Position.Angle\n" in result.out
     result = livebode("inspect", path, "--dbc", dbc, "--time", "Position.time")
     assert (result.code, "Position.Angle  rad" in result.out) == (0, True)
+    assert "on the clock --time 'Drive.time': Drive.Torque, Drive.Speed, Drive.Enabled\n" in result.out
     (tmp_path / "axis.toml").write_text(
-        f'[source]\nlog = "{name}"\ndbc = "x.dbc"\n[signals]\noutput = "Drive.Torque"\ninput = "Drive.Speed"\n'
+        '[source]\nlog = "a.blf"\ndbc = "x.dbc"\n[signals]\noutput = "Drive.Torque"\ninput = "Drive.Speed"\n'
         '[lines]\nfrequencies = "50,100"\nwindow = 100\n[tracking]\nestimator = "direct"\naccept_roles = true\n'
     )
     result = livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run")
     assert (result.code, result.err) == (0, "")
-    with refused(RecordingError, "no-frames", path=str(dbc)):
-        open_log(dbc, dbc=dbc)
-    with refused(RecordingError, "not-found", path=str(tmp_path / "none.dbc")):
-        open_log(path, dbc=tmp_path / "none.dbc")
 
 
 def test_mf4_gives_the_values_of_asammdf(tmp_path):

@@ -10,6 +10,7 @@ import re
 import struct
 import subprocess
 import sys
+import tracemalloc
 import zipfile
 from functools import partial
 from pathlib import Path
@@ -47,6 +48,8 @@ MAY_END_ANYWHERE = "asc", "delimited", "ulog"
 """A table may end after any row, and a flight recorder when its battery is removed."""
 ROUNDS = int(os.environ.get("LIVEBODE_FUZZ_ROUNDS", "150"))
 """Damaged files of each kind; raise it for a campaign."""
+SLOW = "asc", "blf", "blf_plain", "mcap", "mdf", "mdf_frames", "rosbag", "ulog"
+"""Kinds whose libraries take some milliseconds for a file: a third of the rounds."""
 
 
 def drain(path: Path, **options: object) -> None:
@@ -371,7 +374,7 @@ def seeds(module: str, folder: Path) -> bytes:
 @pytest.mark.parametrize("module", [*MODULES, "struct", "struct73", "blf_plain", "mdf_frames"])
 def test_damaged_files_are_read_or_refused(module, tmp_path):
     whole = seeds(module, tmp_path)
-    for round_ in range(ROUNDS):
+    for round_ in range(ROUNDS // 3 if module in SLOW else ROUNDS):
         rng = random.Random(f"{module} {round_}")
         path = text(tmp_path, damaged(whole, rng) or b"x", "damaged.bin")
         survives(path, rate_hz=rng.choice([None, 4000.0]), time=rng.choice([None, "none"]))
@@ -380,7 +383,7 @@ def test_damaged_files_are_read_or_refused(module, tmp_path):
 def test_damaged_dbc_files_are_read_or_refused(tmp_path):
     path = write("blf", tmp_path, with_time(signals(20)))
     whole = (tmp_path / DBC).read_bytes()
-    for round_ in range(ROUNDS):
+    for round_ in range(ROUNDS // 3):
         rng = random.Random(f"dbc {round_}")
         raw = damaged(whole, rng) or b"x"
         at = rng.choice([match.start() for match in re.finditer(rb"\d", raw)] or [0])
@@ -399,15 +402,15 @@ def peak_kib():  # ru_maxrss would count what the parent held before it started 
         return next(int(line.split()[1]) for line in status if line.startswith("VmHWM"))
 
 before = peak_kib()
-blocks = open_log(sys.argv[1]).blocks(sys.argv[3:])
+blocks = open_log(sys.argv[1]).blocks(["input", "output"])
 blocks = list(blocks) if sys.argv[2] == "kept" else blocks
 print(sum(len(block) for block in blocks), (peak_kib() - before) // 1024)
 """
 
 
-def measured(path: Path, how: str, *channels: str) -> tuple[int, int]:
+def measured(path: Path, how: str) -> tuple[int, int]:
     """Samples read and growth of the peak memory in MiB, with the blocks let go or kept."""
-    command = [sys.executable, "-c", MEASURE, str(path), how, *(channels or ("input", "output"))]
+    command = [sys.executable, "-c", MEASURE, str(path), how]
     read, grown = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
     return int(read), int(grown)
 
@@ -455,18 +458,20 @@ def test_memory_stays_bounded_whatever_the_length(module, tmp_path):
     assert grown_mib < 128
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the peak memory is read from /proc")
 def test_memory_of_a_long_wav_file_is_that_of_a_block(tmp_path):
     path = write("wav", tmp_path, signals(2))
-    frames = 12_000_000
+    frames = 3_000_000
     with path.open("r+b") as file:  # two channels of eight bytes, zeros that the disk does not store
         at = file.read().index(b"data") + 4
         file.seek(at)
         file.write(struct.pack("<I", frames * 16))
         file.truncate(at + 4 + frames * 16)
-    read, grown_mib = measured(path, "let go", "c1", "c2")
+    tracemalloc.start()
+    read = sum(len(block) for block in open_log(path).blocks())
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
     assert read == frames
-    assert grown_mib < 128
+    assert peak < frames * 16 / 4
 
 
 @pytest.mark.parametrize("long", ['<a b="{}"/>', "<a><!-- {} --></a>", "<{}/>", "<a><?b {}?></a>"])
