@@ -17,7 +17,7 @@ OBJECT_HEAD = struct.Struct("<4sHHLL")
 CONTAINER_HEAD = struct.Struct("<H6xL4x")
 CONTAINER = 10
 CONTAINER_BYTES_MAX = 1 << 26
-OBJECT_BYTES_MAX = 1 << 20
+OBJECT_BYTES_MAX = 1 << 24
 
 
 def check(file: IO[bytes], size: int) -> None:
