@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from livebode.core import ExtraError, RecordingError
 from livebode.sources import open_log
+from tests.support.command import livebode
 from tests.support.errors import refused
 
 PLUGINS = {"a.mcap": StoragePlugin.MCAP, "a.db3": StoragePlugin.SQLITE3}
@@ -86,6 +87,8 @@ def test_each_topic_has_its_clock_and_its_fields_by_path(tmp_path, name):
     logged = open_log(path, channels=["/joints.position[0]"], time="/joints.logged")
     assert logged.rate_hz == 100
     assert open_log(path, time="/joints.logged").channels == joints.channels
+    printed = livebode("inspect", path).out.split()
+    assert {channel.name for channel in rates.channels} < set(printed)  # none is shortened
     with refused(RecordingError, "clocks-differ", groups=["/joints", "/imu"]):
         open_log(path, channels=["/joints.position[0]", "/imu.angular_velocity.z"])
 
@@ -173,6 +176,7 @@ BOMB = "".join(f"\n{'=' * 80}\nMSG: my/B{k}\nB{k + 1}[50] x" for k in range(20))
     [
         (mcap("float64 x", chunk(bytes(1 << 20), 1 << 40)), "too-large", {"declared": 1 << 40}),
         (mcap("float64 x", chunk(bytes(1 << 20), 1000)), "damaged", {"declared": 1000}),
+        (mcap("float64 x", chunk(b"", 1 << 20)), "too-large", {"declared": 1 << 20}),
         (mcap("float64 x", chunk(bytes(99), 99, b"own")), "damaged", {}),
         (mcap("float64 x", chunk(chunk(b"", 0), 47)), "damaged", {}),
         (mcap("float64 x", message(bytes(8), channel=2)), "damaged", {"part": 2}),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
 from livebode.cli import terminal
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from livebode.preparation.quiet import Quiet
 
 _LINES_SHOWN = 24
+_WIDTH_MAX = 4096
 
 
 def inspect_command(
@@ -120,6 +122,10 @@ def _show_recording(found: Inspection, console: Console) -> None:
         elif channel.minimum == channel.maximum:
             extent[1] = "constant"
         table.add_row(channel.name, channel.unit, channel.kind, *extent, str(channel.not_finite or ""))
+    # A name that is shortened to the width of the terminal cannot be given to a run.
+    console.width = max(
+        console.width, Measurement.get(console, console.options.update(max_width=_WIDTH_MAX), table).maximum
+    )
     console.print(table)
     for skipped in log.skipped:
         console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")

@@ -18,6 +18,8 @@ RECORD = struct.Struct("<BQ")
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
 READ = SCHEMA, CHANNEL, MESSAGE, CHUNK
 RECORD_BYTES_MAX = 1 << 28
+PACKED_MAX = 1000
+"""Highest plausible compression of a chunk: its messages differ at least by their times."""
 
 
 class McapRecording(RosRecording):
@@ -104,7 +106,7 @@ def expanded(chunk: bytes) -> bytes:
     """The records in a chunk, never more bytes than it declares."""
     _, _, declared, checksum, length = struct.unpack_from("<QQQII", chunk)
     compression, packed = chunk[32 : 32 + length], chunk[32 + length + 8 :]
-    if declared > RECORD_BYTES_MAX:
+    if declared > min(RECORD_BYTES_MAX, PACKED_MAX * len(packed)):
         raise oversized(f"a chunk declares {declared} bytes", RECORD_BYTES_MAX, declared=declared)
     raw = decompressed(packed, compression, declared + 1)
     if len(raw) != declared or (checksum and zlib.crc32(raw) != checksum):
