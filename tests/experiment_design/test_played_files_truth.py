@@ -136,8 +136,8 @@ def test_a_design_from_a_run_adopts_the_description_of_the_run(runs):
     ("measured", "code", "facts"),
     [
         ('run = "run-theta"', "value-mismatch", {"key": "loop.position_pd", "value": "position"}),
-        ('run = "run-theta"\noutput = "velocity"', "value-mismatch", {"key": "measured.output", "kind": "position"}),
-        ('run = "run-speed"\noutput = "position"', "value-mismatch", {"key": "measured.output", "kind": "velocity"}),
+        ('run = "run-theta"\noutput = "velocity"', "value-mismatch", {"key": "measured.output", "value": "velocity"}),
+        ('run = "run-speed"\noutput = "position"', "value-mismatch", {"key": "measured.output", "value": "position"}),
         ('run = "run-speed"\n[loop]\nexcitation_at = "velocity reference"', "value-invalid",
          {"key": "loop.excitation_at", "value": "velocity reference"}),
     ],
