@@ -70,6 +70,7 @@ class Inspection:
             "timing": asdict(log.timing) if log.timing else None,
             "channels": [asdict(channel) for channel in self.channels],
             "skipped": [asdict(skipped) for skipped in log.skipped],
+            "other_clocks": {clock: list(names) for clock, names in log.other_clocks.items()},
         }
         if self.quiet is not None:
             plain["without_excitation"] = self.quiet.plain()
@@ -100,6 +101,7 @@ def inspect(
     *,
     rate_hz: float | None = None,
     time: str | None = None,
+    dbc: Path | None = None,
     excitation: str | None = None,
     output: str | None = None,
     input: str | None = None,
@@ -109,8 +111,8 @@ def inspect(
 
     With lines (a text and the window), hum is searched in `output` and `input` where there is no excitation.
     """
-    log = open_log(path, rate_hz=rate_hz, time=time)
     required = [name for name in (excitation, output, input) if name is not None]
+    log = open_log(path, rate_hz=rate_hz, time=time, dbc=dbc, channels=required[:1] or None)
     known = {channel.name for channel in log.channels}
     # A channel given by a path or an alias is listed by that name.
     extra = [name for name in dict.fromkeys(required) if name not in known]

@@ -24,9 +24,17 @@ from livebode.sources import open_log
 def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
-    assert axis.source.log is not None
     given = axis.source
-    log = open_log(axis.source.log, rate_hz=given.rate_hz, time=given.time, kinds=given.kinds, clock=given.clock)
+    assert given.log is not None
+    log = open_log(
+        given.log,
+        rate_hz=given.rate_hz,
+        time=given.time,
+        kinds=given.kinds,
+        clock=given.clock,
+        dbc=given.dbc,
+        channels=[axis.signals.output],
+    )
     pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
