@@ -60,7 +60,8 @@ def validate_run(
             role="input",
         )
     notes = _freshness(own_words["source"].get("log"), log)
-    opened = open_log(log, rate_hz=axis.source.rate_hz, time=axis.source.time)
+    given = axis.source
+    opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=[signals.output])
     if signals.excitation and "excitation" not in named and not opened.has(signals.excitation):
         notes.append(f"{log.name} has no channel {signals.excitation!r}: judged without the excitation w")
         signals = signals.model_copy(update={"excitation": None})

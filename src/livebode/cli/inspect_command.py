@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
 from livebode.cli import terminal
-from livebode.cli.options import Excitation, From, Json, Output, Rate, SkipPeriods, Time, To
+from livebode.cli.options import Dbc, Excitation, From, Json, Output, Rate, SkipPeriods, Time, To
 from livebode.core import UsageError, counted
 from livebode.estimation.settings import default_hop
 from livebode.excitation.pattern import pattern
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 _LINES_SHOWN = 24
 _STRETCHES_SHOWN = 16
+_WIDTH_MAX = 4096
 
 
 def inspect_command(
@@ -43,6 +45,7 @@ def inspect_command(
     from_: From = None,
     to: To = None,
     skip_periods: SkipPeriods = None,
+    dbc: Dbc = None,
     as_json: Json = False,
 ) -> None:
     """List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and SNR.
@@ -57,6 +60,7 @@ def inspect_command(
         log,
         rate_hz=rate,
         time=time,
+        dbc=dbc,
         excitation=excitation,
         output=output,
         input=input_,
@@ -136,9 +140,15 @@ def _show_recording(found: Inspection, console: Console) -> None:
         elif channel.minimum == channel.maximum:
             extent[1] = "constant"
         table.add_row(channel.name, channel.unit, channel.kind, *extent, str(channel.not_finite or ""))
+    # A name that is shortened to the width of the terminal cannot be given to a run.
+    console.width = max(
+        console.width, Measurement.get(console, console.options.update(max_width=_WIDTH_MAX), table).maximum
+    )
     console.print(table)
     for skipped in log.skipped:
         console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")
+    for clock, names in log.other_clocks.items():
+        console.print(f"  on the clock --time '{clock}': {', '.join(names)}", style="dim", soft_wrap=True)
 
 
 def _show_hum(quiet: Quiet, console: Console) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -38,6 +39,9 @@ To = Annotated[str | None, typer.Option("--to", metavar="MOMENT", help="End of t
 SkipPeriods = Annotated[
     int | None,
     typer.Option(metavar="N", min=0, help="Leave out N periods at the beginning of the excitation."),
+]
+Dbc = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="DBC file that defines the signals of a recording of CAN frames.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result, or the error, as JSON.")]
 Port = Annotated[

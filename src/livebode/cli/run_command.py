@@ -10,7 +10,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.notices import NoticePrinter
-from livebode.cli.options import Excitation, From, Json, Output, Port, Rate, Serve, SkipPeriods, Time, To
+from livebode.cli.options import Dbc, Excitation, From, Json, Output, Port, Rate, Serve, SkipPeriods, Time, To
 from livebode.cli.pictures import drawing, show, tracked_amount
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
@@ -34,6 +34,7 @@ def run_command(
     from_: From = None,
     to: To = None,
     skip_periods: SkipPeriods = None,
+    dbc: Dbc = None,
     lines: Annotated[
         str | None,
         typer.Option(
@@ -101,7 +102,14 @@ def run_command(
     Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png.
     """
     given: dict[str, dict[str, Any]] = {
-        "source": {"rate_hz": rate, "time": time, "from": from_, "to": to, "skip_periods": skip_periods},
+        "source": {
+            "rate_hz": rate,
+            "time": time,
+            "from": from_,
+            "to": to,
+            "skip_periods": skip_periods,
+            "dbc": dbc,
+        },
         "signals": {"output": output, "input": input, "excitation": excitation, "schedule": schedule},
         "lines": {"frequencies": lines, "window": _window(window)},
         "tracking": {

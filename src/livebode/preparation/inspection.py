@@ -80,6 +80,7 @@ class Inspection:
             "timing": asdict(log.timing) if log.timing else None,
             "channels": [asdict(channel) for channel in self.channels],
             "skipped": [asdict(skipped) for skipped in log.skipped],
+            "other_clocks": {clock: list(names) for clock, names in log.other_clocks.items()},
         }
         if self.quiet is not None:
             plain["without_excitation"] = self.quiet.plain()
@@ -111,6 +112,7 @@ def inspect(
     *,
     rate_hz: float | None = None,
     time: str | None = None,
+    dbc: Path | None = None,
     excitation: str | None = None,
     output: str | None = None,
     input: str | None = None,
@@ -128,9 +130,9 @@ def inspect(
     LivebodeError
         If it cannot be read, has no periodic signal, or the part has no samples.
     """
-    log = open_log(path, rate_hz=rate_hz, time=time)
-    log = chosen_part(log, begin, end, skip_periods, lambda part: _periods_in(part, excitation))
     required = [name for name in (excitation, output, input) if name is not None]
+    log = open_log(path, rate_hz=rate_hz, time=time, dbc=dbc, channels=required[:1] or None)
+    log = chosen_part(log, begin, end, skip_periods, lambda part: _periods_in(part, excitation))
     known = {channel.name for channel in log.channels}
     # A channel given by a path or an alias is listed by that name.
     extra = [name for name in dict.fromkeys(required) if name not in known]

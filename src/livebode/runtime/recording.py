@@ -10,6 +10,7 @@ from livebode.core import Event
 from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
 from livebode.estimation.stream_estimator import Follower
+from livebode.fitting.drift import DriftTest
 from livebode.preparation.aligned import AlignedLog, slip_event, slips_of
 from livebode.preparation.early_spikes import early_spikes
 from livebode.preparation.outlying import outlying_event, outlying_periods, outlying_samples
@@ -26,9 +27,17 @@ from livebode.sources import open_log
 def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
-    assert axis.source.log is not None
     given = axis.source
-    log = open_log(axis.source.log, rate_hz=given.rate_hz, time=given.time, kinds=given.kinds, clock=given.clock)
+    assert given.log is not None
+    log = open_log(
+        given.log,
+        rate_hz=given.rate_hz,
+        time=given.time,
+        kinds=given.kinds,
+        clock=given.clock,
+        dbc=given.dbc,
+        channels=[axis.signals.output],
+    )
     log = configured_part(axis, log)
     follower = make_follower(axis, log)
     log = log.naming([name for name in axis.signals.model_dump().values() if name])
@@ -50,6 +59,8 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     if log.is_part:
         found["part"] = {"first": log.first, "stop": log.stop}
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": found}
+    if settings.quantity == "plant" and not settings.average:
+        pipeline = replace(pipeline, drift=DriftTest(settings.lines))
     loop = RunLoop(
         source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed
     )

@@ -31,6 +31,14 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
         )
     for column in everything:
         if column.name == name and not column.temporal:
+            if column.group != columns[0].group:
+                raise RecordingError(
+                    "clocks-differ",
+                    f"channel {name!r} is sampled by the clock of {column.group!r}, the others by {columns[0].group!r}",
+                    "open it separately",
+                    channel=name,
+                    groups=[column.group, columns[0].group],
+                )
             raise RecordingError(
                 "lengths-differ",
                 f"channel {name!r} has {column.samples} samples, the others {columns[0].samples}",
@@ -63,3 +71,9 @@ def found_channel(name: str, columns: Sequence[Column], everything: Sequence[Col
         except RecordingError as error:
             raise error.at(f"expression {name!r}") from None
     return expression
+
+
+def in_file(names: Sequence[str], columns: Sequence[Column]) -> list[str]:
+    """The names of the columns that are read for these channels: those in an expression instead of the expression."""
+    found = {name: found_channel(name, columns, columns) for name in names}
+    return [part for name, one in found.items() for part in (one.names if isinstance(one, Expression) else [name])]

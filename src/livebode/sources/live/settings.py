@@ -26,7 +26,7 @@ TAKEN: dict[str, set[str]] = {
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
 }
 """Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
-LOG = {"log", "time", "rate_hz", "follow"}
+LOG = {"log", "time", "rate_hz", "follow", "dbc"}
 EVERY = {"timeout_s", "kinds"}
 PART = {"from_": "from", "to": "to", "skip_periods": "skip_periods"}
 """Keys that choose a part of a finished recording."""
@@ -60,6 +60,8 @@ class SourceSettings(BaseModel):
         End of that part, in the same form; the sample at this moment is excluded. Default: its last sample.
     skip_periods
         Number of periods that are left out at the beginning of the excitation in that part.
+    dbc
+        DBC file that defines the signals of a recording of CAN frames, relative to this file.
     follow
         The recording grows: a text table, or a directory of recordings.
     url
@@ -121,6 +123,7 @@ class SourceSettings(BaseModel):
     from_: Limit | None = Field(default=None, alias="from")
     to: Limit | None = None
     skip_periods: Annotated[int, Field(ge=0, le=1 << 40)] = 0
+    dbc: File | None = None
     follow: bool = False
     url: str | None = None
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None

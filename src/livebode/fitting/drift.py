@@ -1,0 +1,155 @@
+"""Whether a machine drifts during a record: a trend of the response at a line that noise does not explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy  # its parts are loaded when they are first used
+from numpy.typing import NDArray
+
+from livebode.core import Lines, Responses, Stage, StatefulBase
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+FALSE_ALARM = 0.01
+"""Probability that a record of a machine that does not drift is reported, all lines together."""
+_GROUPS_MAX = 32
+_GROUPS_MIN = 6
+_MOVED = 1e-3  # of the largest value of the schedule
+# A trend is at most so far from its middle for the share 1 - 1/e of the record, as noise from its mean within sigma.
+_WITHIN_SIGMA = 1 - np.exp(-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """Trend of the response over a record; shapes (lines,).
+
+    Attributes
+    ----------
+    found
+        Whether the machine drifts: all lines together, at `FALSE_ALARM`.
+    lines
+        Lines whose own trend is significant.
+    value
+        Mean over the record.
+    change, sigma
+        Change of the response from the beginning to the end of the record and its standard deviation, unit of the
+        response; NaN at lines with fewer than six groups of windows.
+    spread
+        Part of the standard deviation of a mean over the record that the trend adds: the mean then covers the response
+        at a random moment of the record as often as noise; 0 unless `found`.
+    """
+
+    found: bool
+    lines: Flags
+    value: Complex
+    change: Complex
+    sigma: Floats
+    spread: Floats
+
+
+class DriftTest(StatefulBase):
+    """Tests responses, in order, for a trend.
+
+    Windows that do not overlap are averaged in up to 32 groups of equal length. At each line a parabola over time is
+    fitted to the groups, for the change as its straight part, and for the largest distance from the mean. Without
+    drift, the power of the straight part over that of the residuals is F(2, 2d), with d the number of groups less
+    three, so that its probability is (1 + F/d)^-d. A record drifts if one line has less than half of `FALSE_ALARM`
+    after Bonferroni, or all lines together have by Fisher's method.
+
+    Parameters
+    ----------
+    lines
+        Lines of the responses.
+
+    Notes
+    -----
+    Where the schedule varies by more than a thousandth of its largest value, nothing is tested, because the response may
+    depend on it. A drift that returns to its beginning has no trend. Slow noise, longer than a group, can be taken for drift.
+    """
+
+    _stage = Stage("drift-test", 1)
+    _STATE = ("_windows", "_free", "_level", "_schedule", "_times_s", "_pairs")
+
+    def __init__(self, lines: Lines) -> None:
+        self._window, n = lines.window, len(lines)
+        self._windows, self._free, self._level = 0, 0, 0
+        self._schedule = np.full(2, np.nan)  # smallest and largest
+        self._times_s = np.zeros((1, _GROUPS_MAX, n))  # sums over the valid windows
+        self._pairs = np.zeros((3, _GROUPS_MAX, n), dtype=np.complex128)  # number, sums of numerator and denominator
+
+    def add(self, part: Responses) -> None:
+        """Process the next responses."""
+        at = int(np.searchsorted(part.first, self._free))
+        while at < len(part):
+            self._add(part, at)
+            self._free = int(part.sample[at]) + 1
+            at = int(np.searchsorted(part.first, self._free))
+
+    def _add(self, part: Responses, at: int) -> None:
+        if self._windows >> self._level == _GROUPS_MAX:
+            self._merge()
+        group = self._windows >> self._level
+        used = part.valid[at] & np.isfinite(part.value[at])
+        weight = np.where(np.isfinite(part.weight[at]), part.weight[at], 1.0)
+        low, high = self._schedule
+        self._schedule = np.array([np.fmin(low, part.schedule[at]), np.fmax(high, part.schedule[at])])
+        self._times_s[:, group, used] += part.time_s[at]
+        self._pairs[:, group, used] += np.stack([np.ones_like(weight), part.value[at] * weight, weight])[:, used]
+        self._windows += 1
+
+    def _merge(self) -> None:
+        for sums in (self._times_s, self._pairs):
+            half = sums[:, ::2] + sums[:, 1::2]
+            sums[:, : _GROUPS_MAX // 2] = half
+            sums[:, _GROUPS_MAX // 2 :] = 0
+        self._level += 1
+
+    def result(self) -> Drift:
+        """The test on all responses up to now."""
+        n = self._pairs.shape[2]
+        change, sigma = np.full(n, complex(np.nan, np.nan)), np.full(n, np.nan)
+        log_chance, farthest = np.zeros(n), np.zeros(n)
+        moved = np.ptp(self._schedule) > _MOVED * np.abs(self._schedule).max()
+        for i in range(0 if moved else n):
+            if (trend := self._trend(i)) is not None:
+                change[i], sigma[i], farthest[i], log_chance[i] = trend
+        own = log_chance < np.log(FALSE_ALARM / 2 / max(n, 1))
+        together = scipy.special.gammaincc(n, -log_chance.sum()) < FALSE_ALARM / 2
+        found = bool(own.any() or together)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            value = self._pairs[1].sum(axis=0) / self._pairs[2].sum(axis=0)
+        return Drift(found, own, value, change, sigma, _WITHIN_SIGMA * farthest * found)
+
+    def _trend(self, line: int) -> tuple[complex, float, float, float] | None:
+        """Change over the record, its sigma, the largest distance from the mean, and ln of the probability by chance.
+
+        None if there are too few groups.
+        """
+        count = self._pairs[0, :, line].real
+        some = count > 0
+        if np.count_nonzero(some) < _GROUPS_MIN:
+            return None
+        count = count[some]
+        time_s = self._times_s[0, some, line] / count
+        value = self._pairs[1, some, line] / self._pairs[2, some, line]
+        centred = time_s - time_s.mean()
+        q, r = np.linalg.qr(np.vander(centred, 3, increasing=True) * np.sqrt(count)[:, np.newaxis])
+        rotated = q.T @ (value * np.sqrt(count))
+        dof = len(count) - 3
+        residual = float(np.sum(np.abs(value * np.sqrt(count) - q @ rotated) ** 2)) / dof
+        if residual <= 0 or r[1, 1] == 0:
+            return None
+        # The groups are centred on their windows; the record is one group longer.
+        longer = len(count) / (len(count) - 1)
+        size = float(np.ptp(time_s)) * longer / r[1, 1]
+        away = q[:, 1:] @ rotated[1:] / np.sqrt(count)
+        log_chance = -dof * float(np.log1p(abs(rotated[1]) ** 2 / residual / dof))
+        return complex(rotated[1] * size), abs(size) * residual**0.5, float(np.abs(away).max()) * longer, log_chance
+
+    @property
+    def _identity(self) -> str:
+        return f"{self._window}"
