@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,10 @@ import numpy as np
 from livebode.analysis.averaged import Averaged, averaged
 from livebode.configuration.axis import FitSection
 from livebode.configuration.fit_settings import chosen_model, fit_settings
+from livebode.core import read_unit, split_plant_unit
 from livebode.fitting import Fit, fit
 from livebode.records import RunRecord
+from livebode.sources.expressions import negated
 
 
 def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
@@ -26,14 +29,48 @@ def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
 
 def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
     """The same for the average of a run."""
-    one, words = of.response, of.words
-    if not one.unit:
+    words = of.words
+    if not of.response.unit:
         words += "; the run has no units: N m, and rad/s or rad are assumed"
+    return _best(of, section)[1], words
+
+
+def _best(of: Averaged, section: FitSection) -> tuple[FitSection, Fit]:
+    """The fit with the smaller misfit, and its section, where the quantity of the output is not known."""
     sections = [section]
     if section.output == "auto" and of.kinds.output is None:
         sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]
-    found = [fit(one, chosen_model(s, of.kinds), **fit_settings(s)) for s in sections]
-    return min(found, key=lambda f: f.epsilon if f.status == "ok" else np.inf), words
+    found = [(s, fit(of.response, chosen_model(s, of.kinds), **fit_settings(s))) for s in sections]
+    return min(found, key=lambda one: one[1].epsilon if one[1].status == "ok" else np.inf)
+
+
+def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, live: bool = False) -> list[str]:
+    """Which quantity the output was taken for and why; and if the fit fails, whether the output is inverted.
+
+    `output` is the name of its channel, and `live` whether the run is on a live source, which computes no channels.
+    """
+    unit = split_plant_unit(of.response.unit)[0]
+    if section.output != "auto":
+        taken: str = section.output
+        why = "as fit.output specifies"
+    elif of.kinds.output is not None:
+        taken = "velocity" if of.kinds.output == "velocity" else "position"
+        why = f"by its unit {unit}" if read_unit(unit).kind == of.kinds.output else "as source.kinds declares"
+    else:
+        taken = _best(of, section)[0].output
+        why = "because neither a unit nor a kind is known"
+        why = f"which has the smaller misfit, {why}" if found.status == "ok" else why
+    remarks = [f"the output {output!r} is fitted as a {taken}, {why}"]
+    if found.status != "ok":
+        turned = replace(of, response=replace(of.response, value=-of.response.value))
+        other = fit_averaged(turned, section)[0]
+        if other.status == "ok":
+            remedy = f"run the recording again with the output {negated(output)!r}"
+            remarks.append(
+                f"the model fits with the other sign (model error {100 * other.epsilon:.2g} %): output or input is "
+                f"inverted; {'change the sign in the drive' if live else remedy}"
+            )
+    return remarks
 
 
 def plain_fit(found: Fit) -> dict[str, Any]:

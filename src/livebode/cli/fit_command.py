@@ -47,7 +47,8 @@ def fit_command(
 
     Defaults are from the run's \\[fit] section. Exit code 3 if no model fits.
     """
-    from livebode.analysis.fits import fit_run, plain_fit
+    from livebode.analysis.averaged import averaged
+    from livebode.analysis.fits import fit_averaged, fit_remarks, plain_fit
     from livebode.configuration.recorded import recorded_configuration
 
     given: dict[str, Any] = {
@@ -62,14 +63,22 @@ def fit_command(
         "hold": hold,
     }
     data = {"source": {"log": str(directory)}, "signals": {"output": "y"}}
-    own = recorded_configuration(RunRecord.open(directory).summary).get("fit", {})
+    run = RunRecord.open(directory)
+    configuration = recorded_configuration(run.summary)
+    own = configuration.get("fit", {})
     section = Axis.of(data | {"fit": own | {k: v for k, v in given.items() if v is not None}}, "the options").fit
     assert section is not None
-    found, words = fit_run(directory, section)
+    average = averaged(run)
+    found, words = fit_averaged(average, section)
+    source, signals = (configuration.get(name, {}) for name in ("source", "signals"))
+    live = "url" in source or bool(source.get("follow"))
+    remarks = fit_remarks(average, section, found, str(signals.get("output", "y")), live=live)
     if as_json:
-        print(to_json({"fitted_to": words} | plain_fit(found)))
+        print(to_json({"fitted_to": words} | plain_fit(found) | {"remarks": remarks}))
     else:
         show_fit(found, words)
+        for remark in remarks:
+            print(f"  {remark}")
     if found.status != "ok":
         raise typer.Exit(3)
 

@@ -107,6 +107,24 @@ def parse_expression(text: str) -> Expression:
     return Expression(text, tree, quoted, tuple(names), before, unit["unit"].strip() if unit else "")
 
 
+def negated(name: str) -> str:
+    """The expression of a channel, or of an expression, with the other sign.
+
+    >>> negated("enc1"), negated("-enc1"), negated("a + b"), negated("enc 1 (mm)")
+    ('-enc1', 'enc1', '-(a + b)', '-`enc 1 (mm)`')
+    """
+    try:
+        tree = parse_expression(name).tree
+    except ExpressionSyntaxError:
+        return f"-`{name}`"
+    match tree:
+        case ast.Name() | ast.Attribute():
+            return f"-{name}"
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Name() | ast.Attribute()):
+            return name.strip().removeprefix("-").strip()
+    return f"-({name})"
+
+
 def _check(node: ast.expr, quoted: Mapping[str, str], names: dict[str, None], depth: int) -> int:
     """The number of samples that it needs before the first; collects the names."""
     if depth > DEPTH_MAX:
