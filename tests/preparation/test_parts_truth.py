@@ -15,8 +15,8 @@ from livebode.records import RunRecord
 from livebode.runtime import Destination, run
 from livebode.sources import open_log
 from livebode.sources.live import make_source
-from tests.preparation.test_outlying_periods_truth import recorded
 from tests.support.command import RATE_HZ, WINDOW, livebode, signals, write_csv, write_parquet
+from tests.support.disturbed import recorded
 from tests.support.errors import refused
 
 BEGINS = 230  # sample at which the excitation begins, 10 s in the time of the recording
