@@ -67,8 +67,9 @@ class DriftTest(StatefulBase):
 
     Notes
     -----
-    Where the schedule varies by more than a thousandth of its largest value, nothing is tested, because the response may
-    depend on it. A drift that returns to its beginning has no trend. Slow noise, longer than a group, can be taken for drift.
+    Where the schedule varies by more than a thousandth of its largest value, nothing is tested, because the response
+    may depend on it. A drift that returns to its beginning has no trend. Slow noise, longer than a group, can be taken
+    for drift.
     """
 
     _stage = Stage("drift-test", 1)
