@@ -18,6 +18,7 @@ FALSE_ALARM = 0.01
 """Probability that a record of a machine that does not drift is reported, all lines together."""
 _GROUPS_MAX = 32
 _GROUPS_MIN = 6
+_ROUNDING = 1e-9  # of a response
 _MOVED = 1e-3  # of the largest value of the schedule
 # A trend is at most so far from its middle for the share 1 - 1/e of the record, as noise from its mean within sigma.
 _WITHIN_SIGMA = 1 - np.exp(-1)
@@ -67,8 +68,9 @@ class DriftTest(StatefulBase):
 
     Notes
     -----
-    Where the schedule varies by more than a thousandth of its largest value, nothing is tested, because the response may
-    depend on it. A drift that returns to its beginning has no trend. Slow noise, longer than a group, can be taken for drift.
+    Where the schedule varies by more than a thousandth of its largest value, nothing is tested, because the response
+    may depend on it. A drift that returns to its beginning has no trend. Slow noise, longer than a group, can be taken
+    for drift.
     """
 
     _stage = Stage("drift-test", 1)
@@ -141,7 +143,8 @@ class DriftTest(StatefulBase):
         rotated = q.T @ (value * np.sqrt(count))
         dof = len(count) - 3
         residual = float(np.sum(np.abs(value * np.sqrt(count) - q @ rotated) ** 2)) / dof
-        if residual <= 0 or r[1, 1] == 0:
+        residual += _ROUNDING**2 * float(np.mean(count * np.abs(value) ** 2))
+        if residual == 0:
             return None
         # The groups are centred on their windows; the record is one group longer.
         longer = len(count) / (len(count) - 1)
