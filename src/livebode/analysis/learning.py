@@ -10,6 +10,7 @@ from typing import Any
 from livebode.configuration.axis import Axis, FitSection
 from livebode.configuration.fit_settings import fitter_of
 from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.recording import open_recording
 from livebode.core import BaselineError, Block, LivebodeError
 from livebode.monitoring import (
     Baseline,
@@ -22,7 +23,6 @@ from livebode.monitoring import (
     places,
 )
 from livebode.records import RunRecord
-from livebode.sources import open_log
 
 _ROLES = ("output", "input", "excitation", "schedule")
 # The belt's parameters referred to the motor shaft; changes are reported in percent.
@@ -206,16 +206,7 @@ def _samples(run: RunRecord, axis: Axis) -> Callable[[], Iterator[Block]]:
     names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule, *axis.monitoring.covariates]
 
     def blocks() -> Iterator[Block]:
-        source, output = axis.source, axis.signals.output
-        assert source.log is not None
-        log = open_log(
-            source.log,
-            rate_hz=source.rate_hz,
-            time=source.time,
-            kinds=source.kinds,
-            dbc=source.dbc,
-            channels=[output],
-        )
+        log = open_recording(axis)
         part = run.found.get("part")
         return (log if part is None else log.part(part["first"], part["stop"])).blocks(names)
 

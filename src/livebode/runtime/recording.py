@@ -6,6 +6,7 @@ import time
 from dataclasses import replace
 
 from livebode.configuration.axis import Axis
+from livebode.configuration.recording import open_recording
 from livebode.core import Event
 from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
@@ -21,24 +22,12 @@ from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
-from livebode.sources import open_log
 
 
 def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
-    given = axis.source
-    assert given.log is not None
-    log = open_log(
-        given.log,
-        rate_hz=given.rate_hz,
-        time=given.time,
-        kinds=given.kinds,
-        clock=given.clock,
-        dbc=given.dbc,
-        channels=[axis.signals.output],
-    )
-    log = configured_part(axis, log)
+    log = configured_part(axis, open_recording(axis))
     follower = make_follower(axis, log)
     log = log.naming([name for name in axis.signals.model_dump().values() if name])
     pipeline = Pipeline.of(axis, follower, log.channels)
