@@ -98,19 +98,20 @@ def _check(
 
 
 def _show_recording(found: Inspection, console: Console) -> None:
-    log = found.log
+    log, contents = found.log, found.contents
     console.print(
-        f"{log.path}: {log.format}, {found.samples} samples at {log.rate_hz:.9g} Hz ({log.rate_origin})", soft_wrap=True
+        f"{log.path}: {log.format}, {contents.samples} samples at {log.rate_hz:.9g} Hz ({log.rate_origin})",
+        soft_wrap=True,
     )
-    gaps = f"{counted(found.gaps, 'gap')} ({found.missing} samples missing)" if found.gaps else "no gaps"
+    gaps = f"{counted(contents.gaps, 'gap')} ({contents.missing} samples missing)" if contents.gaps else "no gaps"
     jitter = ""
     if log.timing is not None:
         jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"
-    console.print(f"{found.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
+    console.print(f"{contents.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
     table = Table(box=None, header_style="bold")
     for heading in ("channel", "unit", "kind", "from", "to", "not finite"):
         table.add_column(heading, justify="left" if heading in ("channel", "unit", "kind") else "right")
-    for channel in found.channels:
+    for channel in contents.channels:
         extent = [f"{x:.6g}" for x in (channel.minimum, channel.maximum)]
         if channel.minimum > channel.maximum:
             extent = ["empty", ""]
@@ -118,7 +119,7 @@ def _show_recording(found: Inspection, console: Console) -> None:
             extent[1] = "constant"
         table.add_row(channel.name, channel.unit, channel.kind, *extent, str(channel.not_finite or ""))
     console.print(table)
-    for skipped in log.skipped:
+    for skipped in found.skipped:
         console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")
 
 

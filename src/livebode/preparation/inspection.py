@@ -6,34 +6,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from livebode.core import Block, Lines, LivebodeError, QuantityKind
+from livebode.core import Lines, LivebodeError
 from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, pattern, recognise
+from livebode.preparation.contents import Contents, read_contents
 from livebode.preparation.plan import LIVE_RESPONSES_PER_S, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
 from livebode.sources import Log, open_log
-
-
-@dataclass
-class ChannelSummary:
-    """One channel over the whole recording: range of its finite samples, and number of others."""
-
-    name: str
-    unit: str
-    kind: QuantityKind
-    minimum: float = float("inf")
-    maximum: float = float("-inf")
-    not_finite: int = 0
-
-    def take(self, block: Block) -> None:
-        samples = block[self.name]
-        finite = samples[np.isfinite(samples)]
-        self.not_finite += samples.size - finite.size
-        if finite.size:
-            self.minimum = min(self.minimum, float(finite.min()))
-            self.maximum = max(self.maximum, float(finite.max()))
+from livebode.sources.recording import Skipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +21,15 @@ class Inspection:
     """Result of `livebode inspect`; `unrecognised`: why an excitation next to a silent stretch is not recognised."""
 
     log: Log
-    samples: int
-    channels: list[ChannelSummary]
-    gaps: int
-    missing: int
+    contents: Contents
     excitation: Excitation | None
     quiet: Quiet | None = None
     unrecognised: str = ""
+
+    @property
+    def skipped(self) -> tuple[Skipped, ...]:
+        """What is not a channel, and why."""
+        return (*self.log.skipped, *self.contents.unreadable)
 
     @property
     def live_hop(self) -> int:
@@ -57,19 +39,19 @@ class Inspection:
 
     def plain(self) -> dict[str, Any]:
         """As plain data, for JSON."""
-        log, found = self.log, self.excitation
+        log, found, contents = self.log, self.excitation, self.contents
         plain: dict[str, Any] = {
             "log": str(log.path),
             "format": log.format,
             "rate_hz": log.rate_hz,
             "rate_from": log.rate_origin,
-            "samples": self.samples,
-            "duration_s": self.samples / log.rate_hz,
-            "gaps": self.gaps,
-            "missing_samples": self.missing,
+            "samples": contents.samples,
+            "duration_s": contents.samples / log.rate_hz,
+            "gaps": contents.gaps,
+            "missing_samples": contents.missing,
             "timing": asdict(log.timing) if log.timing else None,
-            "channels": [asdict(channel) for channel in self.channels],
-            "skipped": [asdict(skipped) for skipped in log.skipped],
+            "channels": [asdict(channel) for channel in contents.channels],
+            "skipped": [asdict(skipped) for skipped in self.skipped],
         }
         if self.quiet is not None:
             plain["without_excitation"] = self.quiet.plain()
@@ -115,15 +97,7 @@ def inspect(
     # A channel given by a path or an alias is listed by that name.
     extra = [name for name in dict.fromkeys(required) if name not in known]
     names = [channel.name for channel in log.channels] + extra
-    summaries: dict[str, ChannelSummary] = {}
-    samples, gaps, missing, stop = 0, 0, 0, None
-    for block in log.blocks(names):
-        for channel in block.channels:
-            summaries.setdefault(channel.name, ChannelSummary(channel.name, channel.unit, channel.kind)).take(block)
-        samples += len(block)
-        if stop is not None and (block.gap or block.start != stop):
-            gaps, missing = gaps + 1, missing + block.start - stop
-        stop = block.stop
+    contents = read_contents(log, names, required)
     found, quiet = None, None
     if lines is not None:
         signals = [name for name in (output, input) if name is not None]
@@ -137,4 +111,4 @@ def inspect(
             if quiet is None:
                 raise
             unrecognised = str(error)
-    return Inspection(log, samples, list(summaries.values()), gaps, missing, found, quiet, unrecognised)
+    return Inspection(log, contents, found, quiet, unrecognised)

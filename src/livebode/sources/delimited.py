@@ -104,7 +104,7 @@ class DelimitedRecording(Recording):
     def _opened(self) -> Iterator[Any]:
         """The file from its first row of numbers, as bytes that Arrow can parse."""
         dialect = self._dialect
-        if dialect.spaced or dialect.commented or dialect.encoding.startswith("utf-16"):
+        if dialect.spaced or dialect.untidy or dialect.encoding.startswith("utf-16"):
             with self.path.open("rb") as raw:
                 raw.seek(dialect.offset)
                 yield io.BufferedReader(Tidied(raw, dialect.encoding, dialect.spaced), 1 << 20)

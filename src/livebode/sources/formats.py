@@ -41,7 +41,8 @@ def is_text(head: bytes) -> bool:
     """
     if head.startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return True
-    return bool(head) and not any(byte < 9 or 13 < byte < 27 for byte in head)
+    body = head.rstrip(b"\x1a\r\n")  # a text may end with Ctrl-Z
+    return bool(head) and not any(byte < 9 or 13 < byte < 27 for byte in body)
 
 
 def is_xml(head: bytes) -> bool:

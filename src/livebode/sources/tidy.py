@@ -1,4 +1,7 @@
-"""A byte stream simplified for Arrow: UTF-8 without comments; where blanks separate columns, a tab for each run."""
+"""A byte stream simplified for Arrow: UTF-8 without comments, blank lines and a final Ctrl-Z.
+
+Where blanks separate columns, each run of them becomes a tab.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,9 @@ from typing import BinaryIO
 
 PIECE = 1 << 20
 COMMENT = re.compile(r"(?m)^[ \t]*[#%].*\n?")
+BLANK_LINE = re.compile(r"(?m)^[ \x1a]+\r?(?:\n|\Z)")
+END_MARK = "\x1a"
+"""Ctrl-Z, which DOS programs and LabVIEW write at the end of a text."""
 MARGINS = re.compile(r"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 BLANKS = re.compile(r"[ \t]+")
 
@@ -46,7 +52,9 @@ class Tidied(io.RawIOBase):
         if end == 0 and len(text) > 4 * PIECE:  # no valid line is this long; Arrow reports it
             end = len(text)
         text, self._kept = text[:end], text[end:]
-        text = COMMENT.sub("", text)
+        text = BLANK_LINE.sub("", COMMENT.sub("", text))
+        if self._done:
+            text = text.rstrip(END_MARK)
         if self._spaced:
             text = BLANKS.sub("\t", MARGINS.sub("", text))
         self._ready = text.encode("utf-8")

@@ -14,7 +14,7 @@ from livebode.core.clock import ClockKind, clock_kind_of
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.steps import Gap, Steps
-from livebode.sources.units import SECONDS, split_unit, time_unit
+from livebode.sources.units import SECONDS, UNIT_IN_FRONT, split_unit, time_unit
 
 RATE_TOLERANCE = 1e-3
 """Relative difference above which a time column contradicts a given rate."""
@@ -113,6 +113,8 @@ def time_rank(column: Column) -> int | None:
     last = re.split(r"[./]", column.name)[-1].casefold()
     head, _, tail = last.rpartition("_")
     name = head if tail in SECONDS and head else last
+    if UNIT_IN_FRONT.fullmatch(last):
+        return len(TIME_NAMES) - 1
     return TIME_NAMES.index(name) if name in TIME_NAMES else None
 
 
