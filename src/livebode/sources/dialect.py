@@ -6,6 +6,7 @@ import codecs
 import csv
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -45,6 +46,8 @@ class Dialect:
         Time zone of dates that contain one.
     untidy
         True if there are comments between the rows, or a blank or Ctrl-Z at the end.
+    ragged
+        True if a line may lack its last cells.
     """
 
     delimiter: str
@@ -58,10 +61,18 @@ class Dialect:
     kinds: tuple[CellKind, ...] = ()
     zone: str | None = None
     untidy: bool = False
+    ragged: bool = False
 
     @property
     def width(self) -> int:
         return len(self.headings)
+
+    def with_headings(self, headings: Sequence[str]) -> Dialect:
+        """The dialect of a table of numbers with these headings."""
+        width = len(headings)
+        if width > COLUMNS_MAX:
+            raise oversized(f"the table has {width} columns, more than {COLUMNS_MAX}", COLUMNS_MAX, columns=width)
+        return replace(self, headings=tuple(headings), units=("",) * width, kinds=(CellKind.NUMBER,) * width)
 
     def split(self, line: str) -> list[str]:
         """Cells of a line."""
@@ -83,12 +94,53 @@ class Line:
 
 @dataclass(frozen=True)
 class Layout:
-    """Result for one delimiter: its score, the dialect, the first line of values, and whether a header is above it."""
+    """Result for one delimiter: its score (the second part: it has a header), the dialect, the first line of values."""
 
     score: tuple[float, bool, int]
     dialect: Dialect
     start: Line
-    headed: bool
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The first lines of a text file, and its last bytes."""
+
+    path: Path
+    text: str
+    encoding: str
+    mark: int
+    lines: list[Line]
+    end: bytes
+
+    @classmethod
+    def of(cls, path: Path) -> Sample:
+        with path.open("rb") as file:
+            sample = file.read(SAMPLE_BYTES)
+            end = file.seek(max(0, path.stat().st_size - END_BYTES)) and file.read(END_BYTES)
+        encoding, mark = find_encoding(sample)
+        if not encoding.startswith("utf-16") and b"\0" in sample:
+            raise RecordingError(
+                "format-unknown", f"{path} contains binary data, not text", "check the name's ending", path=str(path)
+            )
+        text = sample[mark:].decode(encoding, "replace")
+        lines = find_lines(path, text, whole=len(sample) < SAMPLE_BYTES)
+        return cls(path, text, encoding, mark, lines, end or sample)
+
+    def placed(self, dialect: Dialect, start: Line) -> Dialect:
+        """The dialect with its encoding, and the place of its first row of values."""
+        offset = self.mark + len(self.text[: start.at].encode(self.encoding, "replace"))
+        untidy = COMMENT.search(self.text, start.at) is not None or ends_blank(self.end)
+        return replace(dialect, encoding=self.encoding, offset=offset, first_line=start.number, untidy=untidy)
+
+    def without_table(self) -> RecordingError:
+        first = self.lines[0].text[:40] if self.lines else ""
+        return RecordingError(
+            "table-missing",
+            f"{self.path} has no row of numbers in its first {SAMPLE_BYTES >> 10} KiB (it begins with {first!r})",
+            "check that this is a recording",
+            path=str(self.path),
+            beginning=first,
+        )
 
 
 def find_dialect(path: Path) -> Dialect:
@@ -99,36 +151,20 @@ def find_dialect(path: Path) -> Dialect:
     RecordingError
         Where there is no table of numbers in the first 256 KiB.
     """
-    with path.open("rb") as file:
-        sample = file.read(SAMPLE_BYTES)
-        end = file.seek(max(0, path.stat().st_size - END_BYTES)) and file.read(END_BYTES)
-    encoding, mark = find_encoding(sample)
-    if not encoding.startswith("utf-16") and b"\0" in sample:
-        raise RecordingError(
-            "format-unknown", f"{path} contains binary data, not text", "check the name's ending", path=str(path)
-        )
-    text = sample[mark:].decode(encoding, "replace")
-    lines = find_lines(path, text, whole=len(sample) < SAMPLE_BYTES)
+    sample = Sample.of(path)
+    lines = sample.lines
     layouts = [layout for delimiter in DELIMITERS for decimal in ".," if (layout := lay_out(lines, delimiter, decimal))]
     if not layouts:
-        first = lines[0].text[:40] if lines else ""
-        raise RecordingError(
-            "table-missing",
-            f"{path} has no row of numbers in its first {len(sample)} bytes (it begins with {first!r})",
-            "check that this is a recording",
-            path=str(path),
-            beginning=first,
-        )
+        raise sample.without_table()
     best = max(layouts, key=lambda layout: layout.score)
     if best.dialect.width > COLUMNS_MAX:
         width = best.dialect.width
         raise oversized(
             f"{path} has {width} columns, more than {COLUMNS_MAX}", COLUMNS_MAX, path=str(path), columns=width
         )
-    dialect = best.dialect if best.headed else with_comment_header(best.dialect, text[: best.start.at])
-    offset = mark + len(text[: best.start.at].encode(encoding, "replace"))
-    untidy = COMMENT.search(text, best.start.at) is not None or ends_blank(end or sample)
-    return replace(dialect, encoding=encoding, offset=offset, first_line=best.start.number, untidy=untidy)
+    above = sample.text[: best.start.at]
+    dialect = best.dialect if best.score[1] else with_comment_header(best.dialect, above)
+    return sample.placed(dialect, best.start)
 
 
 def ends_blank(end: bytes) -> bool:
@@ -212,7 +248,7 @@ def lay_out(lines: list[Line], delimiter: str, decimal: str) -> Layout | None:
     if len(kinds) > 1 and not any(columns[-1]) and not (header and header[-1]):  # each line ends with a delimiter
         kinds, headings = (*kinds[:-1], CellKind.TEXT), (*headings[:-1], "")
     dialect = replace(dialect, headings=headings, units=tuple(units or [""] * width), kinds=kinds, zone=zone)
-    return Layout((share, bool(header), width), dialect, rows[0][0], bool(header)) if rows else None
+    return Layout((share, bool(header), width), dialect, rows[0][0]) if rows else None
 
 
 def with_blank_rows(table: list[tuple[Line, list[str]]], decimal: str) -> list[tuple[Line, list[str]]]:

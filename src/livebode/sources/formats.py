@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -49,6 +50,7 @@ def is_xml(head: bytes) -> bool:
     return head.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<")
 
 
+TWINCAT = re.compile(rb"(?:\xef\xbb\xbf)?Name[\t;,|][^\r\n]*\r?\nFile[\t;,|]")
 ARROW_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
 
 FORMATS = (
@@ -61,6 +63,8 @@ FORMATS = (
     Format("TDMS", (".tdms",), lambda head: head.startswith(b"TDSm"), "tdms"),
     Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith((b"MDF     ", b"UnFinMF ")), "mdf"),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
+    Format("TwinCAT Scope export", (".csv", ".txt"), lambda head: TWINCAT.match(head) is not None, "twincat"),
+    Format("LabVIEW LVM", (".lvm",), lambda head: head.startswith(b"LabVIEW Measurement"), "lvm"),
     Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, "delimited"),
 )  # fmt: skip
 """All formats; the first that matches reads the file."""

@@ -10,6 +10,8 @@ import io
 import re
 from typing import BinaryIO
 
+from livebode.sources.dialect import Dialect
+
 PIECE = 1 << 20
 COMMENT = re.compile(r"(?m)^[ \t]*[#%].*\n?")
 BLANK_LINE = re.compile(r"(?m)^[ \x1a]+\r?(?:\n|\Z)")
@@ -20,15 +22,16 @@ BLANKS = re.compile(r"[ \t]+")
 
 
 class Tidied(io.RawIOBase):
-    r"""The text of `raw` from its current position, simplified line by line; `spaced`: blanks separate the columns.
+    r"""The text of `raw` from its current position, simplified line by line as its dialect needs it.
 
-    >>> io.BufferedReader(Tidied(io.BytesIO(b"  1   2 \n# note\n 3 4"), "utf-8", True)).read()
+    >>> blanks = Dialect("\t", True, ".")
+    >>> io.BufferedReader(Tidied(io.BytesIO(b"  1   2 \n# note\n 3 4"), blanks)).read()
     b'1\t2\n3\t4'
     """
 
-    def __init__(self, raw: BinaryIO, encoding: str, spaced: bool) -> None:
-        self._raw, self._spaced = raw, spaced
-        self._decoder = codecs.getincrementaldecoder(encoding)("replace")
+    def __init__(self, raw: BinaryIO, dialect: Dialect) -> None:
+        self._raw, self._dialect = raw, dialect
+        self._decoder = codecs.getincrementaldecoder(dialect.encoding)("replace")
         self._kept = ""
         self._ready = b""
         self._done = False
@@ -55,6 +58,13 @@ class Tidied(io.RawIOBase):
         text = BLANK_LINE.sub("", COMMENT.sub("", text))
         if self._done:
             text = text.rstrip(END_MARK)
-        if self._spaced:
+        if self._dialect.ragged:
+            lines = (line.rstrip("\r") for line in text.split("\n"))
+            text = "".join(self._filled(line) for line in lines if line.strip() not in ("", "EOF"))
+        if self._dialect.spaced:
             text = BLANKS.sub("\t", MARGINS.sub("", text))
         self._ready = text.encode("utf-8")
+
+    def _filled(self, line: str) -> str:
+        missing = self._dialect.width - 1 - line.count(self._dialect.delimiter)
+        return f"{line}{self._dialect.delimiter * missing}\n"

@@ -25,7 +25,7 @@ GAPS_SHARE_MAX = 0.05
 GAPS_LISTED = 1000
 RATE_NAMES = "fs", "f_s", "fs_hz", "rate", "rate_hz", "sample_rate", "samplerate", "sampling_rate", "sample_rate_hz"
 PERIOD_NAMES = "ts", "t_s", "dt", "dt_s", "sample_time", "sampletime", "sampling_time", "sample_period", "period_s"
-TIME_NAMES = "t", "time", "zeit", "timestamp", "time_stamp", "zeitstempel", "seconds", "sekunden"
+TIME_NAMES = "t", "time", "zeit", "timestamp", "time_stamp", "zeitstempel", "seconds", "sekunden", "x_value"
 DSPACE_TIME = re.compile(r"(?:^|[./])X(?:\(\d+\))?[./]Data$")
 
 
