@@ -106,6 +106,15 @@ def test_a_window_that_is_wrong_by_a_sample_is_reported_with_what_changes_and_th
     assert "every 1024 samples rather than every 1023" in doubt.message
 
 
+def test_a_window_of_one_period_and_a_half_is_reported(tmp_path: Path) -> None:
+    period = multisine(Lines((1, 2, 3, 5), 200, RATE_HZ))
+    log = recorded(tmp_path / "log.parquet", np.tile(period, 30))
+    done = livebode("run", log, *ROLES, "--window", "300", "--out", tmp_path / "run")
+    assert done.code == 0, done.err
+    (doubt,) = (event for event in RunRecord.open(tmp_path / "run").events() if event.kind == "window-doubtful")
+    assert (doubt.details["period"], doubt.details["window"]) == (200, 300)
+
+
 def test_inspect_names_the_design(tmp_path: Path) -> None:
     lines = Lines(tuple(range(1, 250, 4)), 1000, RATE_HZ)
     log = recorded(tmp_path / "log.parquet", np.tile(multisine(lines), 4))

@@ -91,7 +91,7 @@ def runs(tmp_path_factory):
     drive = axis.drive
     loop = (
         f"[loop.velocity]\ngain = {drive.velocity_gain_n_m_s}\nintegral_time_s = {drive.integral_time_s}\n"
-        f"rate_hz = {drive.velocity_rate_hz}\nheld_ticks = {drive.velocity_ticks}\n"
+        f"rate_hz = {drive.velocity_rate_hz}\nrate_divider = {drive.velocity_ticks}\n"
         f"[loop.position]\ngain = {drive.position_gain_per_s}\nrate_hz = {drive.position_rate_hz}\n"
         f"rate_divider = {drive.position_ticks}\n"
     )
@@ -136,8 +136,8 @@ def test_a_design_from_a_run_adopts_the_description_of_the_run(runs):
     ("measured", "code", "facts"),
     [
         ('run = "run-theta"', "value-mismatch", {"key": "loop.position_pd", "value": "position"}),
-        ('run = "run-theta"\noutput = "velocity"', "value-mismatch", {"key": "measured.output", "unit": "rad/(N m)"}),
-        ('run = "run-speed"\noutput = "position"', "value-mismatch", {"key": "measured.output", "unit": "rad/s/(N m)"}),
+        ('run = "run-theta"\noutput = "velocity"', "value-mismatch", {"key": "measured.output", "value": "velocity"}),
+        ('run = "run-speed"\noutput = "position"', "value-mismatch", {"key": "measured.output", "value": "position"}),
         ('run = "run-speed"\n[loop]\nexcitation_at = "velocity reference"', "value-invalid",
          {"key": "loop.excitation_at", "value": "velocity reference"}),
     ],

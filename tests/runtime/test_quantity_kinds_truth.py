@@ -81,6 +81,14 @@ def test_a_torque_that_is_not_in_newton_metres_has_an_unknown_gain(tmp_path: Pat
     assert {row[0] for row in parameters(found)} == {"two-mass-gain"}
 
 
+def test_an_output_in_rpm_has_an_unknown_gain_and_no_inertia_in_kilograms(tmp_path: Path) -> None:
+    found = tracked(tmp_path, " [rpm]", " [N m]")
+    assert found.kinds.output_factor == pytest.approx(2 * np.pi / 60)
+    assert {row[0] for row in parameters(found)} == {"two-mass-gain"}
+    with refused(ConfigError, "unit-not-si", key="fit.model", value="two-mass"):
+        tracked(tmp_path / "named", " [rpm]", " [N m]", model="two-mass")
+
+
 def test_declared_kinds_win_over_units_that_say_something_else_or_nothing(tmp_path: Path, plain: RunRecord) -> None:
     declared = {"kinds": {"y": "velocity", "u": "torque"}}
     for name, y, u in (("counts", " [counts]", " [%]"), ("wrong", " [m]", " [A]"), ("none", "", "")):

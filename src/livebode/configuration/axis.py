@@ -399,7 +399,8 @@ class FitSection(_Section):
     Parameters
     ----------
     model
-        The model. "auto": two-mass if the input is a torque in N m or radius_m is given, otherwise two-mass-gain.
+        The model. "auto": two-mass if the input is a torque or radius_m is given, otherwise two-mass-gain; that also
+        where a unit is recognised and not SI (rpm, mN m).
     output
         What the output is. "auto": by its kind, velocity if it has neither a unit nor a kind.
     side

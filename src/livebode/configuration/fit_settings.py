@@ -23,17 +23,29 @@ def check_fit(section: FitSection) -> None:
 def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
     """The section's model; "auto" is two masses if the input is a torque, else two masses with an unknown gain.
 
-    A torque that is not in N m also has an unknown gain: the parameters of two masses are in SI units.
+    With a torque that is not in N m, or an output in rpm or degrees, the gain is unknown too: the parameters of all
+    other models are in SI units.
 
     Raises
     ------
     ConfigError
-        If the section does not specify the output, and its kind is neither a velocity nor a position.
+        If the section does not specify the output, and its kind is neither a velocity nor a position; or if it
+        specifies a model in SI units and a unit is not one.
     """
     name = section.model
     if name == "auto":
-        torque = kinds.input == "torque" and kinds.input_factor == 1.0
-        name = "two-mass" if torque or section.radius_m else "two-mass-gain"
+        name = "two-mass" if kinds.si and (kinds.input == "torque" or section.radius_m) else "two-mass-gain"
+    elif name != "two-mass-gain" and not kinds.si:
+        raise ConfigError(
+            "unit-not-si",
+            f"the parameters of fit.model = {name!r} are in SI units, but one unit of the output is "
+            f"{kinds.output_factor:g} and one of the input {kinds.input_factor:g} SI units",
+            "set fit.model to 'two-mass-gain', or record rad/s or m/s, and N m",
+            key="fit.model",
+            value=name,
+            output_factor=kinds.output_factor,
+            input_factor=kinds.input_factor,
+        )
     output = section.output
     if output == "auto":
         output = _output_of(kinds)

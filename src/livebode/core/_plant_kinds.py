@@ -16,23 +16,29 @@ class PlantKinds:
     ----------
     output, input
         None where the source reports no unit, and the configuration declares no kind.
-    input_factor
-        SI units in one unit of the input; 1 where its unit is not recognised.
+    input_factor, output_factor
+        SI units (rad for angles) in one unit of the input and of the output; 1 where the unit is not recognised.
 
     Examples
     --------
     >>> PlantKinds.of(Channel("speed", "rpm"), Channel("torque", "N m"))
-    PlantKinds(output='velocity', input='torque', input_factor=1.0)
+    PlantKinds(output='velocity', input='torque', input_factor=1.0, output_factor=0.10471975511965977)
     """
 
     output: QuantityKind | None = None
     input: QuantityKind | None = None
     input_factor: float = 1.0
+    output_factor: float = 1.0
+
+    @property
+    def si(self) -> bool:
+        """Whether both are in SI units, or in units that are not recognised."""
+        return self.input_factor == self.output_factor == 1.0
 
     @classmethod
     def of(cls, output: Channel, input: Channel) -> PlantKinds:
         """The kinds of two channels."""
-        return cls(output.stated_kind, input.stated_kind, input.factor)
+        return cls(output.stated_kind, input.stated_kind, input.factor, output.factor)
 
     @classmethod
     def of_unit(cls, unit: str) -> PlantKinds:

@@ -125,7 +125,7 @@ class PhysicalModel:
     ...
     ...     def transfer(self, m, c, k):
     ...         return [1.0], [m, c, k]
-    >>> grid = Grid(np.array([1.0, 16.0]), rate_hz=1000.0)
+    >>> grid = EvaluationGrid(np.array([1.0, 16.0]), rate_hz=1000.0)
     >>> abs(Oscillator().at([1.0, 10.0, 1e4], grid)).round(6)
     array([0.0001  , 0.000989])
     >>> Oscillator().derived_names

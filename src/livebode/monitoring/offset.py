@@ -24,7 +24,7 @@ class LocalChange:
     def share(self, position_m: Floats) -> Floats:
         """Share of the change at these positions, 0 … 1.
 
-        >>> Place(1.0, 0.05).share(np.array([1.0, 1.05])).round(3)
+        >>> LocalChange(1.0, 0.05).share(np.array([1.0, 1.05])).round(3)
         array([1.   , 0.607])
         """
         return np.asarray(np.exp(-(((position_m - self.centre_m) / self.width_m) ** 2) / 2))

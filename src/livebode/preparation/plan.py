@@ -15,7 +15,7 @@ from livebode.estimation.stream_estimator import Follower
 from livebode.preparation.checks import check_length
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
 from livebode.preparation.spectra_plan import check_spectra
-from livebode.preparation.window_check import WINDOWS_COMPARED, window_doubt
+from livebode.preparation.window_check import WINDOWS_COMPARED, divided_window, window_doubt
 from livebode.sources import Log
 
 LIVE_RESPONSES_PER_S = 20.0
@@ -84,6 +84,8 @@ def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
     """An event if the excitation does not repeat with the window that the configuration specifies."""
     if settings.method.reference != "excitation" or not settings.excitation or axis.lines.window == "auto":
         return []
+    if axis.lines.frequencies == "auto":
+        return divided_window(beginning(log, settings.excitation), settings)
     samples = beginning(log, settings.excitation, WINDOWS_COMPARED * settings.lines.window)
     return window_doubt(samples, settings)
 

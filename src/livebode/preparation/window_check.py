@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import Event
+from livebode.core import Event, LivebodeError
 from livebode.estimation import Settings
 
 _LAGS = 8  # samples around the window in which another period is searched
@@ -25,17 +25,37 @@ def window_doubt(samples: np.ndarray, settings: Settings) -> list[Event]:
         return []
     differences = {lag: _difference(samples, lag, window + _LAGS) for lag in lags}
     best = min(differences, key=lambda lag: (differences[lag], abs(lag - window)))
-    changes = differences[window] / 2
-    if differences[window] <= _ROUNDING or differences[best] >= changes:
+    if differences[window] <= _ROUNDING or differences[best] >= differences[window] / 2:
         return []
+    return [_doubt(settings, best, differences[window] / 2, differences[best] / 2)]
+
+
+def divided_window(samples: np.ndarray, settings: Settings) -> list[Event]:
+    """An event if a whole number of the excitation's periods, as `recognise` finds it, is not the window."""
+    from livebode.excitation import recognise  # its statistics are slow to import
+
+    window = settings.lines.window
+    try:
+        period = recognise(samples, settings.lines.rate_hz).period
+    except LivebodeError:  # the person knows better
+        return []
+    longest = max(window, period)
+    if window % period == 0 or samples.size <= longest:
+        return []
+    changes, rest = (_difference(samples, lag, longest) / 2 for lag in (window, period))
+    return [_doubt(settings, period, changes, rest)]
+
+
+def _doubt(settings: Settings, period: int, changes: float, rest: float) -> Event:
+    window = settings.lines.window
     message = (
-        f"{settings.excitation!r} repeats every {best} samples rather than every {window}: "
+        f"{settings.excitation!r} repeats every {period} samples rather than every {window}: "
         f"{100 * changes:.2g} % of its power changes from one window to the next, "
-        f"{100 * differences[best] / 2:.2g} % from one such period to the next; "
+        f"{100 * rest:.2g} % from one such period to the next; "
         "compare lines.window with the design of the excitation"
     )
-    facts = {"window": window, "period": best, "share_that_changes": changes}
-    return [Event("window-doubtful", 0, 0.0, message, facts)]
+    facts = {"window": window, "period": period, "share_that_changes": changes}
+    return Event("window-doubtful", 0, 0.0, message, facts)
 
 
 def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:

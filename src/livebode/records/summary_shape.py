@@ -25,6 +25,7 @@ class _Kinds(BaseModel):
     output: QuantityKind | None
     input: QuantityKind | None
     input_factor: Annotated[float, Field(gt=0)]
+    output_factor: Annotated[float, Field(gt=0)] = 1.0
 
 
 class _Found(_Part):

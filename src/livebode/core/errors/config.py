@@ -49,6 +49,7 @@ class ConfigError(LivebodeError):
         "secret-missing": "The environment variable that holds a secret is not set.",
         "token-weak": "A token is too short, or has letters that a token may not have.",
         "tokens-equal": "Operators and viewers have the same token.",
+        "unit-not-si": "The parameters of a model are in SI units, and the output or the input is not.",
         "value-invalid": "The value of a key has the wrong type or form, is out of range or cannot be used.",
         "value-mismatch": "The value of a key differs from what the source, the design or the run has.",
     }
