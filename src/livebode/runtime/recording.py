@@ -25,8 +25,12 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     started = time.perf_counter()
     assert axis.source.log is not None
     given = axis.source
-    log = open_log(axis.source.log, rate_hz=given.rate_hz, time=given.time, kinds=given.kinds, clock=given.clock)
+    names = [name for name in axis.signals.model_dump().values() if name]
+    log = open_log(
+        axis.source.log, rate_hz=given.rate_hz, time=given.time, kinds=given.kinds, clock=given.clock, channels=names
+    ).listing(names)
     pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
+    log = log.listing(pipeline.channels)
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
     noticed += window_in_doubt(axis, log, settings)

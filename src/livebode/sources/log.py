@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,7 @@ class Log:
         self._clock = clock
         self._block_samples = block_samples
         self._kinds = kinds
+        self._listed: tuple[str, ...] = ()
 
     @property
     def path(self) -> Path:
@@ -57,13 +59,24 @@ class Log:
 
     @property
     def format(self) -> str:
-        """Name of the format: csv, parquet, arrow, mat, hdf5, npz or sinumerik."""
+        """Name of the format, as `docs/reference/readers.md` lists it: csv, parquet, mat, …"""
         return self._recording.format
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Everything that `blocks` can read, in the order of the file."""
-        return tuple(self._label(column, column.name) for column in self._columns if not column.temporal)
+        """Everything that `blocks` can read, in the order of the file; then the other names of `listing`."""
+        own = [self._label(column, column.name) for column in self._columns if not column.temporal]
+        return (*own, *(self._label(self._column(name), name) for name in self._listed))
+
+    def listing(self, names: Sequence[str]) -> Log:
+        """The same log, whose `channels` have these paths and aliases too; RecordingError if one is not in the file."""
+        other = copy(self)
+        known = {column.name for column in self._columns}
+        other._listed = tuple(name for name in dict.fromkeys((*self._listed, *names)) if name not in known)
+        with located(self.path):
+            for name in other._listed:
+                self._column(name)
+        return other
 
     @property
     def aliases(self) -> Mapping[str, str]:
@@ -156,9 +169,12 @@ class Log:
                 value=repeated[0],
             )
         with located(self.path):
-            columns = [resolve(name, self._columns, self._recording.columns) for name in names]
+            columns = [self._column(name) for name in names]
         labels = tuple(self._label(column, name) for name, column in zip(names, columns))
         return self._cut(self._read(columns, limit), labels, limit)
+
+    def _column(self, name: str) -> Column:
+        return resolve(name, self._columns, self._recording.columns)
 
     def _label(self, column: Column, name: str) -> Channel:
         kind = self._kinds.get(column.name)
