@@ -15,6 +15,7 @@ from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, Spec
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass
+from livebode.fitting.drift import DriftTest
 from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_table, places, signals_of
 from livebode.motion import MotionCorrection
 from livebode.preparation.checks import ChannelCheck
@@ -140,6 +141,13 @@ def fitter() -> Case:
     return Case(lambda: Fitter(BELT), processed(rows()), [lambda: Fitter(BELT, free=["delay"])])
 
 
+def drift() -> Case:
+    def step(part: Responses) -> Callable[[Any], object]:
+        return lambda test: (test.add(part), test.result().change.tobytes())
+
+    return Case(lambda: DriftTest(FITTED), [step(part) for part in rows()], [lambda: DriftTest(LINES)])
+
+
 def baseline(by_model: bool) -> Baseline:
     """Of an ideal machine, with a table from responses that scatter."""
     lines, rng = MONITORED.lines, np.random.default_rng(9)
@@ -233,7 +241,7 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, spectra_tracker, motion_correction, fitter, monitor_by_model, monitor_by_tables, change_detection,
-        fits, run_counts, stream_position,
+        tracker, spectra_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables,
+        change_detection, fits, run_counts, stream_position,
     )
 }  # fmt: skip

@@ -9,7 +9,7 @@ from livebode.runtime import Document
 
 _KINDS = {
     "roles-doubtful", "transient", "phase-slip", "phase-slips", "restart", "replaced", "computer-clock", "foreign",
-    "backlog", "backlog-cleared", "waiting", "window-doubtful",
+    "backlog", "backlog-cleared", "waiting", "window-doubtful", "drift",
 }  # fmt: skip
 _ONCE = {"foreign"}
 

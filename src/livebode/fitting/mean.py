@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Responses, SignalError
+from livebode.fitting.drift import DriftTest
 from livebode.fitting.line_verdicts import LineVerdicts
 
 Floats = NDArray[np.float64]
@@ -45,9 +46,12 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     mean, unless it was valid for longer than invalid for that reason, as in motion, where errors that repeat are not
     known. The three windows before the first verdict are ignored.
 
-    Bias: a machine that changes is averaged, and its change is in sigma. With a Hann window the errors correlate less,
-    and sigma is too high. Responses that average over periods already contain each other: of these the newest valid
-    one is returned unchanged.
+    A machine that drifts is averaged. If its drift is significant (`DriftTest`), sigma contains it without reduction,
+    so that it covers the response at a random moment of the record.
+
+    Bias: a change that returns to its beginning is averaged, and only its scatter is in sigma. With a Hann window the
+    errors correlate less, and sigma is too high. Responses that average over periods already contain each other: of
+    these the newest valid one is returned unchanged.
 
     Parameters
     ----------
@@ -81,6 +85,8 @@ class RunningMean:
         Number of responses used, those with a valid line.
     averages
         Whether they average over periods already, so that the newest one is returned.
+    drift
+        The test of the responses for a drift.
     """
 
     def __init__(self) -> None:
@@ -92,6 +98,7 @@ class RunningMean:
         n = len(like.lines)
         self._pair = _Pair(n)
         self._overlap = _Overlap(like.lines.window, n)
+        self.drift = DriftTest(like.lines)
         self._least, self._dof = np.full(n, np.inf), 0.0
         self._coherence, self._input_coherence = _Mean(n), _Mean(n)
         self._moment, self._schedule, self._scheduled = 0.0, 0.0, 0
@@ -114,6 +121,7 @@ class RunningMean:
         weight = np.where(np.isfinite(part.weight), part.weight, 1.0)
         self._pair.add(used, part.value * weight, weight)
         self._overlap.add(part.sample + 1, used.astype(np.float64))
+        self.drift.add(part)
         known = used & np.isfinite(part.sigma)
         self._least = np.minimum(self._least, np.where(known, part.sigma, np.inf).min(axis=0))
         self._dof = float(np.max(part.dof, initial=self._dof, where=known.any(axis=1)))
@@ -152,7 +160,7 @@ class RunningMean:
         several = windows >= 2
         single = np.where(np.isfinite(self._least), self._least, np.nan)
         added = np.where(np.isfinite(distortion) & valid, distortion, 0.0)
-        together = np.hypot(scatter, added)
+        together = np.hypot(np.hypot(scatter, added), self.drift.result().spread)
         dof = windows[several].min() - 1 if several.any() else self._dof or np.nan
         if several.any() and added.any():
             with np.errstate(invalid="ignore", divide="ignore"):

@@ -8,6 +8,9 @@ SENTENCES = (
     "{channel} repeats every {period} samples rather than every {window}: {share} % of its power changes from one "
     "window to the next, {rest} % from one such period to the next",
     "compare lines.window with the design of the excitation",
+    "the response drifts during the recording, most at {line} Hz: by {percent} % ± {bound} % from the beginning to the "
+    "end",
+    "the bound of a mean contains the drift",
     "{count} samples are missing before sample {sample}",
     "an unknown number of samples is missing before sample {sample}",
     "responses are invalid until a window of {window} samples is complete again",
@@ -294,7 +297,7 @@ NAMES = (
     "gain may fall by", "peak sensitivity Ms", "gain margin", "gain reduction", "phase margin", "delay margin",
     "peak sensitivity", "bandwidth", "acknowledged", "backlog", "backlog-cleared", "baseline-unknown", "change",
     "change-cleared", "change-corrected", "clock-jump", "computer-clock", "configuration-applied",
-    "configuration-postponed", "configuration-refused", "connected", "disconnected", "distorted", "doubtful",
+    "configuration-postponed", "configuration-refused", "connected", "disconnected", "distorted", "doubtful", "drift",
     "fit-failed", "fit-resumed", "foreign", "gap", "held", "hum", "hum-gone", "implausible", "layout-changed", "loss",
     "malformed", "missing", "noise-from-detection-lines", "non-finite", "not-whole", "overflow", "phase-slip",
     "phase-slips", "record-closed", "record-continued", "record-damaged", "record-paused", "record-removed",

@@ -76,6 +76,7 @@ class _Summary(_Part):
     fit: Section | None = None
     loop: Section | None = None
     monitoring: Section | None = None
+    drift: Section | None = None
     record: _Record | None = None
     left_out_samples: Count | None = None
     clock: list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None = None

@@ -9,6 +9,7 @@ from livebode.configuration.axis import Axis
 from livebode.core import Channel, LivebodeError, SignalError, Stateful, nearest_name
 from livebode.estimation import plant_kinds
 from livebode.estimation.stream_estimator import Follower
+from livebode.fitting.drift import DriftTest
 from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection, change_detection
 from livebode.runtime.fits import Fits
@@ -29,12 +30,15 @@ class Pipeline:
         A model fitted to each response, if one is configured.
     detection
         Detects changes, or reports that it cannot.
+    drift
+        Tests whether the machine drifts within a recording.
     """
 
     follower: Follower
     fits: Fits | None = None
     detection: ChangeDetection | None = None
     axis: Axis | None = None
+    drift: DriftTest | None = None
 
     @classmethod
     def of(cls, axis: Axis, follower: Follower, channels: Sequence[Channel], *, samples: bool = True) -> Pipeline:
@@ -76,7 +80,7 @@ class Pipeline:
     @property
     def parts(self) -> Mapping[str, Stateful]:
         """Stages with a state, by name."""
-        optional = {"fits": self.fits, "detection": self.detection}
+        optional = {"fits": self.fits, "detection": self.detection, "drift": self.drift}
         return {"tracker": self.follower} | {name: part for name, part in optional.items() if part}
 
     def take_over(self, before: Pipeline) -> bool:

@@ -9,6 +9,7 @@ from livebode.configuration.axis import Axis
 from livebode.core import Event
 from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
+from livebode.fitting.drift import DriftTest
 from livebode.preparation.aligned import AlignedLog, slip_event, slips_of
 from livebode.preparation.early_spikes import early_spikes
 from livebode.preparation.plan import make_follower, roles_in_doubt, window_in_doubt
@@ -46,6 +47,8 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
     found |= {"left_out_samples": source.first, "clock": log.clock_kind}
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
+    if settings.quantity == "plant" and not settings.average:
+        pipeline = replace(pipeline, drift=DriftTest(settings.lines))
     loop = RunLoop(
         source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed
     )

@@ -23,6 +23,7 @@ from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition
 from livebode.runtime.destination import Destination
 from livebode.runtime.documents import Channels, ClockSet, FitResults, RunEnded, RunStarted, TrackerResults
+from livebode.runtime.drift_event import drift_events
 from livebode.runtime.live_checks import LiveChecks
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.recorder import Recorder
@@ -210,6 +211,8 @@ class RunLoop:
         self._overview.add(responses)
         if len(responses):
             self._stream.publish(responses)
+        if self.pipeline.drift is not None:
+            self.pipeline.drift.add(responses)
         parameters = self._fit(responses)
         detection = self.pipeline.detection
         if detection is not None and (self._shedding is None or self._shedding.to_monitor(responses)):
@@ -332,6 +335,10 @@ class RunLoop:
         if detection is not None:
             self._stream.publish_all(detection.finish())
             self._done["monitoring"] = detection.summary()
+        if self.pipeline.drift is not None:
+            found = self.pipeline.drift.result()
+            self._done["drift"] = summary.of_drift(found, self._follower.settings.lines)
+            self._stream.publish_all(drift_events(self._done["drift"], *self.position))
         self._stream.finish_groups()
         self._done |= self._found_on_the_way
         if continued_in is not None:

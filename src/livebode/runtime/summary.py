@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis.loop_report import loop_report
-from livebode.core import PlantKinds, Responses
+from livebode.core import Lines, PlantKinds, Responses
 from livebode.core.clock import moment
 from livebode.estimation.stream_estimator import Follower
 from livebode.fitting import Fit
+from livebode.fitting.drift import Drift
 from livebode.kernel import instruction_set
 from livebode.runtime.fits import Fits
 from livebode.runtime.run_counts import RunCounts
@@ -53,6 +54,25 @@ def of_source(source: object) -> dict[str, Any]:
     if not isinstance(source, LiveSource):
         return {}
     return {"source": asdict(source.health) | {"first_sample": source.first_sample}}
+
+
+def of_drift(drift: Drift, lines: Lines) -> dict[str, Any]:
+    """Entries on a drift of the machine within the recording: at the lines where it is significant, or the clearest."""
+    if not drift.found:
+        return {"found": False, "lines": []}
+    shown = drift.lines.copy()
+    if not shown.any():
+        shown[np.nanargmax(np.abs(drift.change) / drift.sigma)] = True
+    size = np.abs(drift.value)
+    rows = [
+        {
+            "frequency_hz": float(lines.frequency_hz[i]),
+            "percent": 100 * float(abs(drift.change[i]) / size[i]),
+            "percent_sigma": 100 * float(drift.sigma[i] / size[i]),
+        }
+        for i in np.flatnonzero(shown)
+    ]
+    return {"found": True, "lines": rows}
 
 
 def fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[str, Any]:
