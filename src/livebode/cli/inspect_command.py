@@ -99,15 +99,16 @@ def _check(
 
 def _show_recording(found: Inspection, console: Console) -> None:
     log, contents = found.log, found.contents
-    console.print(
-        f"{log.path}: {log.format}, {contents.samples} samples at {log.rate_hz:.9g} Hz ({log.rate_origin})",
-        soft_wrap=True,
-    )
+    rate = "at an unknown rate" if found.without_rate else f"at {log.rate_hz:.9g} Hz ({log.rate_origin})"
+    console.print(f"{log.path}: {log.format}, {contents.samples} samples {rate}", soft_wrap=True)
     gaps = f"{counted(contents.gaps, 'gap')} ({contents.missing} samples missing)" if contents.gaps else "no gaps"
     jitter = ""
     if log.timing is not None:
         jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"
-    console.print(f"{contents.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
+    if found.without_rate:
+        console.print(f"no rate: {found.without_rate} (options --rate and --time)", soft_wrap=True)
+    else:
+        console.print(f"{contents.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
     table = Table(box=None, header_style="bold")
     for heading in ("channel", "unit", "kind", "from", "to", "not finite"):
         table.add_column(heading, justify="left" if heading in ("channel", "unit", "kind") else "right")

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from livebode.core import Lines, LivebodeError
+from livebode.core import Lines, LivebodeError, RecordingError
 from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, pattern, recognise
 from livebode.preparation.contents import Contents, read_contents
@@ -15,16 +15,26 @@ from livebode.preparation.quiet import Quiet, look_for_hum
 from livebode.sources import Log, open_log
 from livebode.sources.recording import Skipped
 
+_WITHOUT_RATE = tuple(
+    f"recording.{code}"
+    for code in ("rate-missing", "time-unit", "time-jitter", "time-irregular", "time-not-increasing", "time-not-finite")
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """Result of `livebode inspect`; `unrecognised`: why an excitation next to a silent stretch is not recognised."""
+    """Result of `livebode inspect`.
+
+    `unrecognised`: why an excitation next to a silent stretch is not recognised. `without_rate`: why the recording has
+    no rate; the rate of `log` has no meaning then.
+    """
 
     log: Log
     contents: Contents
     excitation: Excitation | None
     quiet: Quiet | None = None
     unrecognised: str = ""
+    without_rate: str = ""
 
     @property
     def skipped(self) -> tuple[Skipped, ...]:
@@ -43,16 +53,18 @@ class Inspection:
         plain: dict[str, Any] = {
             "log": str(log.path),
             "format": log.format,
-            "rate_hz": log.rate_hz,
-            "rate_from": log.rate_origin,
+            "rate_hz": None if self.without_rate else log.rate_hz,
+            "rate_from": None if self.without_rate else log.rate_origin,
             "samples": contents.samples,
-            "duration_s": contents.samples / log.rate_hz,
+            "duration_s": None if self.without_rate else contents.samples / log.rate_hz,
             "gaps": contents.gaps,
             "missing_samples": contents.missing,
             "timing": asdict(log.timing) if log.timing else None,
             "channels": [asdict(channel) for channel in contents.channels],
             "skipped": [asdict(skipped) for skipped in self.skipped],
         }
+        if self.without_rate:
+            plain["without_rate"] = self.without_rate
         if self.quiet is not None:
             plain["without_excitation"] = self.quiet.plain()
         if found is not None:
@@ -91,7 +103,7 @@ def inspect(
 
     With lines (a text and the window), hum is searched in `output` and `input` where there is no excitation.
     """
-    log = open_log(path, rate_hz=rate_hz, time=time)
+    log, without_rate = open_with_or_without_rate(path, rate_hz, time, needs_rate=bool(excitation or lines))
     required = [name for name in (excitation, output, input) if name is not None]
     known = {channel.name for channel in log.channels}
     # A channel given by a path or an alias is listed by that name.
@@ -111,4 +123,16 @@ def inspect(
             if quiet is None:
                 raise
             unrecognised = str(error)
-    return Inspection(log, contents, found, quiet, unrecognised)
+    return Inspection(log, contents, found, quiet, unrecognised, without_rate)
+
+
+def open_with_or_without_rate(
+    path: Path, rate_hz: float | None, time: str | None, *, needs_rate: bool
+) -> tuple[Log, str]:
+    """The log, and why it has no rate (empty if it has one); the channels can be listed without."""
+    try:
+        return open_log(path, rate_hz=rate_hz, time=time), ""
+    except RecordingError as error:
+        if needs_rate or rate_hz is not None or error.code not in _WITHOUT_RATE:
+            raise
+        return open_log(path, rate_hz=1.0, time="none"), str(error)
