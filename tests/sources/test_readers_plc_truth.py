@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 
 from livebode.core import RecordingError
 from livebode.sources import open_log
+from livebode.sources.dialect import Dialect
+from livebode.sources.tidy import Tidied
 from tests.support.errors import refused
 from tests.support.recordings import write_scope
 
@@ -131,3 +135,13 @@ def test_a_trace_of_codesys_2_as_text_gives_its_variables(tmp_path):
     log = open_log(path, rate_hz=1000)
     assert [channel.name for channel in log.channels] == ["Cycle", "PLC_PRG.rPos", "PLC_PRG.bOn"]
     np.testing.assert_array_equal(values(log, "PLC_PRG.rPos"), 2 * np.arange(100.0))
+
+
+def test_short_lines_of_a_wide_table_are_completed_in_small_pieces():
+    """A table of 18,000 columns whose lines have one cell grows 9,000 times; it must not do so at once."""
+    dialect = Dialect("\t", False, ".", ragged=True).with_headings([f"c{k}" for k in range(18_000)])
+    raw = io.BytesIO(b"1\n" * 100_000)
+    first = Tidied(raw, dialect).read(1 << 26)
+    assert raw.tell() <= 1 << 12
+    assert first[:18_000] == b"1" + b"\t" * 17_999
+    assert len(first) < 1 << 26

@@ -15,7 +15,7 @@ from livebode.preparation.inspection import inspect
 from livebode.sources import Log, open_log
 from tests.support.errors import refused
 
-QUICK = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+QUICK = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 WORDS = st.sampled_from(["ANGLE_MODE|HORIZON", "ARM", "IDLE", "SMALL_ANGLE", "a b"])
 
 

@@ -13,7 +13,7 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
     found = [column for column in columns if column.name == name and not column.temporal]
     found = found or [column for column in columns if name in column.aliases and not column.temporal]
     plain = name.replace("(1).", ".")
-    found = found or [column for column in columns if column.name.replace("(1).", ".") == plain and not column.temporal]
+    found = found or [column for column in columns if plain in plain_paths(column) and not column.temporal]
     if len(found) == 1:
         return found[0]
     if found:
@@ -38,3 +38,7 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
     raise RecordingError(
         "channel-unknown", f"there is no channel {name!r}", nearest_name(name, names), channel=name, channels=names
     )
+
+
+def plain_paths(column: Column) -> list[str]:
+    return [name.replace("(1).", ".") for name in (column.name, *column.aliases)]

@@ -31,6 +31,8 @@ class Tidied(io.RawIOBase):
 
     def __init__(self, raw: BinaryIO, dialect: Dialect) -> None:
         self._raw, self._dialect = raw, dialect
+        # A ragged table grows by its width with each short line: its pieces are as much smaller.
+        self._piece = max(1 << 12, PIECE // max(dialect.width, 1)) if dialect.ragged else PIECE
         self._decoder = codecs.getincrementaldecoder(dialect.encoding)("replace")
         self._kept = ""
         self._ready = b""
@@ -48,7 +50,7 @@ class Tidied(io.RawIOBase):
         return count
 
     def _fill(self) -> None:
-        raw = self._raw.read(PIECE)
+        raw = self._raw.read(self._piece)
         self._done = not raw
         text = self._kept + self._decoder.decode(raw, final=self._done)
         end = len(text) if self._done else text.rfind("\n") + 1
