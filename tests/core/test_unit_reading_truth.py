@@ -96,7 +96,7 @@ def test_the_unit_of_a_plant_is_split_into_those_of_output_and_input() -> None:
         for input in ("N m", "A", "kg m/(s^2)"):
             assert split_plant_unit(f"{output}/({input})") == (output, input)
     assert [split_plant_unit(text) for text in ("", "dB", "m/A", ")", "m)")] == [("", "")] * 5
-    assert PlantKinds.of_unit("rpm/(mN m)") == PlantKinds("velocity", "torque", 1e-3)
+    assert PlantKinds.of_unit("rpm/(mN m)") == PlantKinds("velocity", "torque", 1e-3, pi / 30)
     assert PlantKinds.of_unit("dB") == PlantKinds("other", "other")
     assert PlantKinds.of_unit("") == PlantKinds(None, None)
 

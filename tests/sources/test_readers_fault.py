@@ -6,12 +6,16 @@ import errno
 import json
 import os
 import random
+import re
 import struct
 import subprocess
 import sys
+import tracemalloc
 import zipfile
+from functools import partial
 from pathlib import Path
 
+import can
 import h5py
 import numpy as np
 import pyarrow as pa
@@ -22,14 +26,30 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import ExtraError, LivebodeError, RecordingError, UsageError
-from livebode.sources import open_log, sinumerik_spectra
+from livebode.sources import sinumerik_spectra
 from livebode.sources.safexml import parse
 from tests.support.errors import refused
-from tests.support.recordings import WRITERS, dspace, signals, with_time, write, write_dspace73
+from tests.support.recordings import (
+    DBC,
+    OWN_RATE,
+    WRITERS,
+    Mf4Writer,
+    dspace,
+    open_log,
+    signals,
+    with_time,
+    write,
+    write_dspace73,
+    write_frames,
+)
 
 MODULES = sorted(WRITERS)
+MAY_END_ANYWHERE = "asc", "delimited", "lvm", "twincat", "ulog"
+"""A table may end after any row, and a flight recorder when its battery is removed."""
 ROUNDS = int(os.environ.get("LIVEBODE_FUZZ_ROUNDS", "150"))
 """Damaged files of each kind; raise it for a campaign."""
+SLOW = "asc", "blf", "blf_plain", "mcap", "mdf", "mdf_frames", "rosbag", "ulog"
+"""Kinds whose libraries take some milliseconds for a file: a third of the rounds."""
 
 
 def drain(path: Path, **options: object) -> None:
@@ -182,11 +202,11 @@ def test_a_file_that_cannot_be_opened_is_refused(tmp_path, monkeypatch, number, 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_a_file_truncated_anywhere_is_read_or_refused(module, tmp_path):
-    given = signals(200) if module == "sinumerik" else with_time(signals(200))
+    given = signals(200) if module in OWN_RATE else with_time(signals(200))
     whole = write(module, tmp_path, given).read_bytes()
     for keep in range(1, len(whole) - 3, max(1, len(whole) // 40)):
         path = text(tmp_path, whole[:keep], f"cut{Path(WRITERS[module][0]).suffix}")
-        assert not survives(path) or module in ("delimited", "lvm", "twincat")  # only a table may end after any row
+        assert not survives(path) or module in MAY_END_ANYWHERE
 
 
 @pytest.mark.parametrize("module", ["parquet", "arrow", "npz", "hdf5", "matlab"])
@@ -358,16 +378,33 @@ def seeds(module: str, folder: Path) -> bytes:
     if module == "struct73":
         write_dspace73(folder / "a.mat", 50)
         return (folder / "a.mat").read_bytes()
-    return write(module, folder, signals(50) if module == "sinumerik" else with_time(signals(50))).read_bytes()
+    if module == "mdf_frames":
+        write_frames(Mf4Writer, folder / "log.mf4", with_time(signals(50)))
+        return (folder / "log.mf4").read_bytes()
+    if module == "blf_plain":  # damage reaches the frames
+        write_frames(partial(can.BLFWriter, compression_level=0), folder / "log.blf", with_time(signals(50)))
+        return (folder / "log.blf").read_bytes()
+    return write(module, folder, signals(50) if module in OWN_RATE else with_time(signals(50))).read_bytes()
 
 
-@pytest.mark.parametrize("module", [*MODULES, "struct", "struct73"])
+@pytest.mark.parametrize("module", [*MODULES, "struct", "struct73", "blf_plain", "mdf_frames"])
 def test_damaged_files_are_read_or_refused(module, tmp_path):
     whole = seeds(module, tmp_path)
-    for round_ in range(ROUNDS):
+    for round_ in range(ROUNDS // 3 if module in SLOW else ROUNDS):
         rng = random.Random(f"{module} {round_}")
         path = text(tmp_path, damaged(whole, rng) or b"x", "damaged.bin")
         survives(path, rate_hz=rng.choice([None, 4000.0]), time=rng.choice([None, "none"]))
+
+
+def test_damaged_dbc_files_are_read_or_refused(tmp_path):
+    path = write("blf", tmp_path, with_time(signals(20)))
+    whole = (tmp_path / DBC).read_bytes()
+    for round_ in range(ROUNDS // 3):
+        rng = random.Random(f"dbc {round_}")
+        raw = damaged(whole, rng) or b"x"
+        at = rng.choice([match.start() for match in re.finditer(rb"\d", raw)] or [0])
+        (tmp_path / DBC).write_bytes(raw[:at] + rng.choice([b"", b"", b"99", b"4000000000"]) + raw[at:])
+        survives(path)
 
 
 MEASURE = """
@@ -435,6 +472,22 @@ def test_memory_stays_bounded_whatever_the_length(module, tmp_path):
     assert kept_mib > samples * 16 / 2**20
     assert grown_mib < kept_mib - samples * 8 / 2**20
     assert grown_mib < 128
+
+
+def test_memory_of_a_long_wav_file_is_that_of_a_block(tmp_path):
+    path = write("wav", tmp_path, signals(2))
+    frames = 3_000_000
+    with path.open("r+b") as file:  # two channels of eight bytes, zeros that the disk does not store
+        at = file.read().index(b"data") + 4
+        file.seek(at)
+        file.write(struct.pack("<I", frames * 16))
+        file.truncate(at + 4 + frames * 16)
+    tracemalloc.start()
+    read = sum(len(block) for block in open_log(path).blocks())
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert read == frames
+    assert peak < frames * 16 / 4
 
 
 @pytest.mark.parametrize("long", ['<a b="{}"/>', "<a><!-- {} --></a>", "<{}/>", "<a><?b {}?></a>"])

@@ -11,8 +11,19 @@ import scipy.io
 from livebode.configuration import Axis
 from livebode.records import RunRecord
 from livebode.runtime import Destination, run
-from livebode.sources import open_log
-from tests.support.recordings import RATE_HZ, WRITERS, dspace, with_time, write, write_dspace73
+from tests.support.recordings import (
+    DBC,
+    NAMES,
+    OWN_RATE,
+    RATE_HZ,
+    WRITERS,
+    dspace,
+    names,
+    open_log,
+    with_time,
+    write,
+    write_dspace73,
+)
 
 WINDOW = 64
 OWN_UNITS = "lvm", "mdf", "sinumerik", "tdms", "twincat"
@@ -29,14 +40,16 @@ def exchanged() -> dict[str, np.ndarray]:
 
 def recorded(module: str, folder: Path) -> Path:
     given = exchanged()
-    if module == "sinumerik":
+    if module in OWN_RATE:
         return write(module, folder, given)
+    if module in NAMES:
+        return write(module, folder, with_time(given))
     return write(module, folder, with_time({"input [A]": given["input"], "output [rpm]": given["output"]}))
 
 
 def tracked(path: Path, folder: Path, output: str, input: str) -> RunRecord:
     given = {
-        "source": {"log": path, "rate_hz": RATE_HZ},
+        "source": {"log": path, "rate_hz": RATE_HZ} | ({"dbc": dbc} if (dbc := path.with_name(DBC)).exists() else {}),
         "signals": {"output": output, "input": input},
         "lines": {"frequencies": "k=4:9:5", "window": WINDOW},
         "tracking": {"estimator": "direct", "hop": WINDOW},
@@ -47,19 +60,19 @@ def tracked(path: Path, folder: Path, output: str, input: str) -> RunRecord:
 def names_of(path: Path, stem: str) -> list[str]:
     """The names that mean the channel whose name begins so, and its aliases."""
     log = open_log(path, rate_hz=RATE_HZ)
-    channels = [channel.name for channel in log.channels if channel.name.rpartition(".")[2].startswith(stem)]
+    channels = [channel.name for channel in log.channels if channel.name.startswith(stem)]
     return [*channels, *(alias for alias, name in log.aliases.items() if name in channels)]
 
 
 @pytest.mark.parametrize("module", sorted(WRITERS))
 def test_a_run_accepts_each_name_of_its_output(module, tmp_path):
     path = recorded(module, tmp_path)
-    outputs, inputs = names_of(path, "output"), names_of(path, "input")
+    inputs, outputs = (names_of(path, name) for name in names(module))
     assert outputs
     for at, output in enumerate(outputs):
         found = tracked(path, tmp_path / str(at), output, inputs[at])
         assert found.summary["configuration"]["signals"]["output"] == output
-        assert found.summary["found"]["unit"] == ("" if module in OWN_UNITS else "rpm/(A)")
+        assert found.summary["found"]["unit"] == ("" if module in (*OWN_UNITS, *NAMES) else "rpm/(A)")
 
 
 @pytest.mark.parametrize("version", ["v5", "v7.3"])

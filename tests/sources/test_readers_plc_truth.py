@@ -55,18 +55,20 @@ def test_channels_of_other_sample_times_are_read_on_request(tmp_path):
     assert (whole.rate_hz, whole.samples, other.rate_hz, other.samples) == (1000, 300, 5000, 1500)
     np.testing.assert_array_equal(values(whole, "pos"), np.arange(300) / 1000 * 2)
     np.testing.assert_array_equal(values(other, "current"), np.arange(1500) / 5000 * 5)
-    assert {skipped.name for skipped in other.skipped} >= {"pos", "vel"}
+    assert other.other_clocks == {"t": ("pos", "vel")}
+    assert whole.other_clocks == {"current.t": ("current",)}
 
 
-def test_channels_of_one_length_and_other_times_are_named_as_skipped(tmp_path):
+def test_channels_of_one_length_and_other_times_have_their_own_clock(tmp_path):
     path = tmp_path / "scope.csv"
     shifted = (np.arange(300) / 1000 - 0.0004, {"late": ("", np.arange(300.0))})
     write_scope(path, [group(1000, 300, pos=("mm", 2), vel=("", 3)), shifted])
     log = open_log(path)
     assert [channel.name for channel in log.channels] == ["t", "pos", "vel"]
-    assert [(skipped.name, skipped.reason) for skipped in log.skipped] == [
-        ("late", "its times differ from those of 'pos'")
-    ]
+    assert log.other_clocks == {"late.t": ("late",)}
+    late = open_log(path, channels=["late"])
+    assert next(late.blocks()).origin_s == -0.0004
+    np.testing.assert_array_equal(values(late, "late"), np.arange(300.0))
 
 
 def test_an_export_without_channels_is_refused(tmp_path):

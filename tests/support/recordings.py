@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import base64
+import shutil
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import asammdf
+import can
 import h5py
 import nptdms
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import scipy.io
+import scipy.io.wavfile
+from can.io.mf4 import MF4Writer
 from numpy.typing import NDArray
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from livebode.sources import Log
+from livebode.sources import open_log as open_alone
+from tests.support.ulog_file import ulog_file
 
 RATE_HZ = 4000.0
 Signals = Mapping[str, NDArray[np.float64]]
@@ -72,10 +83,8 @@ def write_tdms(path: Path, signals: Signals) -> None:
 
 
 def write_mdf(path: Path, signals: Signals) -> None:
-    """The format has time beside its signals; where none is given it is that of the rate."""
-    time = signals.get("t", np.arange(len(next(iter(signals.values())))) / RATE_HZ)
     given = [
-        asammdf.Signal(values, time, name=name, master_metadata=("t", 1))
+        asammdf.Signal(values, clock_s(signals), name=name, master_metadata=("t", 1))
         for name, values in signals.items()
         if name != "t"
     ]
@@ -190,6 +199,83 @@ def write_sinumerik(path: Path, signals: Signals) -> None:
     )
 
 
+def write_wav(path: Path, signals: Signals) -> None:
+    """As float64; the format has no names."""
+    scipy.io.wavfile.write(path, int(RATE_HZ), np.column_stack(list(signals.values())))
+
+
+def clock_s(signals: Signals) -> NDArray[np.float64]:
+    """Time of the samples in formats that always have it; where none is given it is that of the rate."""
+    return signals.get("t", np.arange(len(next(iter(signals.values())))) / RATE_HZ)
+
+
+def write_ulog(path: Path, signals: Signals) -> None:
+    """One topic, log."""
+    time_us = np.rint(clock_s(signals) * 1e6).astype(np.uint64)
+    given = {name: values.astype("<f8") for name, values in signals.items() if name != "t"}
+    path.write_bytes(ulog_file({"log": {"timestamp": time_us, **given}}))
+
+
+def write_ros(storage: StoragePlugin, path: Path, signals: Signals) -> None:
+    """One topic, /log, whose header has the time; a bag is a directory, of which a reader takes the file."""
+    given = {name: values for name, values in signals.items() if name != "t"}
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    fields = "".join(f"float64 {name}\n" for name in given)
+    store.register(get_types_from_msg(f"std_msgs/Header header\n{fields}", "test_msgs/msg/Log"))
+    header, stamp, log = (
+        store.types[name] for name in ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", "test_msgs/msg/Log")
+    )
+    bag = path.with_name(f"{path.stem}_bag")
+    shutil.rmtree(bag, ignore_errors=True)
+    with Writer(bag, version=9, storage_plugin=storage) as writer:
+        topic = writer.add_connection("/log", log.__msgtype__, typestore=store)
+        for at, (time_s, row) in enumerate(zip(clock_s(signals), zip(*given.values(), strict=True), strict=True)):
+            seconds, nanoseconds = divmod(round(time_s * 1e9), 1_000_000_000)
+            message = log(header(stamp(seconds, nanoseconds), "drive"), *row)
+            writer.write(topic, at, store.serialize_cdr(message, log.__msgtype__))
+    next(one for one in bag.iterdir() if one.suffix in (".mcap", ".db3")).rename(path)
+
+
+FD_LENGTHS = 8, 12, 16, 20, 24, 32, 48, 64
+DBC = "frames.dbc"
+
+
+def write_dbc(path: Path, names: Sequence[str], length: int) -> None:
+    """A message Log, number 0x123, whose signals are doubles."""
+    signals = [f' SG_ {name} : {64 * at}|64@1- (1,0) [0|0] "" X' for at, name in enumerate(names)]
+    kinds = [f"SIG_VALTYPE_ 291 {name} : 2;" for name in names]
+    lines = ['VERSION ""', "NS_ :", "BS_:", "BU_: X", f"BO_ 291 Log: {length} X", *signals, *kinds]
+    path.write_text("\n".join(lines) + "\n")
+
+
+class Mf4Writer(MF4Writer):
+    """Without the date that python-can subtracts."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._start_time = 0.0
+
+
+def write_frames(writer: type, path: Path, signals: Signals) -> None:
+    """One message, Log, in frames of CAN FD with the DBC beside them."""
+    given = {name: values for name, values in signals.items() if name != "t"}
+    length = next(length for length in FD_LENGTHS if length >= 8 * len(given))
+    write_dbc(path.with_name(DBC), list(given), length)
+    rows = np.column_stack(list(given.values())).astype("<f8")
+    with writer(path) as file:
+        for time_s, row in zip(clock_s(signals).tolist(), rows):
+            data = row.tobytes().ljust(length, b"\0")
+            # BLF has whole nanoseconds, and its writer rounds down.
+            frame = can.Message(time_s + 5e-10, 291, is_extended_id=False, is_fd=True, data=data, channel=0)
+            file.on_message_received(frame)
+
+
+def open_log(path: Path, **options: object) -> Log:
+    """The recording, with the DBC that a writer here left beside it."""
+    dbc = path.with_name(DBC)
+    return open_alone(path, **({"dbc": dbc} if dbc.exists() else {}), **options)
+
+
 WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "delimited": (".csv", write_csv),
     "parquet": (".parquet", write_parquet),
@@ -203,8 +289,39 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "sinumerik": (".xml", write_sinumerik),
     "lvm": (".lvm", write_lvm),
     "twincat": (".csv", write_twincat),
+    "ulog": (".ulg", write_ulog),
+    "wav": (".wav", write_wav),
+    "blf": (".blf", partial(write_frames, can.BLFWriter)),
+    "asc": (".asc", partial(write_frames, can.ASCWriter)),
+    "mcap": (".mcap", partial(write_ros, StoragePlugin.MCAP)),
+    "rosbag": (".db3", partial(write_ros, StoragePlugin.SQLITE3)),
 }
 """Ending and writer for each module of `livebode.sources` that reads a format."""
+NAMES = {
+    "asc": ("Log.input", "Log.output"),
+    "blf": ("Log.input", "Log.output"),
+    "mcap": ("/log.input", "/log.output"),
+    "rosbag": ("/log.input", "/log.output"),
+    "ulog": ("log.input", "log.output"),
+    "wav": ("c1", "c2"),
+}
+"""What the signals input and output are called where the format does not keep these names."""
+OWN_RATE = "sinumerik", "wav"
+"""Formats that define a rate and have no time column."""
+CLOCKS = {
+    "asc": "Log.time",
+    "blf": "Log.time",
+    "mcap": "/log.header.stamp",
+    "mdf": "t",
+    "rosbag": "/log.header.stamp",
+    "twincat": "t",
+    "ulog": "log.timestamp",
+}
+"""The time column of formats that always have one."""
+
+
+def names(module: str) -> tuple[str, str]:
+    return NAMES.get(module, ("input", "output"))
 
 
 def signals(samples: int = 1000, seed: int = 0) -> dict[str, NDArray[np.float64]]:

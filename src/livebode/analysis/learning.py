@@ -206,9 +206,16 @@ def _samples(axis: Axis) -> Callable[[], Iterator[Block]]:
     names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule, *axis.monitoring.covariates]
 
     def blocks() -> Iterator[Block]:
-        assert axis.source.log is not None
-        return open_log(
-            axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time, kinds=axis.source.kinds
-        ).blocks(names)
+        source, output = axis.source, axis.signals.output
+        assert source.log is not None
+        log = open_log(
+            source.log,
+            rate_hz=source.rate_hz,
+            time=source.time,
+            kinds=source.kinds,
+            dbc=source.dbc,
+            channels=[output],
+        )
+        return log.blocks(names)
 
     return blocks

@@ -60,7 +60,8 @@ def validate_run(
             role="input",
         )
     notes = _freshness(own_words["source"].get("log"), log)
-    opened = open_log(log, rate_hz=axis.source.rate_hz, time=axis.source.time)
+    given = axis.source
+    opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=[signals.output])
     there = {c.name for c in opened.channels} | set(opened.aliases)
     if signals.excitation and "excitation" not in named and signals.excitation not in there:
         notes.append(f"{log.name} has no channel {signals.excitation!r}: judged without the excitation w")

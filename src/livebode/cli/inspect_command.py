@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
 from livebode.cli import terminal
-from livebode.cli.options import Excitation, Json, Output, Rate, Time
+from livebode.cli.options import Dbc, Excitation, Json, Output, Rate, Time
 from livebode.core import UsageError, counted
 from livebode.estimation.settings import default_hop
 from livebode.excitation.pattern import pattern
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from livebode.preparation.quiet import Quiet
 
 _LINES_SHOWN = 24
+_WIDTH_MAX = 4096
 
 
 def inspect_command(
@@ -39,6 +41,7 @@ def inspect_command(
     ] = None,
     rate: Rate = None,
     time: Time = None,
+    dbc: Dbc = None,
     as_json: Json = False,
 ) -> None:
     """List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and SNR.
@@ -49,7 +52,9 @@ def inspect_command(
 
     _check(excitation, output, input_, lines, window)
     of_lines = None if lines is None or window is None else (lines, window)
-    found = inspect(log, rate_hz=rate, time=time, excitation=excitation, output=output, input=input_, lines=of_lines)
+    found = inspect(
+        log, rate_hz=rate, time=time, dbc=dbc, excitation=excitation, output=output, input=input_, lines=of_lines
+    )
     if as_json:
         print(to_json(found.plain()))
         return
@@ -119,9 +124,15 @@ def _show_recording(found: Inspection, console: Console) -> None:
         elif channel.minimum == channel.maximum:
             extent[1] = "constant"
         table.add_row(channel.name, channel.unit, channel.kind, *extent, str(channel.not_finite or ""))
+    # A name that is shortened to the width of the terminal cannot be given to a run.
+    console.width = max(
+        console.width, Measurement.get(console, console.options.update(max_width=_WIDTH_MAX), table).maximum
+    )
     console.print(table)
     for skipped in found.skipped:
         console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")
+    for clock, names in log.other_clocks.items():
+        console.print(f"  on the clock --time '{clock}': {', '.join(names)}", style="dim", soft_wrap=True)
 
 
 def _show_hum(quiet: Quiet, console: Console) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -18,6 +19,9 @@ Time = Annotated[
         metavar="COLUMN",
         help="Time column, if it is not detected by its name; unit in brackets behind the name. none: no time column.",
     ),
+]
+Dbc = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="DBC file that defines the signals of a recording of CAN frames.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result, or the error, as JSON.")]
 Port = Annotated[

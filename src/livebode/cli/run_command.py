@@ -10,7 +10,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.notices import NoticePrinter
-from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
+from livebode.cli.options import Dbc, Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import drawing, show, tracked_amount
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
@@ -31,6 +31,7 @@ def run_command(
     ] = None,
     rate: Rate = None,
     time: Time = None,
+    dbc: Dbc = None,
     lines: Annotated[
         str | None,
         typer.Option(
@@ -97,7 +98,7 @@ def run_command(
     Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png.
     """
     given: dict[str, dict[str, Any]] = {
-        "source": {"rate_hz": rate, "time": time},
+        "source": {"rate_hz": rate, "time": time, "dbc": dbc},
         "signals": {"output": output, "input": input, "excitation": excitation, "schedule": schedule},
         "lines": {"frequencies": lines, "window": _window(window)},
         "tracking": {

@@ -18,6 +18,8 @@ FALSE_ALARM = 0.01
 """Probability that a record of a machine that does not drift is reported, all lines together."""
 _GROUPS_MAX = 32
 _GROUPS_MIN = 6
+_ROUNDING = 1e-9  # of a response
+_MOVED = 1e-3  # of the largest value of the schedule
 # A trend is at most so far from its middle for the share 1 - 1/e of the record, as noise from its mean within sigma.
 _WITHIN_SIGMA = 1 - np.exp(-1)
 
@@ -54,11 +56,10 @@ class DriftTest(StatefulBase):
     """Tests responses, in order, for a trend.
 
     Windows that do not overlap are averaged in up to 32 groups of equal length. At each line a parabola over time is
-    fitted to the groups (with a slope over the schedule, where it varies), for the change as its straight part, and for
-    the largest distance from the mean. Without drift, the power of the straight part over that of the residuals is
-    F(2, 2d), with d the number of groups less that of the parameters, so that its probability is (1 + F/d)^-d. A record
-    drifts if one line has less than half of `FALSE_ALARM` after Bonferroni, or all lines together have by Fisher's
-    method.
+    fitted to the groups, for the change as its straight part, and for the largest distance from the mean. Without
+    drift, the power of the straight part over that of the residuals is F(2, 2d), with d the number of groups less
+    three, so that its probability is (1 + F/d)^-d. A record drifts if one line has less than half of `FALSE_ALARM`
+    after Bonferroni, or all lines together have by Fisher's method.
 
     Parameters
     ----------
@@ -67,16 +68,19 @@ class DriftTest(StatefulBase):
 
     Notes
     -----
-    A drift that returns to its beginning has no trend. Slow noise, longer than a group, can be taken for drift.
+    Where the schedule varies by more than a thousandth of its largest value, nothing is tested, because the response
+    may depend on it. A drift that returns to its beginning has no trend. Slow noise, longer than a group, can be taken
+    for drift.
     """
 
     _stage = Stage("drift-test", 1)
-    _STATE = ("_windows", "_free", "_level", "_moments", "_pairs")
+    _STATE = ("_windows", "_free", "_level", "_schedule", "_times_s", "_pairs")
 
     def __init__(self, lines: Lines) -> None:
         self._window, n = lines.window, len(lines)
         self._windows, self._free, self._level = 0, 0, 0
-        self._moments = np.zeros((2, _GROUPS_MAX, n))  # sums of time and schedule over the valid windows
+        self._schedule = np.full(2, np.nan)  # smallest and largest
+        self._times_s = np.zeros((1, _GROUPS_MAX, n))  # sums over the valid windows
         self._pairs = np.zeros((3, _GROUPS_MAX, n), dtype=np.complex128)  # number, sums of numerator and denominator
 
     def add(self, part: Responses) -> None:
@@ -93,13 +97,14 @@ class DriftTest(StatefulBase):
         group = self._windows >> self._level
         used = part.valid[at] & np.isfinite(part.value[at])
         weight = np.where(np.isfinite(part.weight[at]), part.weight[at], 1.0)
-        schedule = part.schedule[at] if np.isfinite(part.schedule[at]) else 0.0
-        self._moments[:, group, used] += np.array([[part.time_s[at]], [schedule]])
+        low, high = self._schedule
+        self._schedule = np.array([np.fmin(low, part.schedule[at]), np.fmax(high, part.schedule[at])])
+        self._times_s[:, group, used] += part.time_s[at]
         self._pairs[:, group, used] += np.stack([np.ones_like(weight), part.value[at] * weight, weight])[:, used]
         self._windows += 1
 
     def _merge(self) -> None:
-        for sums in (self._moments, self._pairs):
+        for sums in (self._times_s, self._pairs):
             half = sums[:, ::2] + sums[:, 1::2]
             sums[:, : _GROUPS_MAX // 2] = half
             sums[:, _GROUPS_MAX // 2 :] = 0
@@ -110,7 +115,8 @@ class DriftTest(StatefulBase):
         n = self._pairs.shape[2]
         change, sigma = np.full(n, complex(np.nan, np.nan)), np.full(n, np.nan)
         log_chance, farthest = np.zeros(n), np.zeros(n)
-        for i in range(n):
+        moved = np.ptp(self._schedule) > _MOVED * np.abs(self._schedule).max()
+        for i in range(0 if moved else n):
             if (trend := self._trend(i)) is not None:
                 change[i], sigma[i], farthest[i], log_chance[i] = trend
         own = log_chance < np.log(FALSE_ALARM / 2 / max(n, 1))
@@ -130,23 +136,22 @@ class DriftTest(StatefulBase):
         if np.count_nonzero(some) < _GROUPS_MIN:
             return None
         count = count[some]
-        time_s, schedule = self._moments[:, some, line] / count
+        time_s = self._times_s[0, some, line] / count
         value = self._pairs[1, some, line] / self._pairs[2, some, line]
-        straight = [np.ones_like(time_s), *([schedule] if np.ptp(schedule) else []), time_s]
-        bent = (time_s - time_s.mean()) ** 2
-        q, r = np.linalg.qr(np.stack([*straight, bent], axis=1) * np.sqrt(count)[:, np.newaxis])
+        centred = time_s - time_s.mean()
+        q, r = np.linalg.qr(np.vander(centred, 3, increasing=True) * np.sqrt(count)[:, np.newaxis])
         rotated = q.T @ (value * np.sqrt(count))
-        dof = len(count) - len(rotated)
+        dof = len(count) - 3
         residual = float(np.sum(np.abs(value * np.sqrt(count) - q @ rotated) ** 2)) / dof
-        slope = len(straight) - 1
-        if residual <= 0 or r[slope, slope] == 0:
+        residual += _ROUNDING**2 * float(np.mean(count * np.abs(value) ** 2))
+        if residual == 0:
             return None
         # The groups are centred on their windows; the record is one group longer.
         longer = len(count) / (len(count) - 1)
-        size = float(np.ptp(time_s)) * longer / r[slope, slope]
-        away = q[:, slope:] @ rotated[slope:] / np.sqrt(count)
-        log_chance = -dof * float(np.log1p(abs(rotated[slope]) ** 2 / residual / dof))
-        return complex(rotated[slope] * size), abs(size) * residual**0.5, float(np.abs(away).max()) * longer, log_chance
+        size = float(np.ptp(time_s)) * longer / r[1, 1]
+        away = q[:, 1:] @ rotated[1:] / np.sqrt(count)
+        log_chance = -dof * float(np.log1p(abs(rotated[1]) ** 2 / residual / dof))
+        return complex(rotated[1] * size), abs(size) * residual**0.5, float(np.abs(away).max()) * longer, log_chance
 
     @property
     def _identity(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from livebode.core import Lines, LivebodeError, RecordingError
 from livebode.estimation.settings import nearest_hop
@@ -19,6 +19,14 @@ _WITHOUT_RATE = tuple(
     f"recording.{code}"
     for code in ("rate-missing", "time-unit", "time-jitter", "time-irregular", "time-not-increasing", "time-not-finite")
 )
+
+
+class _Given(TypedDict):
+    """What `open_log` is given besides the rate."""
+
+    time: str | None
+    dbc: Path | None
+    channels: list[str] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +70,7 @@ class Inspection:
             "timing": asdict(log.timing) if log.timing else None,
             "channels": [asdict(channel) for channel in contents.channels],
             "skipped": [asdict(skipped) for skipped in self.skipped],
+            "other_clocks": {clock: list(names) for clock, names in log.other_clocks.items()},
         }
         if self.without_rate:
             plain["without_rate"] = self.without_rate
@@ -94,6 +103,7 @@ def inspect(
     *,
     rate_hz: float | None = None,
     time: str | None = None,
+    dbc: Path | None = None,
     excitation: str | None = None,
     output: str | None = None,
     input: str | None = None,
@@ -103,8 +113,9 @@ def inspect(
 
     With lines (a text and the window), hum is searched in `output` and `input` where there is no excitation.
     """
-    log, without_rate = open_with_or_without_rate(path, rate_hz, time, needs_rate=bool(excitation or lines))
     required = [name for name in (excitation, output, input) if name is not None]
+    given: _Given = {"time": time, "dbc": dbc, "channels": required[:1] or None}
+    log, without_rate = open_with_or_without_rate(path, rate_hz, given, needs_rate=bool(excitation or lines))
     known = {channel.name for channel in log.channels}
     # A channel given by a path or an alias is listed by that name.
     extra = [name for name in dict.fromkeys(required) if name not in known]
@@ -126,13 +137,11 @@ def inspect(
     return Inspection(log, contents, found, quiet, unrecognised, without_rate)
 
 
-def open_with_or_without_rate(
-    path: Path, rate_hz: float | None, time: str | None, *, needs_rate: bool
-) -> tuple[Log, str]:
+def open_with_or_without_rate(path: Path, rate_hz: float | None, given: _Given, *, needs_rate: bool) -> tuple[Log, str]:
     """The log, and why it has no rate (empty if it has one); the channels can be listed without."""
     try:
-        return open_log(path, rate_hz=rate_hz, time=time), ""
+        return open_log(path, rate_hz=rate_hz, **given), ""
     except RecordingError as error:
         if needs_rate or rate_hz is not None or error.code not in _WITHOUT_RATE:
             raise
-        return open_log(path, rate_hz=1.0, time="none"), str(error)
+        return open_log(path, rate_hz=1.0, **(given | {"time": "none"})), str(error)

@@ -24,12 +24,17 @@ from livebode.sources import open_log
 def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
-    assert axis.source.log is not None
     given = axis.source
-    names = [name for name in axis.signals.model_dump().values() if name]
+    assert given.log is not None
     log = open_log(
-        axis.source.log, rate_hz=given.rate_hz, time=given.time, kinds=given.kinds, clock=given.clock, channels=names
-    ).listing(names)
+        given.log,
+        rate_hz=given.rate_hz,
+        time=given.time,
+        kinds=given.kinds,
+        clock=given.clock,
+        dbc=given.dbc,
+        channels=[axis.signals.output],
+    ).listing([name for name in axis.signals.model_dump().values() if name])
     pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
     log = log.listing(pipeline.channels)
     settings = pipeline.follower.settings

@@ -10,9 +10,12 @@ from importlib import import_module
 from pathlib import Path
 
 from livebode.core import LivebodeError, RecordingError
+from livebode.sources.dbc import no_frames
 from livebode.sources.recording import Recording, contained
 
 HEAD_BYTES = 1024
+MDF_MAGIC = b"MDF     ", b"UnFinMF "
+ULOG_MAGIC = b"ULog\x01\x12\x35"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -20,18 +23,22 @@ HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 class Format:
     """A format: its file name endings, a test of its first bytes, and the class that reads it.
 
-    The class is named by module so that h5py and the like are imported only for the files that need them.
+    The class is named by module so that h5py and the like are imported only for the files that need them. With
+    `takes_dbc` it is called with the file that defines the signals in CAN frames.
     """
 
     title: str
     suffixes: tuple[str, ...]
     matches: Callable[[bytes], bool]
     module: str
+    takes_dbc: bool = False
 
-    def open(self, path: Path) -> Recording:
-        reader: type[Recording] = import_module(f"livebode.sources.{self.module}").READER
+    def open(self, path: Path, dbc: Path | None = None) -> Recording:
+        reader: Callable[..., Recording] = import_module(f"livebode.sources.{self.module}").READER
+        if dbc is not None and not self.takes_dbc:
+            raise no_frames(path, self.title)
         with contained(path, self.title):
-            return reader(path)
+            return reader(path, dbc) if self.takes_dbc else reader(path)
 
 
 def is_text(head: bytes) -> bool:
@@ -51,6 +58,16 @@ def is_xml(head: bytes) -> bool:
 
 
 TWINCAT = re.compile(rb"(?:\xef\xbb\xbf)?Name[\t;,|][^\r\n]*\r?\nFile[\t;,|]")
+
+
+def is_wav(head: bytes) -> bool:
+    return head.startswith((b"RIFF", b"RIFX", b"RF64")) and head[8:12] == b"WAVE"
+
+
+ASC_HEAD = re.compile(
+    rb"(?:\s*//[^\n]*\n)*\s*(?:date\s[^\n]*\n\s*)?base\s+(?:hex|dec)\s+timestamps\s+(\w+)", re.IGNORECASE
+)
+"""First lines of a text log of Vector, with the kind of its timestamps."""
 ARROW_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
 
 FORMATS = (
@@ -61,7 +78,13 @@ FORMATS = (
     Format("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), lambda head: head.startswith(HDF5_MAGIC), "hdf5"),
     Format("NPZ", (".npz",), lambda head: head.startswith(b"PK\x03\x04"), "npz"),
     Format("TDMS", (".tdms",), lambda head: head.startswith(b"TDSm"), "tdms"),
-    Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith((b"MDF     ", b"UnFinMF ")), "mdf"),
+    Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith(MDF_MAGIC), "mdf", takes_dbc=True),
+    Format("ULog", (".ulg", ".ulog"), lambda head: head.startswith(ULOG_MAGIC), "ulog"),
+    Format("WAV", (".wav",), is_wav, "wav"),
+    Format("MCAP", (".mcap",), lambda head: head.startswith(b"\x89MCAP0\r\n"), "mcap"),
+    Format("ROS 2 bag", (".db3",), lambda head: head.startswith(b"SQLite format 3\0"), "rosbag"),
+    Format("BLF", (".blf",), lambda head: head.startswith(b"LOGG"), "blf", takes_dbc=True),
+    Format("ASC", (".asc",), lambda head: ASC_HEAD.match(head) is not None, "asc", takes_dbc=True),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
     Format("TwinCAT Scope export", (".csv", ".txt"), lambda head: TWINCAT.match(head) is not None, "twincat"),
     Format("LabVIEW LVM", (".lvm",), lambda head: head.startswith(b"LabVIEW Measurement"), "lvm"),
@@ -70,20 +93,21 @@ FORMATS = (
 """All formats; the first that matches reads the file."""
 
 
-def open_recording(path: Path) -> Recording:
-    """Open `path` with the format that its content has.
+def open_recording(path: Path, dbc: Path | None = None) -> Recording:
+    """Open `path` with the format that its content has; `dbc` defines the signals in CAN frames.
 
     Raises
     ------
     RecordingError
-        For a file that is missing, empty, unreadable, or not in one of the formats.
+        For a file that is missing, empty, unreadable, or not in one of the formats; for a `dbc` with a file that
+        has no CAN frames.
     ExtraError
         Where the package that reads its format is not installed.
     """
     head = read_head(path)
     for format_ in FORMATS:
         if format_.matches(head):
-            return checked(format_.open(path))
+            return checked(format_.open(path, dbc))
     suffix = path.suffix.lower()
     named = [format_.title for format_ in FORMATS if suffix in format_.suffixes]
     if named:

@@ -59,7 +59,7 @@ class Log:
 
     @property
     def format(self) -> str:
-        """Name of the format, as `docs/reference/readers.md` lists it: csv, parquet, mat, …"""
+        """Name of the format: csv, parquet, arrow, mat, …; `docs/reference/readers.md` lists them."""
         return self._recording.format
 
     @property
@@ -92,14 +92,32 @@ class Log:
 
     @property
     def skipped(self) -> tuple[Skipped, ...]:
-        """What else is in the file, and why it is not a channel."""
+        """What else is in the file with this clock, and why it is not a channel."""
         listed = {column.name for column in self._columns}
         other = [
             Skipped(column.name, f"it has {column.samples} samples, not {self.samples}")
             for column in self._recording.columns
-            if column.name not in listed and column.name not in self.scalars
+            if column.name not in listed and column.name not in self.scalars and column.group == self._group
         ]
         return (*self._recording.skipped, *other)
+
+    @property
+    def other_clocks(self) -> Mapping[str, tuple[str, ...]]:
+        """Channels of the file that are sampled by other clocks, by the time column that `open_log(time=)` takes."""
+        groups: dict[str, list[Column]] = {}
+        for column in self._recording.columns:
+            if column.group != self._group:
+                groups.setdefault(column.group, []).append(column)
+        return {
+            clock.name: tuple(column.name for column in columns if not column.temporal and column is not clock)
+            for columns in groups.values()
+            for clock in columns
+            if clock.clock
+        }
+
+    @property
+    def _group(self) -> str:
+        return self._columns[0].group
 
     @property
     def scalars(self) -> Mapping[str, float]:

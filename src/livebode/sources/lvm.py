@@ -38,8 +38,8 @@ class LvmRecording(DelimitedRecording):
             elif groups:
                 groups[-1] = replace(groups[-1], channels=(*groups[-1].channels, column))
         groups = [group for group in groups if group.channels]
-        found, skipped = as_columns(merged(groups, super().chunks([group.time for group in groups], 1 << 16)))
-        self.columns, self.skipped = tuple(found), tuple(skipped)
+        times = super().chunks([group.time for group in groups], 1 << 16)
+        self.columns, self.skipped = tuple(as_columns(merged(groups, times))), ()
 
     def find_dialect(self, path: Path) -> Dialect:
         """The dialect as the tags of the file define it."""

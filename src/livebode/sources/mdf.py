@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core import ExtraError
 from livebode.sources.damage import damaged, oversized, truncated
+from livebode.sources.dbc import no_frames
+from livebode.sources.mdfcan import MdfCanRecording
+from livebode.sources.mdffile import opened
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+
+FRAMES = "CAN_DataFrame", "CAN_ErrorFrame", "CAN_RemoteFrame"
 
 
 class MdfRecording(Recording):
@@ -28,6 +30,7 @@ class MdfRecording(Recording):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
+        self.has_frames = False
         columns: list[Column] = []
         skipped: list[Skipped] = []
         with opened(path) as file:
@@ -36,8 +39,13 @@ class MdfRecording(Recording):
                     raise oversized(f"{path} has more than {COLUMNS_MAX} channels", COLUMNS_MAX, path=str(path))
                 samples = int(group.channel_group.cycles_nr)
                 self._check_size(file, at, samples)
-                for index, channel in enumerate(group.channels):
+                for channel in group.channels:
                     self._check_place(channel, int(group.channel_group.samples_byte_nr))
+                if any(channel.name in FRAMES for channel in group.channels):
+                    self.has_frames = True
+                    skipped.append(Skipped(f"group {at}", "it has CAN frames, whose signals only a DBC file defines"))
+                    continue
+                for index, channel in enumerate(group.channels):
                     column = Column(channel.name, unit_of(channel), samples, key=(at, index))
                     first = file.get(group=at, index=index, record_count=1, ignore_invalidation_bits=True)
                     if first.samples.ndim == 1 and first.samples.dtype.kind in "fiub":
@@ -101,41 +109,14 @@ def unit_of(channel: Any) -> str:
     return str(getattr(channel, "unit", "") or "")
 
 
-@contextmanager
-def opened(path: Path) -> Iterator[Any]:
-    try:
-        from asammdf import MDF
-    except ImportError:
-        raise ExtraError(
-            "not-installed",
-            f"{path} needs the package asammdf, which is not installed",
-            "run pip install livebode[mdf]",
-            package="asammdf",
-            extra="mdf",
-            path=str(path),
-        ) from None
-    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its messages are in the error that follows
-    with path.open("rb") as raw:  # a path would be mapped; if a mapped file shrinks, the process is killed
-        try:
-            file = MDF(raw)
-        except Exception as error:
-            abandon(error)
-            raise
-        try:
-            yield file
-        finally:
-            file.close()
+def open_mdf(path: Path, dbc: Path | None) -> Recording:
+    """The channels of the file; with a DBC, or if there are no others, the signals in its CAN frames."""
+    recording = MdfRecording(path)  # also checks sizes and places, which asammdf does not
+    if dbc is not None and not recording.has_frames:
+        raise no_frames(path, "MDF")
+    if dbc is None and (recording.columns or not recording.has_frames):
+        return recording
+    return MdfCanRecording(path, dbc)
 
 
-def abandon(error: Exception) -> None:
-    """Close the incomplete object of asammdf, which would print on standard error when it is collected."""
-    trace = error.__traceback__
-    while trace is not None:
-        half: Any = trace.tb_frame.f_locals.get("self")
-        if hasattr(half, "_tempfile") and not getattr(half, "_closed", True):
-            half._closed = True
-            half._tempfile.close()
-        trace = trace.tb_next
-
-
-READER = MdfRecording
+READER = open_mdf

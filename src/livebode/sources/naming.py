@@ -27,6 +27,14 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
         )
     for column in everything:
         if column.name == name and not column.temporal:
+            if column.group != columns[0].group:
+                raise RecordingError(
+                    "clocks-differ",
+                    f"channel {name!r} is sampled by the clock of {column.group!r}, the others by {columns[0].group!r}",
+                    "open it separately",
+                    channel=name,
+                    groups=[column.group, columns[0].group],
+                )
             raise RecordingError(
                 "lengths-differ",
                 f"channel {name!r} has {column.samples} samples, the others {columns[0].samples}",

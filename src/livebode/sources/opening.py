@@ -17,6 +17,7 @@ from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import resolve
 from livebode.sources.recording import Column, Recording, guarded, located
 from livebode.sources.timing import Clock, clock_from_time, find_time, rate_column, rate_in_column, rate_in_file
+from livebode.sources.units import split_unit
 
 _logger = logging.getLogger(__name__)
 
@@ -27,6 +28,7 @@ def open_log(
     rate_hz: float | None = None,
     time: str | None = None,
     channels: Sequence[str] | None = None,
+    dbc: str | os.PathLike[str] | None = None,
     block_samples: int = 65536,
     kinds: Mapping[str, QuantityKind] | None = None,
     clock: ClockKind | None = None,
@@ -41,9 +43,11 @@ def open_log(
         Samples per second, treated as exact. Default: from a time column or from the file's metadata.
     time
         Name of the time column, with its unit if the file does not contain it: "clock [us]". Default: found by
-        name; "none" ignores the time column.
+        name; "none" ignores the time column. A column of a group selects its channels.
     channels
-        Channels to read; selects the series that belong together if the file has series of several lengths.
+        Channels to read; selects the series that belong together if the file has series of several lengths or clocks.
+    dbc
+        File that defines the signals in CAN frames, for BLF, ASC and MDF.
     block_samples
         Largest length of a Block.
     kinds
@@ -55,7 +59,8 @@ def open_log(
     Raises
     ------
     RecordingError
-        Where the file cannot be read, lacks a channel, or has no usable time or rate.
+        Where the file cannot be read, lacks a channel, has no usable time or rate, or needs a `dbc` or has no use
+        for it.
     UsageError
         Where `rate_hz` or `block_samples` is out of range.
     ExtraError
@@ -82,7 +87,7 @@ def open_log(
             value=rate_hz,
         )
     checked_block_samples(block_samples)
-    recording = open_recording(Path(path))
+    recording = open_recording(Path(path), None if dbc is None else Path(dbc))
     with located(recording.path):
         log = log_of(recording, rate_hz, time, channels, block_samples, kinds or {}, clock)
     _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)
@@ -99,7 +104,7 @@ def log_of(
     clock_kind: ClockKind | None,
 ) -> Log:
     """The log of an open recording; parameters as in `open_log`."""
-    columns = together(recording, channels)
+    columns = together(recording, channels, time)
     time_column, unit = find_time(columns, time)
     chosen = channels or [c.name for c in columns if c is not time_column and not c.temporal]
     if not chosen:
@@ -163,11 +168,12 @@ def rate_by_column(recording: Recording) -> tuple[float, str] | None:
     return rate_in_column(column, guarded(recording.chunks([column], 1 << 16), recording.path, recording.format))
 
 
-def together(recording: Recording, channels: Sequence[str] | None) -> list[Column]:
-    """The columns of one length: that of `channels`, or the one with most of the file's values."""
+def together(recording: Recording, channels: Sequence[str] | None, time: str | None) -> list[Column]:
+    """The columns of one group and length: of `channels`, of the time column, or with most of the file's values."""
     everything = recording.columns
     if channels:
         asked = [resolve(name, everything, everything) for name in channels]
+        check_groups(channels, asked)
         if len({column.samples for column in asked}) > 1:
             lengths = ", ".join(f"{name!r} {column.samples}" for name, column in zip(channels, asked))
             raise RecordingError(
@@ -178,12 +184,16 @@ def together(recording: Recording, channels: Sequence[str] | None) -> list[Colum
                 argument="channels",
                 samples=[column.samples for column in asked],
             )
-        length = asked[0].samples
+        group, length = asked[0].group, asked[0].samples
+    elif timed := [
+        column for column in everything if column.group and column.name in (time, split_unit(time or "")[0])
+    ]:
+        group, length = timed[0].group, timed[0].samples
     else:
-        values: Counter[int | None] = Counter()
+        values: Counter[tuple[str, int | None]] = Counter()
         for column in everything:
-            values[column.samples] += 1 if column.samples is None else column.samples
-        length = max(values, key=lambda samples: values[samples], default=0)
+            values[column.group, column.samples] += 1 if column.samples is None else column.samples
+        group, length = max(values, key=lambda shared: values[shared], default=("", 0))
     if length is not None and length < 2:
         raise RecordingError(
             "channel-missing",
@@ -191,7 +201,21 @@ def together(recording: Recording, channels: Sequence[str] | None) -> list[Colum
             "check that the recording is complete",
             path=str(recording.path),
         )
-    return [column for column in everything if column.samples == length]
+    return [column for column in everything if (column.group, column.samples) == (group, length)]
+
+
+def check_groups(names: Sequence[str], columns: Sequence[Column]) -> None:
+    """RecordingError if the columns do not share their clock."""
+    groups = [column.group for column in columns]
+    if len(set(groups)) > 1:
+        listed = ", ".join(f"{name!r} in {group!r}" for name, group in zip(names, groups))
+        raise RecordingError(
+            "clocks-differ",
+            f"the channels are sampled by different clocks ({listed})",
+            "name channels of one group",
+            argument="channels",
+            groups=groups,
+        )
 
 
 def reasons(recording: Recording) -> str:

@@ -40,6 +40,10 @@ class Column:
         True for dates and durations: usable as time only, read as int64 nanoseconds.
     key
         Where the values are, for the format's own use.
+    group
+        What it is sampled with, where the format defines it: columns of two groups have clocks of their own.
+    clock
+        True for the time column of its group.
     """
 
     name: str
@@ -48,6 +52,8 @@ class Column:
     aliases: tuple[str, ...] = ()
     temporal: bool = False
     key: Any = field(default=None, repr=False, compare=False)
+    group: str = ""
+    clock: bool = False
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from livebode.sources.recording import Chunk, Column, Skipped
+from livebode.sources.recording import Chunk, Column
 
 
 @dataclass(frozen=True)
@@ -51,20 +51,15 @@ def split(same: Sequence[int], chunk: Chunk) -> list[int]:
     return [first.setdefault(key, at) for at, key in enumerate(zip(same, contents, strict=True))]
 
 
-def as_columns(groups: Sequence[TimedColumns]) -> tuple[list[Column], list[Skipped]]:
-    """Columns of every length; of groups of one length only the first, because a Log takes them for simultaneous."""
+def as_columns(groups: Sequence[TimedColumns]) -> list[Column]:
+    """The columns with their lengths; several groups have clocks of their own, named after their first channel."""
     columns: list[Column] = []
-    skipped: list[Skipped] = []
-    taken: dict[int, TimedColumns] = {}
     for group in groups:
-        if group.samples in taken:
-            other = taken[group.samples].channels[0].name
-            skipped += [Skipped(column.name, f"its times differ from those of {other!r}") for column in group.channels]
-            continue
-        taken[group.samples] = group
-        time = group.time if not columns else replace(group.time, name=f"{group.channels[0].name}.{group.time.name}")
-        columns += [replace(column, samples=group.samples) for column in (time, *group.channels)]
-    return columns, skipped
+        first = group.channels[0].name if len(groups) > 1 else ""
+        name = f"{first}.{group.time.name}" if columns else group.time.name
+        time = replace(group.time, name=name, clock=True)
+        columns += [replace(column, samples=group.samples, group=first) for column in (time, *group.channels)]
+    return columns
 
 
 def trimmed(chunks: Iterator[Chunk], samples: int | None) -> Iterator[Chunk]:

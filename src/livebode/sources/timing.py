@@ -79,7 +79,8 @@ class Clock:
 def find_time(columns: Sequence[Column], time: str | None) -> tuple[Column | None, str]:
     """The time column among `columns` and the unit that the user gave for it.
 
-    `time` None finds one by name, "none" uses none, anything else is the name of one, "name [unit]" with its unit.
+    `time` None takes the clock of the group, else finds one by name; "none" uses none; anything else is the name of
+    one, "name [unit]" with its unit.
 
     >>> find_time([Column("u"), Column("Zeit", "ms")], None)[0].name
     'Zeit'
@@ -87,6 +88,8 @@ def find_time(columns: Sequence[Column], time: str | None) -> tuple[Column | Non
     'us'
     """
     if time is None:
+        if clock := next((column for column in columns if column.clock), None):
+            return clock, ""
         ranked = sorted((rank, at) for at, column in enumerate(columns) if (rank := time_rank(column)) is not None)
         return (columns[ranked[0][1]] if ranked else None), ""
     if time.casefold() == "none":

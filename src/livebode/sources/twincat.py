@@ -31,8 +31,7 @@ class TwinCatRecording(DelimitedRecording):
         super().__init__(path)
         groups = timed_columns(self._properties)
         times = super().chunks([group.time for group in groups], 1 << 16)
-        columns, skipped = as_columns(merged(groups, times))
-        self.columns, self.skipped = tuple(columns), tuple(skipped)
+        self.columns, self.skipped = tuple(as_columns(merged(groups, times))), ()
 
     def find_dialect(self, path: Path) -> Dialect:
         """The dialect as the export defines it: the delimiter behind "Name", one column for each cell of that row."""

@@ -196,9 +196,9 @@ class FollowSource(LiveSource):
     def _segment(self, path: Path, seen: str, counted: int) -> int | None:
         """Deliver one recording whose rows are counted from `counted`; the count after it, None if unreadable."""
         try:
-            log = open_log(
-                path, rate_hz=self.settings.rate_hz or self._sequencer.schema.rate_hz, time=self.settings.time
-            )
+            given = self.settings
+            rate_hz = given.rate_hz or self._sequencer.schema.rate_hz
+            log = open_log(path, rate_hz=rate_hz, time=given.time, dbc=given.dbc)
             labels, mark = log.channels, FolderMark(path.name, checksum(path), seen, counted, log.timing is not None)
             self._announce(labels, log.rate_hz)
             held: Batch | None = None

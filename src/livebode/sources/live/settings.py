@@ -25,7 +25,7 @@ TAKEN: dict[str, set[str]] = {
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
 }
 """Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
-LOG = {"log", "time", "rate_hz", "follow"}
+LOG = {"log", "time", "rate_hz", "follow", "dbc"}
 EVERY = {"timeout_s", "kinds"}
 
 
@@ -42,6 +42,8 @@ class SourceSettings(BaseModel):
     clock
         What the time column of a recording counts. "utc": seconds since 1970. "relative": seconds since any other
         moment. Default: by its first value.
+    dbc
+        DBC file that defines the signals of a recording of CAN frames, relative to this file.
     follow
         The recording grows: a text table, or a directory of recordings.
     url
@@ -100,6 +102,7 @@ class SourceSettings(BaseModel):
     log: File | None = None
     time: str | None = None
     clock: ClockKind | None = None
+    dbc: File | None = None
     follow: bool = False
     url: str | None = None
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
