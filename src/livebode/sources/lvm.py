@@ -62,7 +62,7 @@ class LvmRecording(DelimitedRecording):
 
     def _named(self) -> list[Column]:
         units = self._tags.get("Y_Unit_Label", [])
-        horizontal = "s" if self._tag("X_Dimension", "Time").casefold() == "time" else ""
+        horizontal = {"time": "s"}.get(self._tag("X_Dimension", "Time").casefold(), "")
         return [
             Column(name, horizontal if name == TIME else units[at] if at < len(units) else "", key=at)
             for at, name in enumerate(self._dialect.headings)

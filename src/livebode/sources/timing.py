@@ -166,7 +166,7 @@ def rate_in_column(column: Column, chunks: Iterator[Chunk]) -> tuple[float, str]
     if known is None or known <= 0 or scale is None:
         return None
     is_period = re.split(r"[./]", column.name)[-1].casefold() in PERIOD_NAMES
-    unit = column.unit or ("s" if is_period else "Hz")
+    unit = column.unit or {True: "s", False: "Hz"}[is_period]
     rate_hz = exact_rate_hz(known * scale, 0.0) if is_period else known * scale
     return rate_hz, f"column {column.name!r} in {unit}, which has one value"
 
