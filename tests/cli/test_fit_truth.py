@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from livebode.records import RunRecord
 from livebode.simulation import BeltAxis, Mechanics, Sensor, SimulatedAxis, Standstill
 from tests.support.axes import MULTISINE
 from tests.support.command import livebode
@@ -80,7 +81,8 @@ def test_a_run_is_fitted_afterwards(machine: Path) -> None:
     result = livebode("fit", out, "--model", "two-mass", "--radius", 0.019, "--json")
     assert result.code == 0
     found = json.loads(result.out)
-    assert found["fitted_to"].startswith("the average up to")
+    end_s = (RunRecord.open(out).responses().sample[-1] + 1) / 4000
+    assert found["fitted_to"].startswith(f"the average up to {end_s:.6g} s")
     assert found["band_hz"] == [20.0, 140.0]
     for name, truth in (("Js", 0.0028), ("mL", 6.7), ("Keff", 5e5), ("bs", 130.0)):
         quantity = found["quantities"][name]

@@ -65,7 +65,7 @@ def averaged(run: RunRecord) -> Averaged:
         counted.add(part)
     one, words = mean.response()[0], f"the mean of {mean.rows} responses"
     if mean.averages:
-        words = f"the average up to {one.time_s:.6g} s"
+        words = f"the average up to {counted.begin_s + (one.sample + 1) / run.lines.rate_hz:.6g} s"
     found = Averaged(
         one,
         run.kinds,
@@ -90,11 +90,15 @@ class _Counted:
     def __init__(self, run: RunRecord) -> None:
         self._window, self._hop = run.lines.window, int(run.found.get("hop", run.lines.window))
         self._movement, self.moved = Movement(max(1, self._window // self._hop)), False
+        self._rate_hz, self.begin_s = run.lines.rate_hz, np.nan
         self.rows, self.incomplete = 0, 0
         self.valid = np.zeros(len(run.lines), dtype=np.int64)
         self.spans_s, self.spans = (np.nan, np.nan), (np.nan, np.nan)
 
     def add(self, part: Responses) -> None:
+        if not self.rows and len(part):
+            # The first response is of one window, whose time is its centre; of a later average it is not.
+            self.begin_s = float(part.time_s[0] - (part.first[0] + part.sample[0]) / 2 / self._rate_hz)
         self.rows += len(part)
         self.valid += np.count_nonzero(part.valid, axis=0)
         self.incomplete += int(np.count_nonzero(~part.valid.all(axis=1)))
