@@ -44,7 +44,7 @@ from tests.support.recordings import (
 )
 
 MODULES = sorted(WRITERS)
-MAY_END_ANYWHERE = "asc", "delimited", "ulog"
+MAY_END_ANYWHERE = "asc", "delimited", "lvm", "twincat", "ulog"
 """A table may end after any row, and a flight recorder when its battery is removed."""
 ROUNDS = int(os.environ.get("LIVEBODE_FUZZ_ROUNDS", "150"))
 """Damaged files of each kind; raise it for a campaign."""
@@ -330,7 +330,23 @@ def test_hdf5_without_its_library_names_the_extra(tmp_path, monkeypatch):
 
 
 @settings(max_examples=ROUNDS, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.binary(max_size=600), st.sampled_from(["", "PAR1", "ARROW1\0\0", "PK\x03\x04", "<", "t,u\n0,1\n", "\ufeff"]))
+@given(
+    st.binary(max_size=600),
+    st.sampled_from(
+        [
+            "",
+            "PAR1",
+            "ARROW1\0\0",
+            "PK\x03\x04",
+            "<",
+            "t,u\n0,1\n",
+            "#t,u\n0,1\n",
+            "\ufeff",
+            "Name\tscope\nFile\tx\nName\tu\n0\t1\n",
+            "LabVIEW Measurement\nX_Value\tu\n0\t1\n",
+        ]
+    ),
+)
 def test_any_bytes_are_read_or_refused(tmp_path, content, head):
     path = text(tmp_path, head.encode() + content, "log.csv")
     survives(path, rate_hz=1000)

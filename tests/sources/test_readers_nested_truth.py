@@ -37,15 +37,66 @@ def test_paths_into_structs(dspace_path):
     log = open_log(dspace_path)
     assert log.rate_hz == 4000
     assert "rec.X.Data" in log.rate_origin
-    assert [(c.name, c.unit) for c in log.channels if "Y" in c.name] == [
-        ("rec.Y(1).Data", "rad/s"),
-        ("rec.Y(2).Data", "A"),
-    ]
+    assert [(c.name, c.unit) for c in log.channels] == [("rec.X.Data", ""), ("omega", "rad/s"), ("iq", "A")]
     truth = np.arange(100) / 4000 * 3
     for name in ("rec.Y(2).Data", "Model Root/Current/iq", "iq", "rec(1).Y(2).Data"):
         np.testing.assert_array_equal(values(log, name), truth)
     assert values(log, "rec(1).X(1).Data")[1] == 1 / 4000
-    assert log.aliases["omega"] == "rec.Y(1).Data"
+    assert log.aliases["rec.Y(1).Data"] == "omega"
+
+
+@pytest.mark.parametrize(
+    ("names", "channels"),
+    [
+        (["enc1 (mm)", "Model/Axis/enc2 (mm/s)"], [("enc1", "mm"), ("enc2", "mm/s")]),
+        (["Axis 1/enc (mm)", "Axis 2/enc (mm)"], [("rec.Y(1).Data", "mm"), ("rec.Y(2).Data", "mm")]),
+        (["", "enc"], [("rec.Y(1).Data", ""), ("enc", "")]),
+    ],
+)
+def test_names_that_a_person_gave_are_shown_with_their_units(tmp_path, names, channels):
+    given = dspace(100)
+    for element, name in zip(given["rec"]["Y"][0, 0][0], names):
+        element["Name"], element["Unit"] = name, ""
+    scipy.io.savemat(tmp_path / "rec.mat", given)
+    log = open_log(tmp_path / "rec.mat")
+    assert [(c.name, c.unit) for c in log.channels][1:] == channels
+    for at, name in enumerate(names, start=1):
+        for other in filter(None, [name, f"rec.Y({at}).Data", channels[at - 1][0]]):
+            np.testing.assert_array_equal(values(log, other), np.arange(100) / 4000 * (at + 1))
+
+
+@QUICK
+@given(st.tuples(st.integers(1, 4), st.integers(1, 4)), st.integers(5, 60), st.sampled_from(["C", "F"]))
+def test_arrays_of_three_axes_are_named_by_their_indices(tmp_path, widths, samples, order):
+    a, b = widths
+    data = np.array(np.arange(float(a * b * samples)).reshape(a, b, samples), order=order)
+    scipy.io.savemat(tmp_path / "a.mat", {"Y": data})
+    with h5py.File(tmp_path / "b.mat", "w", userblock_size=512) as file:
+        file.create_dataset("Y", data=data.transpose()).attrs["MATLAB_class"] = np.bytes_("double")
+    with (tmp_path / "b.mat").open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    np.savez(tmp_path / "a.npz", Y=data)
+    for name in ("a.mat", "b.mat", "a.npz"):
+        log = open_log(tmp_path / name, rate_hz=1)
+        expected = {f"Y({i + 1},{j + 1})": data[i, j] for i in range(a) for j in range(b)}
+        expected = {"Y": data[0, 0]} if len(expected) == 1 else expected
+        assert {channel.name for channel in log.channels} == expected.keys()
+        for channel, truth in expected.items():
+            np.testing.assert_array_equal(values(log, channel), truth)
+
+
+def test_an_array_of_three_axes_with_time_between_the_others(tmp_path):
+    data = np.arange(2.0 * 50 * 3).reshape(2, 50, 3)
+    for order in ("C", "F"):
+        np.savez(tmp_path / "a.npz", Y=np.array(data, order=order))
+        np.testing.assert_array_equal(values(open_log(tmp_path / "a.npz", rate_hz=1), "Y(2,3)"), data[1, :, 2])
+
+
+def test_an_array_of_too_many_series_is_skipped(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"Y": np.zeros((9, 9, 100)), "u": np.arange(100.0)})
+    log = open_log(tmp_path / "a.mat", rate_hz=1)
+    assert [channel.name for channel in log.channels] == ["u"]
+    assert "at most 64 series" in log.skipped[0].reason
 
 
 @QUICK

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import RecordingError
+from livebode.preparation.inspection import inspect
 from livebode.sources import Log, open_log
 from tests.support.errors import refused
 
@@ -141,3 +142,52 @@ def test_a_rate_in_the_metadata_is_used(tmp_path):
     pq.write_table(table, tmp_path / "a.parquet")
     log = open_log(tmp_path / "a.parquet")
     assert (log.rate_hz, log.rate_origin) == (4000, "'rate_hz' in the file")
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells", "rate_hz"),
+    [
+        ("Fs", ["4000"] * 5, 4000),
+        ("fs (kHz)", ["4"] * 5, 4000),
+        ("Ts", ["0.00025"] * 5, 4000),
+        ("Tvz [ms]", ["0.25", "", "", "", ""], 4000),
+        ("Abtastzeit [s]", ["2.5e-4"] * 5, 4000),
+    ],
+)
+def test_a_column_of_one_value_named_as_rate_or_period_gives_the_rate(tmp_path, heading, cells, rate_hz):
+    path = tmp_path / "log.csv"
+    path.write_text(f"u,{heading}\n" + "".join(f"{k},{cell}\n" for k, cell in enumerate(cells)), encoding="utf-8")
+    log = open_log(path)
+    assert log.rate_hz == rate_hz
+    assert log.rate_origin.startswith(f"column {heading.split()[0]!r} in")
+    assert open_log(path, rate_hz=50).rate_hz == 50
+
+
+@pytest.mark.parametrize(
+    "column", ["Ts\n1,2\n2,3\n3,4\n", "Fs [V]\n1,5\n2,5\n3,5\n", "Fs\n1,-5\n2,-5\n", "rate\n1,5\n2,5\n"]
+)
+def test_a_column_that_is_no_rate_gives_none(tmp_path, column):
+    path = tmp_path / "log.csv"
+    path.write_text(f"u,{column}", encoding="utf-8")
+    with refused(RecordingError, "rate-missing", argument="rate_hz"):
+        open_log(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("u,v\n1,2\n2,3\n3,5\n", "has neither"),
+        ("t,u,v\n0,1,2\n9,2,3\n18,3,5\n", "has no unit"),
+        ("t,u,v\n0,1,2\n0,2,3\n0,3,5\n", "repeats"),
+    ],
+)
+def test_inspect_lists_the_channels_of_a_recording_without_a_rate(tmp_path, text, reason):
+    path = tmp_path / "log.csv"
+    path.write_text(text, encoding="utf-8")
+    found = inspect(path)
+    plain = found.plain()
+    assert [channel["name"] for channel in plain["channels"]][-2:] == ["u", "v"]
+    assert (plain["rate_hz"], plain["duration_s"], plain["samples"]) == (None, None, 3)
+    assert reason in plain["without_rate"]
+    with pytest.raises(RecordingError):
+        inspect(path, excitation="u")

@@ -93,6 +93,80 @@ def write_mdf(path: Path, signals: Signals) -> None:
         file.save(path, overwrite=True, compression=2)
 
 
+def write_lvm(path: Path, signals: Signals) -> None:
+    """Without a column of time; where the signals have none the increment gives the rate."""
+    width = len(signals)
+    delta = f"Delta_X\t{1 / RATE_HZ!r}" if "t" not in signals else "Samples\t1"
+    lines = [
+        "LabVIEW Measurement\t",
+        "Separator\tTab",
+        "Decimal_Separator\t.",
+        "X_Columns\tNo",
+        "***End_of_Header***\t",
+    ]
+    lines += ["\t", f"Channels\t{width}", delta, "***End_of_Header***", "\t".join(["X_Value", *signals, "Comment"])]
+    rows = ["\t".join(["", *map(repr, map(float, row))]) for row in zip(*signals.values())]
+    path.write_text("\r\n".join([*lines, *rows]) + "\r\n", encoding="utf-8", newline="")
+
+
+def write_twincat(path: Path, signals: Signals) -> None:
+    """An export with one time column in ms for all channels; where none is given it is that of the rate."""
+    time = signals.get("t", np.arange(len(next(iter(signals.values())))) / RATE_HZ)
+    given = {name: values for name, values in signals.items() if name != "t"}
+    write_scope(path, [(time, {name: ("", values) for name, values in given.items()})])
+
+
+def write_scope(
+    path: Path,
+    groups: list[tuple[NDArray[np.float64], dict[str, tuple[str, NDArray[np.float64]]]]],
+    delimiter: str = "\t",
+    decimal: str = ".",
+    end: str = "",
+) -> None:
+    """An export of TwinCAT Scope: for each group its times in s, and its channels with unit and values.
+
+    The longest group must come first: a line ends behind the last group that still has samples.
+    """
+    properties = {
+        "Name": "{name}",
+        "SymbolComment": "",
+        "Data-Type": "REAL64",
+        "SampleTime[ms]": "0,25",
+        "SymbolName": "MAIN.{name}",
+        "Unit": "{unit}",
+    }
+    lines = [
+        f"Name{delimiter}scope 1",
+        f"File{delimiter}C:\\scope.csv",
+        f"Starttime of export{delimiter}132959733843760000",
+    ]
+    lines += ["", ""]
+    for key, text in properties.items():
+        lines.append(
+            delimiter.join(
+                cell
+                for _, channels in groups
+                for cell in [
+                    key,
+                    *(
+                        text.format(name=name, unit=f"{unit} (Quantity)" if unit else "(None)")
+                        for name, (unit, _) in channels.items()
+                    ),
+                ]
+            )
+        )
+    lines.append("")
+    for row in range(len(groups[0][0])):
+        cells = [
+            cell
+            for time, channels in groups
+            if row < len(time)
+            for cell in [f"{1000 * time[row]:.9g}", *(repr(float(values[row])) for _, values in channels.values())]
+        ]
+        lines.append(delimiter.join(cells).replace(".", decimal))
+    path.write_text("\n".join([*lines, end] if end else lines) + "\n", encoding="utf-8")
+
+
 def base85(values: NDArray[np.float64]) -> str:
     """Python's base-85 of the same groups of four bytes, in the alphabet of the control."""
     text = base64.b85encode(values.astype(">f8").tobytes())
@@ -213,6 +287,8 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "tdms": (".tdms", write_tdms),
     "mdf": (".mf4", write_mdf),
     "sinumerik": (".xml", write_sinumerik),
+    "lvm": (".lvm", write_lvm),
+    "twincat": (".csv", write_twincat),
     "ulog": (".ulg", write_ulog),
     "wav": (".wav", write_wav),
     "blf": (".blf", partial(write_frames, can.BLFWriter)),
@@ -238,6 +314,7 @@ CLOCKS = {
     "mcap": "/log.header.stamp",
     "mdf": "t",
     "rosbag": "/log.header.stamp",
+    "twincat": "t",
     "ulog": "log.timestamp",
 }
 """The time column of formats that always have one."""

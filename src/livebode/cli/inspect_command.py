@@ -117,23 +117,25 @@ def _check(
 
 
 def _show_recording(found: Inspection, console: Console) -> None:
-    log = found.log
-    console.print(
-        f"{log.path}: {log.format}, {found.samples} samples at {log.rate_hz:.9g} Hz ({log.rate_origin})", soft_wrap=True
-    )
-    gaps = f"{counted(found.gaps, 'gap')} ({found.missing} samples missing)" if found.gaps else "no gaps"
+    log, contents = found.log, found.contents
+    rate = "at an unknown rate" if found.without_rate else f"at {log.rate_hz:.9g} Hz ({log.rate_origin})"
+    console.print(f"{log.path}: {log.format}, {contents.samples} samples {rate}", soft_wrap=True)
+    gaps = f"{counted(contents.gaps, 'gap')} ({contents.missing} samples missing)" if contents.gaps else "no gaps"
     jitter = ""
     if log.timing is not None:
         jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"
-    console.print(f"{found.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
+    if found.without_rate:
+        console.print(f"no rate: {found.without_rate} (options --rate and --time)", soft_wrap=True)
+    else:
+        console.print(f"{contents.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
     if log.is_part:
-        stop = log.first + found.samples + found.missing
+        stop = log.first + contents.samples + contents.missing
         span = " … ".join(f"{log.origin_s + sample / log.rate_hz:.6g}" for sample in (log.first, stop))
         console.print(f"part: samples {log.first} to {stop - 1} of the recording ({span} s)", soft_wrap=True)
     table = Table(box=None, header_style="bold")
     for heading in ("channel", "unit", "kind", "from", "to", "not finite"):
         table.add_column(heading, justify="left" if heading in ("channel", "unit", "kind") else "right")
-    for channel in found.channels:
+    for channel in contents.channels:
         extent = [f"{x:.6g}" for x in (channel.minimum, channel.maximum)]
         if channel.minimum > channel.maximum:
             extent = ["empty", ""]
@@ -145,7 +147,7 @@ def _show_recording(found: Inspection, console: Console) -> None:
         console.width, Measurement.get(console, console.options.update(max_width=_WIDTH_MAX), table).maximum
     )
     console.print(table)
-    for skipped in log.skipped:
+    for skipped in found.skipped:
         console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")
     for clock, names in log.other_clocks.items():
         console.print(f"  on the clock --time '{clock}': {', '.join(names)}", style="dim", soft_wrap=True)

@@ -4,52 +4,52 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
-import numpy as np
-
-from livebode.core import Block, Lines, LivebodeError, QuantityKind, UsageError
+from livebode.core import Lines, LivebodeError, RecordingError, UsageError
 from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, pattern, recognise
+from livebode.preparation.contents import Contents, read_contents
 from livebode.preparation.part import chosen_part
 from livebode.preparation.plan import LIVE_RESPONSES_PER_S, SEARCHED, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
 from livebode.preparation.stretches import Stretch, stretches
 from livebode.sources import Log, open_log
+from livebode.sources.recording import Skipped
+
+_WITHOUT_RATE = tuple(
+    f"recording.{code}"
+    for code in ("rate-missing", "time-unit", "time-jitter", "time-irregular", "time-not-increasing", "time-not-finite")
+)
 
 
-@dataclass
-class ChannelSummary:
-    """One channel over the whole recording: range of its finite samples, and number of others."""
+class _Given(TypedDict):
+    """What `open_log` is given besides the rate."""
 
-    name: str
-    unit: str
-    kind: QuantityKind
-    minimum: float = float("inf")
-    maximum: float = float("-inf")
-    not_finite: int = 0
-
-    def take(self, block: Block) -> None:
-        samples = block[self.name]
-        finite = samples[np.isfinite(samples)]
-        self.not_finite += samples.size - finite.size
-        if finite.size:
-            self.minimum = min(self.minimum, float(finite.min()))
-            self.maximum = max(self.maximum, float(finite.max()))
+    time: str | None
+    dbc: Path | None
+    channels: list[str] | None
 
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """Result of `livebode inspect`; `unrecognised`: why an excitation next to a silent stretch is not recognised."""
+    """Result of `livebode inspect`.
+
+    `unrecognised`: why an excitation next to a silent stretch is not recognised. `without_rate`: why the recording has
+    no rate; the rate of `log` has no meaning then.
+    """
 
     log: Log
-    samples: int
-    channels: list[ChannelSummary]
-    gaps: int
-    missing: int
+    contents: Contents
     excitation: Excitation | None
     quiet: Quiet | None = None
     unrecognised: str = ""
+    without_rate: str = ""
+
+    @property
+    def skipped(self) -> tuple[Skipped, ...]:
+        """What is not a channel, and why."""
+        return (*self.log.skipped, *self.contents.unreadable)
 
     @property
     def live_hop(self) -> int:
@@ -61,27 +61,29 @@ class Inspection:
     def stretches(self) -> list[Stretch]:
         """Parts of the recording by what a run does with them; of the searched beginning of a long recording."""
         assert self.excitation is not None
-        searched = min(self.samples + self.missing, SEARCHED)
+        searched = min(self.contents.samples + self.contents.missing, SEARCHED)
         return stretches(self.excitation, self.log.first, searched)
 
     def plain(self) -> dict[str, Any]:
         """As plain data, for JSON."""
-        log, found = self.log, self.excitation
+        log, found, contents = self.log, self.excitation, self.contents
         plain: dict[str, Any] = {
             "log": str(log.path),
             "format": log.format,
-            "rate_hz": log.rate_hz,
-            "rate_from": log.rate_origin,
-            "samples": self.samples,
-            "duration_s": self.samples / log.rate_hz,
-            "gaps": self.gaps,
-            "missing_samples": self.missing,
+            "rate_hz": None if self.without_rate else log.rate_hz,
+            "rate_from": None if self.without_rate else log.rate_origin,
+            "samples": contents.samples,
+            "duration_s": None if self.without_rate else contents.samples / log.rate_hz,
+            "gaps": contents.gaps,
+            "missing_samples": contents.missing,
             "part": {"first": log.first, "stop": log.stop},
             "timing": asdict(log.timing) if log.timing else None,
-            "channels": [asdict(channel) for channel in self.channels],
-            "skipped": [asdict(skipped) for skipped in log.skipped],
+            "channels": [asdict(channel) for channel in contents.channels],
+            "skipped": [asdict(skipped) for skipped in self.skipped],
             "other_clocks": {clock: list(names) for clock, names in log.other_clocks.items()},
         }
+        if self.without_rate:
+            plain["without_rate"] = self.without_rate
         if self.quiet is not None:
             plain["without_excitation"] = self.quiet.plain()
         if found is not None:
@@ -131,21 +133,15 @@ def inspect(
         If it cannot be read, has no periodic signal, or the part has no samples.
     """
     required = [name for name in (excitation, output, input) if name is not None]
-    log = open_log(path, rate_hz=rate_hz, time=time, dbc=dbc, channels=required[:1] or None)
+    given: _Given = {"time": time, "dbc": dbc, "channels": required[:1] or None}
+    needs_rate = bool(excitation or lines or begin is not None or end is not None or skip_periods)
+    log, without_rate = open_with_or_without_rate(path, rate_hz, given, needs_rate=needs_rate)
     log = chosen_part(log, begin, end, skip_periods, lambda part: _periods_in(part, excitation))
     known = {channel.name for channel in log.channels}
     # A channel given by a path or an alias is listed by that name.
     extra = [name for name in dict.fromkeys(required) if name not in known]
     names = [channel.name for channel in log.channels] + extra
-    summaries: dict[str, ChannelSummary] = {}
-    samples, gaps, missing, stop = 0, 0, 0, None
-    for block in log.blocks(names):
-        for channel in block.channels:
-            summaries.setdefault(channel.name, ChannelSummary(channel.name, channel.unit, channel.kind)).take(block)
-        samples += len(block)
-        if stop is not None and (block.gap or block.start != stop):
-            gaps, missing = gaps + 1, missing + block.start - stop
-        stop = block.stop
+    contents = read_contents(log, names, required)
     found, quiet = None, None
     if lines is not None:
         signals = [name for name in (output, input) if name is not None]
@@ -159,7 +155,17 @@ def inspect(
             if quiet is None:
                 raise
             unrecognised = str(error)
-    return Inspection(log, samples, list(summaries.values()), gaps, missing, found, quiet, unrecognised)
+    return Inspection(log, contents, found, quiet, unrecognised, without_rate)
+
+
+def open_with_or_without_rate(path: Path, rate_hz: float | None, given: _Given, *, needs_rate: bool) -> tuple[Log, str]:
+    """The log, and why it has no rate (empty if it has one); the channels can be listed without."""
+    try:
+        return open_log(path, rate_hz=rate_hz, **given), ""
+    except RecordingError as error:
+        if needs_rate or rate_hz is not None or error.code not in _WITHOUT_RATE:
+            raise
+        return open_log(path, rate_hz=1.0, **(given | {"time": "none"})), str(error)
 
 
 def _periods_in(log: Log, excitation: str | None) -> tuple[int, int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -16,12 +17,12 @@ WIDTH_MAX = 64
 
 @dataclass(frozen=True)
 class Slot:
-    """One series in an array: the array's name, its shape, which axis is time, and the index on the other axis."""
+    """One series in an array: the array's name, its shape, which axis is time, and the index on each other axis."""
 
     array: str
     shape: tuple[int, ...]
     time_axis: int
-    index: int
+    others: tuple[int, ...] = ()
 
     @property
     def samples(self) -> int:
@@ -30,14 +31,22 @@ class Slot:
     def at(self, first: int, last: int) -> tuple[int | slice, ...]:
         """Index expression of samples `first` … `last` − 1.
 
-        >>> Slot("y", (3, 100), 1, 2).at(10, 20)
-        (2, slice(10, 20, None))
+        >>> Slot("y", (3, 100, 2), 1, (2, 0)).at(10, 20)
+        (2, slice(10, 20, None), 0)
         """
-        place: list[int | slice] = [0] * len(self.shape)
-        if len(self.shape) == 2:
-            place[1 - self.time_axis] = self.index
-        place[self.time_axis] = slice(first, last)
-        return tuple(place)
+        if not self.shape:
+            return ()
+        return (*self.others[: self.time_axis], slice(first, last), *self.others[self.time_axis :])
+
+    def strides(self, *, fortran: bool) -> tuple[int, int]:
+        """Number of its first value in the array as stored, and of values from one sample to the next.
+
+        >>> Slot("y", (3, 100, 2), 1, (2, 1)).strides(fortran=False)
+        (401, 2)
+        """
+        steps = [math.prod(self.shape[:at] if fortran else self.shape[at + 1 :]) for at in range(len(self.shape))]
+        step = steps.pop(self.time_axis) if steps else 1
+        return sum(index * size for index, size in zip(self.others, steps, strict=True)), step
 
 
 def array_columns(
@@ -45,12 +54,17 @@ def array_columns(
 ) -> tuple[list[Column], Skipped | None]:
     """The columns in the array called `array`, or the reason why there are none.
 
-    Axes of length one do not count. A matrix has its time along the longer axis (`tie_axis` where both are equal) and
-    its columns are called name(1), name(2), … A unit in the array's name is taken where `unit` is empty.
+    An array has its time along the longest axis; where several are, a matrix along `tie_axis`. Its series are called
+    name(1), name(2), … or name(1,2) by the index on each other axis, in reverse order with `tie_axis` 1, which is that
+    of MATLAB's files in HDF5. If only one axis is longer than one, the series has no index. A unit in the array's name
+    is taken where `unit` is empty.
 
     >>> columns, _ = array_columns("y", (1000, 2), np.dtype("f8"), "m")
     >>> [(c.name, c.unit, c.samples) for c in columns]
     [('y(1)', 'm', 1000), ('y(2)', 'm', 1000)]
+    >>> columns, _ = array_columns("y", (2, 2, 1000), np.dtype("f8"))
+    >>> [c.name for c in columns]
+    ['y(1,1)', 'y(1,2)', 'y(2,1)', 'y(2,2)']
     """
     if dtype.kind not in "fiub":
         return [], Skipped(array, f"its values are of type {dtype}, not real numbers")
@@ -61,18 +75,17 @@ def array_columns(
     long = [axis for axis, length in enumerate(shape) if length > 1]
     if len(long) <= 1:
         time_axis = long[0] if long else 0
-        slot = Slot(array, shape, time_axis, 0)
+        slot = Slot(array, shape, time_axis, (0,) * (len(shape) - 1))
         return [Column(name, unit, math.prod(shape), aliases, key=slot)], None
-    if len(shape) != 2 or min(shape) > WIDTH_MAX:
+    longest = [axis for axis, length in enumerate(shape) if length == max(shape)]
+    time_axis = longest[-1] if (len(shape) == 2) == (tie_axis == 1) else longest[0]
+    widths = [length for axis, length in enumerate(shape) if axis != time_axis]
+    if math.prod(widths) > WIDTH_MAX:
         return [], Skipped(array, f"its shape {shape} is neither a series nor at most {WIDTH_MAX} series side by side")
-    time_axis = tie_axis if shape[0] == shape[1] else int(shape[1] > shape[0])
-    return [
-        Column(
-            f"{name}({index + 1})",
-            unit,
-            shape[time_axis],
-            tuple(f"{alias}({index + 1})" for alias in aliases),
-            key=Slot(array, shape, time_axis, index),
-        )
-        for index in range(shape[1 - time_axis])
-    ], None
+    columns = []
+    for others in product(*map(range, widths)):
+        index = f"({','.join(str(at + 1) for at in (reversed(others) if tie_axis else others))})"
+        named = tuple(f"{alias}{index}" for alias in aliases)
+        slot = Slot(array, shape, time_axis, others)
+        columns.append(Column(f"{name}{index}", unit, shape[time_axis], named, key=slot))
+    return columns, None

@@ -51,9 +51,23 @@ def zoned(cell: str) -> bool:
     return bool(match and match["zone"])
 
 
+def is_word(cell: str) -> bool:
+    """True for text that is not a damaged number.
+
+    >>> is_word("ANGLE_MODE|HORIZON"), is_word("1.2.3"), is_word("-")
+    (True, False, False)
+    """
+    return cell[:1].isalpha() and cell not in EMPTY and not is_number(cell)
+
+
 def kind_of(cells: list[str], decimal: str) -> CellKind:
-    """Content of a column: text only if no cell is a value, so that text among numbers is detected as an error."""
+    """Content of a column: text if no cell is a value, or if several are words (flags, some of them 0).
+
+    One word, or damaged numbers, among numbers are not a column of text but an error in one line.
+    """
     filled = [cell for cell in cells if cell not in EMPTY]
+    if sum(map(is_word, filled)) > 1:
+        return CellKind.TEXT
     if any(is_number(cell, decimal) for cell in filled) or not filled:
         return CellKind.NUMBER
     return CellKind.MOMENT if any(is_moment(cell) for cell in filled) else CellKind.TEXT

@@ -15,7 +15,7 @@ from pyarrow import csv
 from livebode.core import RecordingError
 from livebode.sources.cells import EMPTY, CellKind
 from livebode.sources.columnar import to_numpy
-from livebode.sources.dialect import find_dialect
+from livebode.sources.dialect import Dialect, find_dialect
 from livebode.sources.locate import locate
 from livebode.sources.recording import Chunk, Column, Recording, Skipped
 from livebode.sources.tidy import Tidied
@@ -32,7 +32,7 @@ class DelimitedRecording(Recording):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._dialect = find_dialect(path)
+        self._dialect = self.find_dialect(path)
         columns: list[Column] = []
         skipped: list[Skipped] = []
         headings = self._dialect.headings
@@ -45,6 +45,10 @@ class DelimitedRecording(Recording):
             elif headings[at]:
                 skipped.append(Skipped(name, "it contains text"))
         self.columns, self.skipped = tuple(columns), tuple(skipped)
+
+    def find_dialect(self, path: Path) -> Dialect:
+        """Layout of the table; a format that declares its own replaces this."""
+        return find_dialect(path)
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         del rows
@@ -61,7 +65,7 @@ class DelimitedRecording(Recording):
         """The values of `columns` in whole lines of the table; RecordingError where one of them does not fit it."""
         dialect = self._dialect
         try:
-            chunks = list(self._parsed(Tidied(io.BytesIO(lines), dialect.encoding, dialect.spaced), columns))
+            chunks = list(self._parsed(Tidied(io.BytesIO(lines), dialect), columns))
         except pa.ArrowInvalid as error:
             raise RecordingError("damaged", first_line(error), "repair the line") from None
         return [np.concatenate(parts) for parts in zip(*chunks)] if chunks else [np.empty(0) for _ in columns]
@@ -104,10 +108,10 @@ class DelimitedRecording(Recording):
     def _opened(self) -> Iterator[Any]:
         """The file from its first row of numbers, as bytes that Arrow can parse."""
         dialect = self._dialect
-        if dialect.spaced or dialect.commented or dialect.encoding.startswith("utf-16"):
+        if dialect.spaced or dialect.untidy or dialect.ragged or dialect.encoding.startswith("utf-16"):
             with self.path.open("rb") as raw:
                 raw.seek(dialect.offset)
-                yield io.BufferedReader(Tidied(raw, dialect.encoding, dialect.spaced), 1 << 20)
+                yield io.BufferedReader(Tidied(raw, dialect), 1 << 20)
         else:
             # Arrow reads ahead in its own threads. With pa.OSFile it would continue to read from a closed descriptor,
             # whose number may already belong to another file. A Python file raises an error instead.

@@ -6,11 +6,13 @@ import codecs
 import csv
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from livebode.core import RecordingError
 from livebode.sources.cells import EMPTY, CellKind, is_comment, is_value, kind_of, zoned
+from livebode.sources.comment_header import find_comment_header
 from livebode.sources.damage import oversized
 from livebode.sources.header import find_header, fits
 from livebode.sources.recording import COLUMNS_MAX
@@ -22,6 +24,9 @@ DELIMITERS = "\t", ";", ",", "|", " ", ""
 SEPARATOR = re.compile(r"sep=.\s*$", re.IGNORECASE)
 """Line that Excel writes above a table; it is skipped, because the table itself is more reliable."""
 COMMENT = re.compile(r"^[ \t]*[#%]", re.MULTILINE)
+BLANK = " \t\r\n\v\f\x1a"
+"""Characters of a line without content."""
+END_BYTES = 64
 UTF16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 
 
@@ -39,8 +44,10 @@ class Dialect:
         One for each column: its name including the unit, the unit from a row of units, and the kind of its values.
     zone
         Time zone of dates that contain one.
-    commented
-        True if there are comments between the rows.
+    untidy
+        True if there are comments between the rows, or a blank or Ctrl-Z at the end.
+    ragged
+        True if a line may lack its last cells.
     """
 
     delimiter: str
@@ -53,11 +60,19 @@ class Dialect:
     units: tuple[str, ...] = ()
     kinds: tuple[CellKind, ...] = ()
     zone: str | None = None
-    commented: bool = False
+    untidy: bool = False
+    ragged: bool = False
 
     @property
     def width(self) -> int:
         return len(self.headings)
+
+    def with_headings(self, headings: Sequence[str]) -> Dialect:
+        """The dialect of a table of numbers with these headings."""
+        width = len(headings)
+        if width > COLUMNS_MAX:
+            raise oversized(f"the table has {width} columns, more than {COLUMNS_MAX}", COLUMNS_MAX, columns=width)
+        return replace(self, headings=tuple(headings), units=("",) * width, kinds=(CellKind.NUMBER,) * width)
 
     def split(self, line: str) -> list[str]:
         """Cells of a line."""
@@ -79,11 +94,53 @@ class Line:
 
 @dataclass(frozen=True)
 class Layout:
-    """Result for one delimiter: its score, the dialect, and the first line of values."""
+    """Result for one delimiter: its score (the second part: it has a header), the dialect, the first line of values."""
 
     score: tuple[float, bool, int]
     dialect: Dialect
     start: Line
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The first lines of a text file, and its last bytes."""
+
+    path: Path
+    text: str
+    encoding: str
+    mark: int
+    lines: list[Line]
+    end: bytes
+
+    @classmethod
+    def of(cls, path: Path) -> Sample:
+        with path.open("rb") as file:
+            sample = file.read(SAMPLE_BYTES)
+            end = file.seek(max(0, path.stat().st_size - END_BYTES)) and file.read(END_BYTES)
+        encoding, mark = find_encoding(sample)
+        if not encoding.startswith("utf-16") and b"\0" in sample:
+            raise RecordingError(
+                "format-unknown", f"{path} contains binary data, not text", "check the name's ending", path=str(path)
+            )
+        text = sample[mark:].decode(encoding, "replace")
+        lines = find_lines(path, text, whole=len(sample) < SAMPLE_BYTES)
+        return cls(path, text, encoding, mark, lines, end or sample)
+
+    def placed(self, dialect: Dialect, start: Line) -> Dialect:
+        """The dialect with its encoding, and the place of its first row of values."""
+        offset = self.mark + len(self.text[: start.at].encode(self.encoding, "replace"))
+        untidy = COMMENT.search(self.text, start.at) is not None or ends_blank(self.end)
+        return replace(dialect, encoding=self.encoding, offset=offset, first_line=start.number, untidy=untidy)
+
+    def without_table(self) -> RecordingError:
+        first = self.lines[0].text[:40] if self.lines else ""
+        return RecordingError(
+            "table-missing",
+            f"{self.path} has no row of numbers in its first {SAMPLE_BYTES >> 10} KiB (it begins with {first!r})",
+            "check that this is a recording",
+            path=str(self.path),
+            beginning=first,
+        )
 
 
 def find_dialect(path: Path) -> Dialect:
@@ -94,34 +151,34 @@ def find_dialect(path: Path) -> Dialect:
     RecordingError
         Where there is no table of numbers in the first 256 KiB.
     """
-    with path.open("rb") as file:
-        sample = file.read(SAMPLE_BYTES)
-    encoding, mark = find_encoding(sample)
-    if not encoding.startswith("utf-16") and b"\0" in sample:
-        raise RecordingError(
-            "format-unknown", f"{path} contains binary data, not text", "check the name's ending", path=str(path)
-        )
-    text = sample[mark:].decode(encoding, "replace")
-    lines = find_lines(path, text, whole=len(sample) < SAMPLE_BYTES)
+    sample = Sample.of(path)
+    lines = sample.lines
     layouts = [layout for delimiter in DELIMITERS for decimal in ".," if (layout := lay_out(lines, delimiter, decimal))]
     if not layouts:
-        first = lines[0].text[:40] if lines else ""
-        raise RecordingError(
-            "table-missing",
-            f"{path} has no row of numbers in its first {len(sample)} bytes (it begins with {first!r})",
-            "check that this is a recording",
-            path=str(path),
-            beginning=first,
-        )
+        raise sample.without_table()
     best = max(layouts, key=lambda layout: layout.score)
     if best.dialect.width > COLUMNS_MAX:
         width = best.dialect.width
         raise oversized(
             f"{path} has {width} columns, more than {COLUMNS_MAX}", COLUMNS_MAX, path=str(path), columns=width
         )
-    offset = mark + len(text[: best.start.at].encode(encoding, "replace"))
-    commented = COMMENT.search(text, best.start.at) is not None
-    return replace(best.dialect, encoding=encoding, offset=offset, first_line=best.start.number, commented=commented)
+    above = sample.text[: best.start.at]
+    dialect = best.dialect if best.score[1] else with_comment_header(best.dialect, above)
+    return sample.placed(dialect, best.start)
+
+
+def ends_blank(end: bytes) -> bool:
+    """True if the last line of a text, from its last bytes, has blanks only, or ends with Ctrl-Z."""
+    last = end.rstrip(b"\r\n").rpartition(b"\n")[2]
+    return not last.strip(BLANK.encode()) or last.endswith(b"\x1a")
+
+
+def with_comment_header(dialect: Dialect, above: str) -> Dialect:
+    """The dialect with the names and units that the comments above its first row contain."""
+    comments = [line for line in above.splitlines() if is_comment(line)]
+    delimiter = " " if dialect.spaced else dialect.delimiter
+    header, units = find_comment_header(comments, dialect.width, delimiter)
+    return replace(dialect, headings=tuple(header), units=tuple(units) or dialect.units) if header else dialect
 
 
 def find_encoding(sample: bytes) -> tuple[str, int]:
@@ -141,8 +198,8 @@ def find_lines(path: Path, text: str, *, whole: bool) -> list[Line]:
     lines, at = [], 0
     for number, line in enumerate(text.splitlines(keepends=True) if "\r" not in text else split_ends(text), start=1):
         complete = whole or line.endswith(("\n", "\r"))
-        if complete and line.strip() and not is_comment(line) and not (number == 1 and SEPARATOR.match(line)):
-            lines.append(Line(number, at, line.rstrip("\r\n")))
+        if complete and line.strip(BLANK) and not is_comment(line) and not (number == 1 and SEPARATOR.match(line)):
+            lines.append(Line(number, at, line.rstrip("\r\n\x1a")))
         at += len(line)
         if len(lines) >= SAMPLE_LINES:
             break
@@ -171,6 +228,8 @@ def lay_out(lines: list[Line], delimiter: str, decimal: str) -> Layout | None:
         table = [(line, dialect.split(line.text)) for line in lines]
     except csv.Error:
         return None
+    if delimiter == "\t" and (mixed := with_blank_rows(table, decimal)):
+        dialect, table = replace(dialect, spaced=True), mixed
     numeric = [any(is_value(cell, decimal) for cell in cells) for _, cells in table]
     widths = Counter(len(cells) for (_, cells), any_ in zip(table, numeric) if any_)
     if not widths:
@@ -186,9 +245,29 @@ def lay_out(lines: list[Line], delimiter: str, decimal: str) -> Layout | None:
     share = round(values_share(columns, decimal) * fitting_share([cells for _, cells in table], kinds, decimal), 2)
     headings = tuple(heading or f"c{at}" for at, heading in enumerate(header or [""] * width, start=1))
     zone = "UTC" if any(zoned(cell) for cells in columns for cell in cells) else None
-    kinds = drop_trailing(kinds, header, columns)
+    if len(kinds) > 1 and not any(columns[-1]) and not (header and header[-1]):  # each line ends with a delimiter
+        kinds, headings = (*kinds[:-1], CellKind.TEXT), (*headings[:-1], "")
     dialect = replace(dialect, headings=headings, units=tuple(units or [""] * width), kinds=kinds, zone=zone)
     return Layout((share, bool(header), width), dialect, rows[0][0]) if rows else None
+
+
+def with_blank_rows(table: list[tuple[Line, list[str]]], decimal: str) -> list[tuple[Line, list[str]]]:
+    """The table with those rows split where blanks, not tabs, separate numbers; empty if that gives no equal rows.
+
+    LabVIEW programs write such a first row below their header, "0.0 0.0 0".
+    """
+    rows = [line.text.split() for line, _ in table]
+    odd = [len(cells) == 1 < len(words) and is_row(words, decimal) for (_, cells), words in zip(table, rows)]
+    if not any(odd):
+        return []
+    split = [(line, words if at_odd else cells) for (line, cells), words, at_odd in zip(table, rows, odd)]
+    values = [len(words) for words in rows if is_row(words, decimal)]
+    same = all(words == cells for (_, cells), words in zip(split, rows) if any(is_value(c, decimal) for c in cells))
+    return split if same and len(set(values)) == 1 else []
+
+
+def is_row(words: list[str], decimal: str) -> bool:
+    return all(is_value(word, decimal) for word in words)
 
 
 def values_share(columns: list[list[str]], decimal: str) -> float:
@@ -200,10 +279,3 @@ def values_share(columns: list[list[str]], decimal: str) -> float:
 def fitting_share(rows: list[list[str]], kinds: tuple[CellKind, ...], decimal: str) -> float:
     """Share of lines that fit the table; a wrong delimiter fits only some of them."""
     return sum(fits(cells, kinds, decimal) for cells in rows) / max(len(rows), 1)
-
-
-def drop_trailing(kinds: tuple[CellKind, ...], header: list[str], columns: list[list[str]]) -> tuple[CellKind, ...]:
-    """The kinds, with a last column that has neither heading nor values (a delimiter ends each line) as text."""
-    if len(kinds) > 1 and not any(columns[-1]) and not (header and header[-1]):
-        return (*kinds[:-1], CellKind.TEXT)
-    return kinds

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Channel
 from livebode.sources.quantities import Quantity, derivative, product, quotient, sum_of
-from livebode.sources.units import SQUARE
+from livebode.sources.units import split_unit
 
 Floats = NDArray[np.float64]
 
@@ -90,8 +90,7 @@ def parse_expression(text: str) -> Expression:
     """
     if len(text) > TEXT_MAX:
         raise ExpressionSyntaxError(f"it is longer than {TEXT_MAX} characters")
-    unit = SQUARE.match(text)
-    bare = unit["name"] if unit else text
+    bare, unit = split_unit(text) if text.endswith("]") else (text, "")
     quoted = {_STAND_IN.format(i): name for i, name in enumerate(dict.fromkeys(_QUOTED.findall(bare)))}
     stand_in = {name: key for key, name in quoted.items()}
     try:
@@ -104,7 +103,7 @@ def parse_expression(text: str) -> Expression:
     before = _check(tree, quoted, names, 0)
     if not names:
         raise ExpressionSyntaxError("there is no channel in it")
-    return Expression(text, tree, quoted, tuple(names), before, unit["unit"].strip() if unit else "")
+    return Expression(text, tree, quoted, tuple(names), before, unit)
 
 
 def negated(name: str) -> str:

@@ -49,11 +49,15 @@ def is_text(head: bytes) -> bool:
     """
     if head.startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return True
-    return bool(head) and not any(byte < 9 or 13 < byte < 27 for byte in head)
+    body = head.rstrip(b"\x1a\r\n")  # a text may end with Ctrl-Z
+    return bool(head) and not any(byte < 9 or 13 < byte < 27 for byte in body)
 
 
 def is_xml(head: bytes) -> bool:
     return head.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<")
+
+
+TWINCAT = re.compile(rb"(?:\xef\xbb\xbf)?Name[\t;,|][^\r\n]*\r?\nFile[\t;,|]")
 
 
 def is_wav(head: bytes) -> bool:
@@ -82,6 +86,8 @@ FORMATS = (
     Format("BLF", (".blf",), lambda head: head.startswith(b"LOGG"), "blf", takes_dbc=True),
     Format("ASC", (".asc",), lambda head: ASC_HEAD.match(head) is not None, "asc", takes_dbc=True),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
+    Format("TwinCAT Scope export", (".csv", ".txt"), lambda head: TWINCAT.match(head) is not None, "twincat"),
+    Format("LabVIEW LVM", (".lvm",), lambda head: head.startswith(b"LabVIEW Measurement"), "lvm"),
     Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, "delimited"),
 )  # fmt: skip
 """All formats; the first that matches reads the file."""

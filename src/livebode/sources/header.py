@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from livebode.sources.cells import EMPTY, CellKind, is_moment, is_number, is_value
+from livebode.sources.units import unbracketed
 
 
 def find_header(
@@ -23,7 +24,7 @@ def find_header(
         if fits(below, kinds, decimal):
             return at + 1, header, []
         if len(below) in lengths and no_values(below, decimal) and fits_at(table, at + 2, kinds, decimal):
-            return at + 2, header, [unit.strip("[]()-") for unit in padded(below, width)]
+            return at + 2, header, [unbracketed(unit) for unit in padded(below, width)]
     first = next(
         at for at, cells in enumerate(table) if len(cells) == width and any(is_value(cell, decimal) for cell in cells)
     )

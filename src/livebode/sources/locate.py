@@ -7,7 +7,7 @@ from pathlib import Path
 
 from livebode.core import RecordingError
 from livebode.sources.cells import EMPTY, CellKind, is_comment, is_moment, is_number
-from livebode.sources.dialect import Dialect
+from livebode.sources.dialect import BLANK, Dialect
 
 
 def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max: int) -> RecordingError | None:
@@ -19,7 +19,7 @@ def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max:
     with path.open("r", encoding=dialect.encoding, errors="replace", newline=None) as file:
         while line := file.readline(line_bytes_max + 1):
             number += 1
-            if number < dialect.first_line or not line.strip() or (dialect.commented and is_comment(line)):
+            if number < dialect.first_line or not line.strip(BLANK) or (dialect.untidy and is_comment(line)):
                 continue
             if len(line) > line_bytes_max:
                 return RecordingError(
@@ -37,6 +37,10 @@ def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max:
 
 def check_line(path: Path, dialect: Dialect, columns: Sequence[int], number: int, line: str) -> RecordingError | None:
     cells = dialect.split(line)
+    if dialect.ragged:
+        if cells == ["EOF"]:
+            return None
+        cells += [""] * (dialect.width - len(cells))
     if len(cells) != dialect.width:
         return RecordingError(
             "line-ragged",

@@ -17,7 +17,7 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
     found = [column for column in columns if column.name == name and not column.temporal]
     found = found or [column for column in columns if name in column.aliases and not column.temporal]
     plain = name.replace("(1).", ".")
-    found = found or [column for column in columns if column.name.replace("(1).", ".") == plain and not column.temporal]
+    found = found or [column for column in columns if plain in plain_paths(column) and not column.temporal]
     if len(found) == 1:
         return found[0]
     if found:
@@ -77,3 +77,7 @@ def in_file(names: Sequence[str], columns: Sequence[Column]) -> list[str]:
     """The names of the columns that are read for these channels: those in an expression instead of the expression."""
     found = {name: found_channel(name, columns, columns) for name in names}
     return [part for name, one in found.items() for part in (one.names if isinstance(one, Expression) else [name])]
+
+
+def plain_paths(column: Column) -> list[str]:
+    return [name.replace("(1).", ".") for name in (column.name, *column.aliases)]

@@ -86,14 +86,11 @@ class Series:
 
     def __init__(self, archive: zipfile.ZipFile, slot: Slot, member: Member) -> None:
         self._file = archive.open(f"{slot.array}.npy" if f"{slot.array}.npy" in archive.namelist() else slot.array)
-        others = math.prod(member.shape) // max(slot.samples, 1)
-        contiguous = others == 1 or (slot.time_axis == 0) == member.fortran
+        first, self._stride = slot.strides(fortran=member.fortran)
         self._dtype = member.dtype
-        self._stride = 1 if contiguous else others
-        self._phase = 0 if contiguous else slot.index
+        self._phase = first % self._stride
         self._name = slot.array
-        start = slot.index * slot.samples if contiguous else 0
-        self._file.seek(member.offset + start * member.dtype.itemsize)
+        self._file.seek(member.offset + (first - self._phase) * member.dtype.itemsize)
 
     def __enter__(self) -> Series:
         return self

@@ -16,7 +16,7 @@ from livebode.sources.formats import open_recording
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import in_file, resolve
 from livebode.sources.recording import Column, Recording, guarded, located
-from livebode.sources.timing import Clock, clock_from_time, find_time, rate_in_file
+from livebode.sources.timing import Clock, clock_from_time, find_time, rate_column, rate_in_column, rate_in_file
 from livebode.sources.units import split_unit
 
 _logger = logging.getLogger(__name__)
@@ -149,6 +149,7 @@ def find_clock(
                 given_hz=rate_hz,
             )
         return Clock(rate_hz, "given")
+    stated = stated or rate_by_column(recording)
     if stated is None:
         raise RecordingError(
             "rate-missing",
@@ -158,6 +159,13 @@ def find_clock(
             argument="rate_hz",
         )
     return Clock(*stated)
+
+
+def rate_by_column(recording: Recording) -> tuple[float, str] | None:
+    column = rate_column(recording.columns)
+    if column is None:
+        return None
+    return rate_in_column(column, guarded(recording.chunks([column], 1 << 16), recording.path, recording.format))
 
 
 def together(recording: Recording, channels: Sequence[str] | None, time: str | None) -> list[Column]:

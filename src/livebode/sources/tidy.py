@@ -1,4 +1,7 @@
-"""A byte stream simplified for Arrow: UTF-8 without comments; where blanks separate columns, a tab for each run."""
+"""A byte stream simplified for Arrow: UTF-8 without comments, blank lines and a final Ctrl-Z.
+
+Where blanks separate columns, each run of them becomes a tab.
+"""
 
 from __future__ import annotations
 
@@ -7,22 +10,30 @@ import io
 import re
 from typing import BinaryIO
 
+from livebode.sources.dialect import Dialect
+
 PIECE = 1 << 20
 COMMENT = re.compile(r"(?m)^[ \t]*[#%].*\n?")
+BLANK_LINE = re.compile(r"(?m)^[ \x1a]+\r?(?:\n|\Z)")
+END_MARK = "\x1a"
+"""Ctrl-Z, which DOS programs and LabVIEW write at the end of a text."""
 MARGINS = re.compile(r"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 BLANKS = re.compile(r"[ \t]+")
 
 
 class Tidied(io.RawIOBase):
-    r"""The text of `raw` from its current position, simplified line by line; `spaced`: blanks separate the columns.
+    r"""The text of `raw` from its current position, simplified line by line as its dialect needs it.
 
-    >>> io.BufferedReader(Tidied(io.BytesIO(b"  1   2 \n# note\n 3 4"), "utf-8", True)).read()
+    >>> blanks = Dialect("\t", True, ".")
+    >>> io.BufferedReader(Tidied(io.BytesIO(b"  1   2 \n# note\n 3 4"), blanks)).read()
     b'1\t2\n3\t4'
     """
 
-    def __init__(self, raw: BinaryIO, encoding: str, spaced: bool) -> None:
-        self._raw, self._spaced = raw, spaced
-        self._decoder = codecs.getincrementaldecoder(encoding)("replace")
+    def __init__(self, raw: BinaryIO, dialect: Dialect) -> None:
+        self._raw, self._dialect = raw, dialect
+        # A ragged table grows by its width with each short line: its pieces are as much smaller.
+        self._piece = max(1 << 12, PIECE // max(dialect.width, 1)) if dialect.ragged else PIECE
+        self._decoder = codecs.getincrementaldecoder(dialect.encoding)("replace")
         self._kept = ""
         self._ready = b""
         self._done = False
@@ -39,14 +50,23 @@ class Tidied(io.RawIOBase):
         return count
 
     def _fill(self) -> None:
-        raw = self._raw.read(PIECE)
+        raw = self._raw.read(self._piece)
         self._done = not raw
         text = self._kept + self._decoder.decode(raw, final=self._done)
         end = len(text) if self._done else text.rfind("\n") + 1
         if end == 0 and len(text) > 4 * PIECE:  # no valid line is this long; Arrow reports it
             end = len(text)
         text, self._kept = text[:end], text[end:]
-        text = COMMENT.sub("", text)
-        if self._spaced:
+        text = BLANK_LINE.sub("", COMMENT.sub("", text))
+        if self._done:
+            text = text.rstrip(END_MARK)
+        if self._dialect.ragged:
+            lines = (line.rstrip("\r") for line in text.split("\n"))
+            text = "".join(self._filled(line) for line in lines if line.strip() not in ("", "EOF"))
+        if self._dialect.spaced:
             text = BLANKS.sub("\t", MARGINS.sub("", text))
         self._ready = text.encode("utf-8")
+
+    def _filled(self, line: str) -> str:
+        missing = self._dialect.width - 1 - line.count(self._dialect.delimiter)
+        return f"{line}{self._dialect.delimiter * missing}\n"

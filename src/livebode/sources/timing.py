@@ -14,7 +14,7 @@ from livebode.core.clock import ClockKind, clock_kind_of
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.steps import Gap, Steps
-from livebode.sources.units import SECONDS, split_unit, time_unit
+from livebode.sources.units import SECONDS, UNIT_IN_FRONT, split_unit, time_unit
 
 RATE_TOLERANCE = 1e-3
 """Relative difference above which a time column contradicts a given rate."""
@@ -23,9 +23,15 @@ JITTER_MAX = 0.1
 2.4 % at the Nyquist frequency, and cause noise 27 dB below a line at a tenth of the rate."""
 GAPS_SHARE_MAX = 0.05
 GAPS_LISTED = 1000
-RATE_NAMES = "fs", "f_s", "fs_hz", "rate", "rate_hz", "sample_rate", "samplerate", "sampling_rate", "sample_rate_hz"
-PERIOD_NAMES = "ts", "t_s", "dt", "dt_s", "sample_time", "sampletime", "sampling_time", "sample_period", "period_s"
-TIME_NAMES = "t", "time", "zeit", "timestamp", "time_stamp", "zeitstempel", "seconds", "sekunden"
+RATE_NAMES = (
+    "fs", "f_s", "fs_hz", "rate", "rate_hz", "sample_rate", "samplerate", "sampling_rate", "sample_rate_hz",
+    "abtastrate",
+)  # fmt: skip
+PERIOD_NAMES = (
+    "ts", "t_s", "dt", "dt_s", "sample_time", "sampletime", "sampling_time", "sample_period", "period_s", "tvz",
+    "abtastzeit",
+)  # fmt: skip
+TIME_NAMES = "t", "time", "zeit", "timestamp", "time_stamp", "zeitstempel", "seconds", "sekunden", "x_value"
 DSPACE_TIME = re.compile(r"(?:^|[./])X(?:\(\d+\))?[./]Data$")
 
 
@@ -116,6 +122,8 @@ def time_rank(column: Column) -> int | None:
     last = re.split(r"[./]", column.name)[-1].casefold()
     head, _, tail = last.rpartition("_")
     name = head if tail in SECONDS and head else last
+    if UNIT_IN_FRONT.fullmatch(last):
+        return len(TIME_NAMES) - 1
     return TIME_NAMES.index(name) if name in TIME_NAMES else None
 
 
@@ -134,6 +142,33 @@ def rate_in_file(scalars: Mapping[str, float]) -> tuple[float, str] | None:
         if bare in PERIOD_NAMES:
             return exact_rate_hz(value, 0.0), f"{name!r} in the file"
     return None
+
+
+def rate_column(columns: Sequence[Column]) -> Column | None:
+    """The first column whose name is that of a rate or period; "rate" alone may be a feed rate."""
+    names = {*RATE_NAMES, *PERIOD_NAMES} - {"rate"}
+    return next((c for c in columns if re.split(r"[./]", c.name)[-1].casefold() in names and not c.temporal), None)
+
+
+def rate_in_column(column: Column, chunks: Iterator[Chunk]) -> tuple[float, str] | None:
+    """Rate in Hz from a column that has one value and is empty otherwise, and the text of its origin; else None.
+
+    >>> rate_in_column(Column("Tvz", "ms"), iter([[np.array([0.25, np.nan, 0.25])]]))
+    (4000.0, "column 'Tvz' in ms, which has one value")
+    """
+    known: float | None = None
+    for (values,) in chunks:
+        found = np.unique(values[np.isfinite(values)])
+        if found.size > 1 or (found.size and known is not None and found[0] != known):
+            return None
+        known = float(found[0]) if found.size else known
+    scale = {**SECONDS, "hz": 1.0, "khz": 1e3, "": 1.0}.get(column.unit.casefold())
+    if known is None or known <= 0 or scale is None:
+        return None
+    is_period = re.split(r"[./]", column.name)[-1].casefold() in PERIOD_NAMES
+    unit = column.unit or {True: "s", False: "Hz"}[is_period]
+    rate_hz = exact_rate_hz(known * scale, 0.0) if is_period else known * scale
+    return rate_hz, f"column {column.name!r} in {unit}, which has one value"
 
 
 def clock_from_time(

@@ -6,9 +6,11 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-SQUARE = re.compile(r"^(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]*)\]$")
-ROUND = re.compile(r"^(?P<name>.*\S)\s+\((?P<unit>.*)\)$")
+BRACKETED = re.compile(r"\[.*\]|\(.*\)")
+OPENING = {"]": "[", ")": "("}
 
+UNIT_IN_FRONT = re.compile(r"(?P<unit>[mun]?s)_(?:today|time|timestamp)", re.IGNORECASE)
+"""A time with its unit in front, such as ms_today in the logs of VESC Tool."""
 SECONDS = {
     "s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "sekunden": 1.0,
     "ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3,
@@ -22,16 +24,46 @@ SECONDS = {
 def split_unit(text: str) -> tuple[str, str]:
     """Name and unit of a heading; the unit is empty if there is none.
 
-    Square brackets may touch the name, round ones need a space before them; a number in brackets is an index.
+    Square brackets may touch the name, round ones need a space before them; a number in brackets is an index. A unit
+    may contain brackets itself.
 
     >>> split_unit("speed [rad/s]"), split_unit("i_q (A)"), split_unit("u[2]"), split_unit("Y(1)")
     (('speed', 'rad/s'), ('i_q', 'A'), ('u[2]', ''), ('Y(1)', ''))
+    >>> split_unit("a [m/(s^2)]"), split_unit("x (N (rms))")
+    (('a', 'm/(s^2)'), ('x', 'N (rms)'))
     """
     text = text.strip()
-    match = SQUARE.match(text) or ROUND.match(text)
-    if match is None or re.fullmatch(r"[\d\s,:;]+", match["unit"]):
+    at = last_bracket(text)
+    name, unit = text[:at].rstrip(), text[at + 1 : -1].strip()
+    touches = len(name) == at
+    if not name or (text[-1] == ")" and touches) or re.fullmatch(r"[\d\s,:;]+", unit):
         return text, ""
-    return match["name"], match["unit"].strip()
+    return name, unit
+
+
+def last_bracket(text: str) -> int:
+    """Where the bracket opens that closes at the end of `text`; 0 without one.
+
+    >>> last_bracket("x (N (rms))"), last_bracket("x)")
+    (2, 0)
+    """
+    closing = text[-1:]
+    opening, depth = OPENING.get(closing), 0
+    for at in range(len(text) - 1, -1, -1):
+        depth += (text[at] == closing) - (text[at] == opening)
+        if depth == 0:
+            return at if opening else 0
+    return 0
+
+
+def unbracketed(unit: str) -> str:
+    """A unit without the brackets or dashes around it.
+
+    >>> unbracketed("[m/(s^2)]"), unbracketed("(N (rms))"), unbracketed("-"), unbracketed("V")
+    ('m/(s^2)', 'N (rms)', '', 'V')
+    """
+    whole = unit[-1:] in OPENING and last_bracket(unit) == 0 and unit[0] == OPENING[unit[-1]]
+    return (unit[1:-1] if whole else unit).strip(" -")
 
 
 def split_units(headings: Sequence[str]) -> list[tuple[str, str]]:
@@ -46,12 +78,14 @@ def split_units(headings: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def time_unit(name: str, unit: str) -> str:
-    """Unit of a time column from its unit or from the end of its name (`time_us`); empty if neither gives it.
+    """Unit of a time column from its unit or its name (`time_us`, `ms_today`); empty if neither gives it.
 
     >>> time_unit("time", "ms"), time_unit("timestamp_ns", ""), time_unit("t", ""), time_unit("t", "rad")
     ('ms', 'ns', '', 'rad')
     """
     if unit:
         return unit
+    if in_front := UNIT_IN_FRONT.fullmatch(name):
+        return in_front["unit"].casefold()
     tail = name.rpartition("_")[2].casefold()
     return tail if "_" in name and tail in SECONDS else ""

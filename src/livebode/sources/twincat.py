@@ -1,0 +1,84 @@
+"""Exports of TwinCAT Scope as text: rows of properties above the table, and a time column for each channel or group."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
+from livebode.sources.cells import is_number
+from livebode.sources.delimited import DelimitedRecording
+from livebode.sources.dialect import Dialect, Sample
+from livebode.sources.recording import Chunk, Column
+from livebode.sources.timed import TimedColumns, as_columns, merged, trimmed
+
+ROW = re.compile(r'[\s"]*[-+.\d]')
+"""A row of values; each row above the table begins with the name of a property."""
+QUANTITY = re.compile(r"\s*\([^()]*\)$")
+TIME = "t"
+
+
+class TwinCatRecording(DelimitedRecording):
+    """A table whose rows of properties (Name, Unit, SymbolName …) also show which columns are times in ms."""
+
+    format: ClassVar[str] = "twincat"
+
+    def __init__(self, path: Path) -> None:
+        self._properties: dict[str, list[str]] = {}
+        super().__init__(path)
+        groups = timed_columns(self._properties)
+        times = super().chunks([group.time for group in groups], 1 << 16)
+        self.columns, self.skipped = tuple(as_columns(merged(groups, times))), ()
+
+    def find_dialect(self, path: Path) -> Dialect:
+        """The dialect as the export defines it: the delimiter behind "Name", one column for each cell of that row."""
+        sample = Sample.of(path)
+        start = next((at for at, line in enumerate(sample.lines) if ROW.match(line.text)), None)
+        plain = Dialect(sample.text[4], False, ".", ragged=True)
+        rows = [plain.split(line.text) for line in sample.lines[:start]]
+        self._properties = {cells[0]: cells for cells in rows if cells and cells[0]}
+        names = self._properties.get("Name", [])
+        if start is None or len(names) < 2:
+            raise sample.without_table()
+        cells = [cell for line in sample.lines[start:] for cell in plain.split(line.text)]
+        comma = plain.delimiter != "," and any(is_number(cell, ",") and not is_number(cell) for cell in cells)
+        dialect = replace(plain, decimal="," if comma else ".").with_headings(names)
+        return sample.placed(dialect, sample.lines[start])
+
+    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        return trimmed(super().chunks(columns, rows), columns[0].samples)
+
+
+def timed_columns(properties: dict[str, list[str]]) -> list[TimedColumns]:
+    """The time columns and their channels, from the rows of properties by their first cell.
+
+    A time column has the name of the property instead of a value.
+
+    >>> group, = timed_columns({"Name": ["Name", "pos", "vel"], "Unit": ["Unit", "mm (Length)", "(None)"]})
+    >>> group.time.name, [(column.name, column.unit) for column in group.channels]
+    ('t', [('pos', 'mm'), ('vel', '')])
+    """
+    names = properties["Name"]
+    symbols, units = (padded(properties.get(name, []), len(names)) for name in ("SymbolName", "Unit"))
+    count = Counter(names)
+    groups: list[TimedColumns] = []
+    for at, name in enumerate(names):
+        if at == 0 or name == "Name":
+            groups.append(TimedColumns(Column(TIME, "ms", key=at), ()))
+            continue
+        symbol, unit = symbols[at], QUANTITY.sub("", units[at])
+        unique = symbol if count[name] > 1 and symbol else name
+        if unique:  # older exports end each row with a delimiter
+            column = Column(unique, unit, aliases=(symbol,) if symbol not in ("", unique) else (), key=at)
+            groups[-1] = TimedColumns(groups[-1].time, (*groups[-1].channels, column))
+    return [group for group in groups if group.channels]
+
+
+def padded(cells: list[str], width: int) -> list[str]:
+    return [*cells[:width], *[""] * (width - len(cells))]
+
+
+READER = TwinCatRecording
