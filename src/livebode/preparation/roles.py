@@ -28,6 +28,7 @@ _RETURNING_MAX = 0.25  # of noise's power: an excitation below that is dominated
 # Gain over frequency, as an exponent. A machine's gain falls, except between an antiresonance and the resonance
 # above it. The width of that zone is the square root of the inertia ratio: a factor of 6 needs a ratio above 35.
 _RISES, _RISES_CLEARLY, _ZONE, _ZONE_MAX = 0.15, 0.5, 3.0, 6.0
+_LEADING_MAX_DEG, _RISES_AS_POSITION = 110.0, 1.2  # an exchanged velocity leads by 90° and rises with f^1
 _LAGGING_MAX = 0.25  # of the lines: below such a zone and above it a machine lags
 _RESPONSE_INPUT, _RESPONSE_OUTPUT, _RESPONSE_ITSELF = 1.0, 0.75, -0.75
 _LOOP_DOUBTFUL, _LOOP_WRONG, _SIGMAS = 0.1, 0.5, 5.0
@@ -170,7 +171,9 @@ def _exchanged(spectra: RoleSpectra) -> Suspicion | None:
     if shown is None and rising > _RISES and not lags(mean_deg(plant)):
         leads = f"the output leads the input by {mean_deg(plant) % 360:.0f}° on average"
         shown = f"{leads}, and the gain rises with f^{rising:.2g}"
-        certain = rising > _RISES_CLEARLY and leading and wide(f, _ZONE_MAX)
+        # An inverted output between antiresonance and resonance leads by more than 90° too.
+        inverted = mean_deg(plant) % 360 > _LEADING_MAX_DEG and rising < _RISES_AS_POSITION
+        certain = rising > _RISES_CLEARLY and leading and wide(f, _ZONE_MAX) and not inverted
     if shown is None:
         return None
     names = f"{settings.input!r} as input and {settings.output!r} as output look exchanged"
