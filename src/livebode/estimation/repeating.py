@@ -186,7 +186,9 @@ class RepeatingErrors(StatefulBase):
         moments = self._moments.update(0, three, powers[:, np.newaxis], np.zeros((3, 1)), np.array([True]))
         self._periods += 1
         self._output += (output - self._output) / self._periods
-        self._step = step_of(signals[0]) if self._step == 0 or self._periods == 1 else self._step
+        # Where the first period shows no step, few others do: the search takes as long as the rest of a period.
+        if self._periods == 1 or (self._step == 0 and self._periods & (self._periods - 1) == 0):
+            self._step = step_of(signals[0])
         late = self._periods - _PERIODS_MIN
         if late >= 0 and late % self._judged_every == 0:
             self._judge(moments, channels)
