@@ -13,6 +13,8 @@ from livebode.configuration.axis import FitSection
 from livebode.configuration.fit_settings import chosen_model, fit_settings
 from livebode.core import read_unit, split_plant_unit
 from livebode.fitting import Fit, fit
+from livebode.fitting.chains import Chain
+from livebode.fitting.unknown_gain import TwoMassGain
 from livebode.records import RunRecord
 from livebode.sources.expressions import negated
 
@@ -32,16 +34,16 @@ def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
     words = of.words
     if not of.response.unit:
         words += "; the run has no units: N m, and rad/s or rad are assumed"
-    return _best(of, section)[1], words
+    return _best(of, section), words
 
 
-def _best(of: Averaged, section: FitSection) -> tuple[FitSection, Fit]:
-    """The fit with the smaller misfit, and its section, where the quantity of the output is not known."""
+def _best(of: Averaged, section: FitSection) -> Fit:
+    """The fit; the one with the smaller misfit, where the quantity of the output is not known."""
     sections = [section]
     if section.output == "auto" and of.kinds.output is None:
         sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]
-    found = [(s, fit(of.response, chosen_model(s, of.kinds), **fit_settings(s))) for s in sections]
-    return min(found, key=lambda one: one[1].epsilon if one[1].status == "ok" else np.inf)
+    found = [fit(of.response, chosen_model(one, of.kinds), **fit_settings(one)) for one in sections]
+    return min(found, key=lambda one: one.epsilon if one.status == "ok" else np.inf)
 
 
 def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, live: bool = False) -> list[str]:
@@ -57,7 +59,8 @@ def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, l
         taken = "velocity" if of.kinds.output == "velocity" else "position"
         why = f"by its unit {unit}" if read_unit(unit).kind == of.kinds.output else "as source.kinds declares"
     else:
-        taken = _best(of, section)[0].output
+        assert isinstance(found.asked, Chain | TwoMassGain)  # `chosen_model` gives no other
+        taken = found.asked.output
         why = "because neither a unit nor a kind is known"
         why = f"which has the smaller misfit, {why}" if found.status == "ok" else why
     remarks = [f"the output {output!r} is fitted as a {taken}, {why}"]
