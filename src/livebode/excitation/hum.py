@@ -19,7 +19,7 @@ _NEAR_BINS = 0.1  # the period is a multiple of the hum's, otherwise the recordi
 # multiples of 50 or 60 Hz would lose them.
 _POWER_MAX, _LEVEL_MAX = 0.1, 0.5
 _WEAK = 0.1  # of the strongest line
-_ORDER_MIN = 2  # of hum: 50 Hz, or 100 Hz of a rectifier
+_ORDER_MAX = 2  # of the lowest hum: 50 Hz, or 100 Hz of a rectifier
 _FAR_BELOW = 0.05  # 26 dB: few designs have lines that far apart, and then hardly at the mains alone
 
 
@@ -40,7 +40,7 @@ def without_mains(calm: Floats, period: int, rate_hz: float, step: float) -> int
     found = find_lines(spectra(cut(calm, period)), step=step)
     bins = np.flatnonzero(found.excited)
     level, resolution_hz = found.amplitude[bins], rate_hz / period
-    at_mains = [meets_mains(bins, resolution_hz, (f,), _NEAR_BINS + _MAINS_DRIFT * bins) for f in MAINS_HZ]
+    at_mains = [_at_harmonics(bins, resolution_hz, mains_hz) for mains_hz in MAINS_HZ]
     for shorter in (divisor for divisor in range(1, period) if period % divisor == 0):
         on = bins % (period // shorter) == 0
         if on.all() and bins.size:
@@ -53,15 +53,18 @@ def without_mains(calm: Floats, period: int, rate_hz: float, step: float) -> int
 def separate_hum(found: BinClasses, resolution_hz: float) -> BinClasses:
     """Count weak lines at harmonics of the mains as distortion, if all other lines are much stronger."""
     bins = np.flatnonzero(found.excited)
+    level = found.amplitude[bins]
     for mains_hz in MAINS_HZ:
-        at = meets_mains(bins, resolution_hz, (mains_hz,), _NEAR_BINS + _MAINS_DRIFT * bins)
-        level = found.amplitude[bins]
-        weak = at & (level <= _FAR_BELOW * level.max())
+        weak = _at_harmonics(bins, resolution_hz, mains_hz) & (level <= _FAR_BELOW * level.max())
         order = np.rint(bins[weak] * resolution_hz / mains_hz)
-        if np.any(order <= _ORDER_MIN) and level[weak].max() <= _FAR_BELOW * level[~weak].min():
+        if np.any(order <= _ORDER_MAX) and level[weak].max() <= _FAR_BELOW * level[~weak].min():
             hum = np.isin(np.arange(found.excited.size), bins[weak])
             return replace(found, excited=found.excited & ~hum, distortion=found.distortion | hum)
     return found
+
+
+def _at_harmonics(bins: NDArray[np.intp], resolution_hz: float, mains_hz: float) -> NDArray[np.bool_]:
+    return meets_mains(bins, resolution_hz, (mains_hz,), _NEAR_BINS + _MAINS_DRIFT * bins)
 
 
 def _weaker(hum: Floats, lines: Floats) -> bool:
