@@ -69,6 +69,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._speed = RippleSpeed(settings.lines) if settings.ripple else None
         self._repeating = RepeatingErrors(settings, self._events) if repeating else None
         self._watch = InputStatistics(self._events, window)
+        self._end = 0, 0.0
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
@@ -139,5 +140,13 @@ class Tracker(StreamEstimator[InputStatistics]):
             ripple = ripple_power(s.ripple, s.lines, self._speed.at(schedule, rows.sample - block.start))
         responses = self._lines.process(rows, place, centre, block.channels, repeating, ripple)
         self._nothing = responses[0:0]
+        self._end = block.stop - 1, block.origin_s + (block.stop - 1) / block.rate_hz
         hand_over(self._events, emit)
         return responses
+
+    def finish(self, emit: Emit = ignore, /) -> Responses | None:
+        """An empty batch, None where no samples came; reports even and odd distortion, if the lines show them."""
+        if self._repeating is not None:
+            self._repeating.finish(*self._end)
+        hand_over(self._events, emit)
+        return super().finish()

@@ -11,6 +11,10 @@ SENTENCES = (
     "the response drifts during the recording, most at {line} Hz: by {percent} % ± {bound} % from the beginning to the "
     "end",
     "the bound of a mean contains the drift",
+    "distortion at the detection lines, relative to the output at a line: even {even}, odd {odd}",
+    "noise of the mean over {periods} periods {noise} dB",
+    "{level} dB",
+    "below {level} dB",
     "{count} samples are missing before sample {sample}",
     "an unknown number of samples is missing before sample {sample}",
     "responses are invalid until a window of {window} samples is complete again",
@@ -282,7 +286,7 @@ SENTENCES = (
 """Templates of sentences."""
 
 NAMES = (
-    ".", ";", "the belt's stiffness", "the moved mass", "the belt's damping", "the motor's inertia",
+    ".", ";", "not measurable", "the belt's stiffness", "the moved mass", "the belt's damping", "the motor's inertia",
     "belt's stiffness", "moved mass", "belt's damping", "motor's inertia", "mode", "mode damping",
     "residual compliance", "mode gain", "lag", "rad/s² per unit of input", "deg", "none", "before", "after",
     "samples were lost", "friction, backlash or sensor steps; increase the excitation, or move the axis",
@@ -299,7 +303,8 @@ NAMES = (
     "gain may fall by", "peak sensitivity Ms", "gain margin", "gain reduction", "phase margin", "delay margin",
     "peak sensitivity", "bandwidth", "acknowledged", "backlog", "backlog-cleared", "baseline-unknown", "change",
     "change-cleared", "change-corrected", "clock-jump", "computer-clock", "configuration-applied",
-    "configuration-postponed", "configuration-refused", "connected", "disconnected", "distorted", "doubtful", "drift",
+    "configuration-postponed", "configuration-refused", "connected", "disconnected", "distorted",
+    "distortion-levels", "doubtful", "drift",
     "fit-failed", "fit-resumed", "foreign", "gap", "held", "hum", "hum-gone", "implausible", "layout-changed", "loss",
     "malformed", "missing", "noise-from-detection-lines", "non-finite", "not-whole", "outlying-periods", "overflow",
     "phase-slip", "phase-slips", "record-closed", "record-continued", "record-damaged", "record-paused",

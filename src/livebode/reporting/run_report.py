@@ -9,14 +9,15 @@ from livebode.core.clock import date_and_time, moment
 from livebode.core.document import Document, Paragraph, Section
 from livebode.language import tr
 from livebode.reporting import sections
+from livebode.reporting.distortion import distortion
 from livebode.reporting.measured import how
 from livebode.reporting.report_data import Judged, ReportData, read, written
 from livebode.reporting.verdict import verdict
 from livebode.reporting.wording import duration
 
 _SECTIONS = (
-    how, sections.response, sections.tracking, sections.parameters, sections.motion, sections.margins, sections.events,
-    sections.quality, sections.validation, sections.settings, sections.versions,
+    how, sections.response, distortion, sections.tracking, sections.parameters, sections.motion, sections.margins,
+    sections.events, sections.quality, sections.validation, sections.settings, sections.versions,
 )  # fmt: skip
 
 
