@@ -43,7 +43,7 @@ def tracked(columns: dict[str, np.ndarray], **options: object) -> tuple[dict[str
         tracker.process(part)
     tracker.finish(events.append)
     assert tracker._repeating is not None
-    return tracker._repeating._levels.levels(), events
+    return tracker._repeating.levels.levels(), events
 
 
 def expected_db(part: np.ndarray, whole: np.ndarray, bins: np.ndarray) -> float:

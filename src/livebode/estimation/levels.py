@@ -148,6 +148,13 @@ class DistortionLevels(StatefulBase):
         self._stretches, self._periods = self._stretches + 1, self._periods + self._now
         self._moments, self._now = PeriodMoments(1, self._at.size, 1.0, own=True), 0
 
+    def add(self, before: DistortionLevels) -> None:
+        """Include the stretches of an earlier recording."""
+        before.end_stretch()
+        self._power, self._scatter = self._power + before._power, self._scatter + before._scatter
+        self._output = self._output + before._output
+        self._stretches, self._periods = self._stretches + before._stretches, self._periods + before._periods
+
     def _sums(self) -> tuple[Floats, Floats, Floats]:
         """The sums over all stretches, including the present one."""
         if not self._now:

@@ -55,12 +55,17 @@ class RepeatingErrors(StatefulBase):
     ----------
     settings
         Lines, signals and estimator.
+
+    Attributes
+    ----------
+    levels
+        Even and odd distortion.
     """
 
     _stage = Stage("repeating-errors", 2)
     _STATE = (
         "_samples", "_position", "_output", "_told", "_at", "_whole", "_largest", "_step", "_periods", "_moments",
-        "_movement", "_silence", "_levels",
+        "_movement", "_silence", "levels",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, events: list[Event] | None = None) -> None:
@@ -79,7 +84,7 @@ class RepeatingErrors(StatefulBase):
         self._at, self._whole, self._largest, self._step = 0, False, 0.0, 0.0
         self._looked = slice(0, None, -(-lines.window // PLACES))
         self._movement = Movement(self._position[self._looked].size)
-        self._levels = DistortionLevels(settings)
+        self.levels = DistortionLevels(settings)
         self._forget()
         self._now = np.full(len(lines), np.nan), np.zeros((len(_KINDS), len(lines)), dtype=np.bool_)
         self._silence = SilentHum(len(lines))
@@ -88,7 +93,7 @@ class RepeatingErrors(StatefulBase):
         self._events = [] if events is None else events
 
     def _forget(self) -> None:
-        self._levels.end_stretch()
+        self.levels.end_stretch()
         self._moments = PeriodMoments(1, len(self._bins), 1.0, own=True)
         self._output = np.zeros(self._mains.bins.size, dtype=np.complex128)
         self._periods = 0
@@ -110,11 +115,11 @@ class RepeatingErrors(StatefulBase):
             "distortion": known,
             "invalid_lines_hz": reasons,
             "mains_lines_hz": f[self._mains.lines.any(axis=0)].tolist(),
-        } | ({"levels": levels} if (levels := self._levels.plain()) else {})
+        } | ({"levels": levels} if (levels := self.levels.plain()) else {})
 
     def finish(self, sample: int, time_s: float) -> None:
         """Report the levels of even and odd distortion, at the end of the samples."""
-        if message := self._levels.sentence():
+        if message := self.levels.sentence():
             self._events.append(Event("distortion-levels", sample, time_s, message))
 
     def restart(self, sample: int) -> None:
@@ -193,7 +198,7 @@ class RepeatingErrors(StatefulBase):
         three = np.stack([spectra["output"], spectra[method.denominator], reference])[:, np.newaxis]
         powers = np.stack([power(reference), power(spectra["output"]), *2 * [np.zeros(len(self._bins))]])
         moments = self._moments.update(0, three, powers[:, np.newaxis], np.zeros((3, 1)), np.array([True]))
-        self._levels.take(every)
+        self.levels.take(every)
         self._periods += 1
         self._output += (output - self._output) / self._periods
         # Where the first period shows no step, few others do: the search takes as long as the rest of a period.

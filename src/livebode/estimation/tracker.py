@@ -99,6 +99,11 @@ class Tracker(StreamEstimator[InputStatistics]):
         """Numbers of samples, ascending: no window that contains one of them counts."""
         self._spectra.left_out = samples
 
+    def continue_levels(self, before: Tracker) -> None:
+        """Add what `before` found of even and odd distortion in an earlier recording."""
+        if self._repeating is not None and before._repeating is not None:
+            self._repeating.levels.add(before._repeating.levels)
+
     def process(self, block: Block, emit: Emit = ignore) -> Responses:
         """Responses at the hops of this Block, which follows the previous one.
 

@@ -211,6 +211,7 @@ SENTENCES = (
     "the moved mass and {rest}",
     "the belt's damping and {rest}",
     "the mean of {count} responses",
+    "the mean of {count} responses in {recordings} recordings",
     "the mean of {count} responses from {low} to {high} of the schedule, whose change is in the bounds",
     "the average up to {time} s",
     "the average up to {time} s from {low} to {high} of the schedule, whose change is in the bounds",
