@@ -1,7 +1,7 @@
 """Answers of the package best-linear-approximation (PyPI, Python ≥ 3.12) to a seeded closed loop with a cube.
 
     python3.12 -m venv /tmp/bla && /tmp/bla/bin/pip install best-linear-approximation
-    /tmp/bla/bin/python tools/bla_reference.py tests/fitting/data/best_linear_approximation.json
+    /tmp/bla/bin/python tools/bla_reference.py tests/fitting/stored/best_linear_approximation.json
 
 The package follows R. Pintelon, J. Schoukens, System Identification, 2nd ed., Wiley 2012, section 4.3.
 `tests/fitting/test_recordings_truth.py` compares livebode with them on the same records.

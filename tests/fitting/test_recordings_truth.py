@@ -17,7 +17,7 @@ from tools import bla_reference as reference
 RATE_HZ, WINDOW = 1000.0, 100
 LINES = Lines.of_bins(range(2, 26, 2), WINDOW, RATE_HZ)
 PLANT = 2 / (1 - 0.6 / LINES.z) / LINES.z
-ANSWERS = json.loads((Path(__file__).parent / "data" / "best_linear_approximation.json").read_text())
+ANSWERS = json.loads((Path(__file__).parent / "stored" / "best_linear_approximation.json").read_text())
 
 
 def tracked(lines: Lines, w: np.ndarray, u: np.ndarray, y: np.ndarray, start: int) -> Responses:

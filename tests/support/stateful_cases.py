@@ -13,6 +13,7 @@ import numpy as np
 from livebode.configuration.axis import FitSection
 from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
+from livebode.estimation.successive import SuccessiveTrackers
 from livebode.excitation import multisine
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.fitting.drift import DriftTest
@@ -102,6 +103,16 @@ def spectra_tracker() -> Case:
         processed(list(spectra())),
         [lambda: SpectraTracker(other, LAYOUT)],
     )
+
+
+def successive_trackers() -> Case:
+    """The second recording begins in the second step; odd lines have levels of distortion."""
+    odd = replace(SETTINGS, lines=Lines.of_bins((1, 3, 7), WINDOW, RATE_HZ))
+
+    def new() -> SuccessiveTrackers:
+        return SuccessiveTrackers([Tracker(odd), Tracker(odd)], [0, 777])
+
+    return Case(new, processed(cut(block(), 777, 1100)))
 
 
 @cache
@@ -241,7 +252,7 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, spectra_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables,
-        change_detection, fits, run_counts, stream_position,
+        tracker, successive_trackers, spectra_tracker, motion_correction, fitter, drift, monitor_by_model,
+        monitor_by_tables, change_detection, fits, run_counts, stream_position,
     )
 }  # fmt: skip

@@ -24,9 +24,7 @@ from livebode.runtime.documents import TrackerResults
 def run_command(
     targets: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="LOG...|AXIS.toml", help="A recording, or several that are averaged, or a configuration."
-        ),
+        typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or several that are averaged, or a configuration."),
     ],
     excitation: Excitation = None,
     output: Output = None,

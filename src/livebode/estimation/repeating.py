@@ -102,9 +102,12 @@ class RepeatingErrors(StatefulBase):
         return super()._state() | {"distortion": self._now[0], "invalid": self._now[1]}
 
     def _load(self, state: dict[str, Any]) -> None:
-        # Version 1 has no levels.
-        super()._load({"levels": DistortionLevels(self._settings).snapshot()} | state)
+        super()._load(state)
         self._now = state["distortion"], state["invalid"]
+
+    def _converted(self, state: dict[str, Any], version: int) -> dict[str, Any]:
+        """Version 1 has no levels."""
+        return {"levels": DistortionLevels(self._settings).snapshot()} | state if version < 2 else state
 
     def judged(self) -> dict[str, Any]:
         """For a record: the lines with a reason against them, and the newest distortion at each."""
