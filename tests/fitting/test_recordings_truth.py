@@ -110,7 +110,7 @@ def test_the_stochastic_distortion_of_a_cube_is_found() -> None:
     at = list(lines.bins)
     exact = np.array([np.fft.rfft(2 * w + cube * w**3)[at] / np.fft.rfft(w)[at] for w in map(excited, range(400))])
     truth = np.sqrt(np.mean(np.var(exact, axis=0, ddof=1)))
-    rng, found = np.random.default_rng(0), []
+    rng, found, inside = np.random.default_rng(0), [], []
     for run in range(12):
         parts = []
         for i in range(count):
@@ -119,9 +119,14 @@ def test_the_stochastic_distortion_of_a_cube_is_found() -> None:
             parts.append(tracked(lines, u, u, y, i * 6 * 256))
         one, between = mean_of(parts, realisations=True)
         assert between.differs
+        inside.append([np.abs(one[0].value - exact.mean(axis=0)) < one[0].bound(c) for c in (1, 2)])
         found.append(10 ** (between.distortion_db / 10) * np.mean(np.abs(one.value) ** 2))
     # 12 runs of 7 × 32 degrees of freedom; the phases also change the level of all lines together.
     assert np.sqrt(np.mean(found)) == pytest.approx(truth, rel=0.1)
+    # The best linear approximation, at 12 × 32 lines, which are correlated: as 120 independent ones within 3 sigma.
+    covered = np.mean(inside, axis=(0, 2))
+    assert abs(covered[0] - 0.632) < 0.13
+    assert covered[1] > 0.982 - 0.036
 
 
 def test_one_period_each_gives_the_total_and_no_noise() -> None:

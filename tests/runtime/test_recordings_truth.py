@@ -171,6 +171,12 @@ def test_other_lines_and_another_window_are_refused_by_name(tmp_path: Path) -> N
         tracked(logs, tmp_path / "run")
 
 
+def test_a_recording_that_is_given_twice_is_refused(logs: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "copy.parquet").write_bytes(logs[0].read_bytes())
+    with pytest.raises(RecordingError, match=r"copy.parquet has the same content as .*0.parquet; give each recording"):
+        tracked([*logs, tmp_path / "copy.parquet"], tmp_path / "run")
+
+
 @pytest.mark.parametrize(
     ("sections", "key"),
     [

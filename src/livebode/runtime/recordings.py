@@ -11,7 +11,7 @@ from typing import Any
 
 from livebode.configuration.axis import Axis
 from livebode.configuration.recording import open_recording
-from livebode.core import Block, Channel, Event
+from livebode.core import Block, Channel, Event, RecordingError
 from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
 from livebode.estimation.successive import SuccessiveTrackers
@@ -34,6 +34,7 @@ class _Part:
     """A recording in the run, whose sample n has the number n + shift there; `stop` is the number after its last."""
 
     log: Log
+    sha256: str
     of: Examined
     tracker: Tracker
     shift: int
@@ -107,11 +108,28 @@ def _prepared(axis: Axis) -> list[_Part]:
             settings = make_settings(own, log)
             if parts:
                 check_same(parts[0].log, parts[0].tracker.settings, log, settings)
-            parts.append(_part(own, log, Tracker(settings), parts[-1].stop if parts else 0))
+            sha256 = _sha256(path, parts)
+            parts.append(_part(own, log, sha256, Tracker(settings), parts[-1].stop if parts else 0))
     return parts
 
 
-def _part(axis: Axis, log: Log, tracker: Tracker, behind: int) -> _Part:
+def _sha256(path: Path, before: Sequence[_Part]) -> str:
+    """The file's checksum; RecordingError if it is that of an earlier one, which would count as twice the evidence."""
+    with path.open("rb") as file:
+        found = hashlib.file_digest(file, "sha256").hexdigest()
+    same = next((part.log.path for part in before if part.sha256 == found), None)
+    if same is not None:
+        raise RecordingError(
+            "recording-repeated",
+            f"{path} has the same content as {same}",
+            "give each recording once",
+            path=str(path),
+            other=str(same),
+        )
+    return found
+
+
+def _part(axis: Axis, log: Log, sha256: str, tracker: Tracker, behind: int) -> _Part:
     """The recording with whole periods between it and the number `behind`, so that its phases stay as they are."""
     window = tracker.settings.lines.window
     shift = -(-(behind + window - log.first) // window) * window if behind else 0
@@ -119,17 +137,15 @@ def _part(axis: Axis, log: Log, tracker: Tracker, behind: int) -> _Part:
     stop = of.source.first
     for block in of.source.blocks([tracker.settings.output]):
         stop = block.stop
-    return _Part(log, of, tracker, shift, stop + shift)
+    return _Part(log, sha256, of, tracker, shift, stop + shift)
 
 
 def _about(part: _Part) -> dict[str, Any]:
     """Entry of run.json: the file, its samples in the run and its own, and what was found."""
-    with part.log.path.open("rb") as file:
-        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     left_out, slips = part.of.found["left_out_samples"], part.of.found["phase_slips"]
     return {
         "file": str(part.log.path),
-        "sha256": sha256,
+        "sha256": part.sha256,
         "first": part.first,
         "stop": part.stop,
         "first_in_file": part.of.source.first,
