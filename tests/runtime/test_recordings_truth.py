@@ -78,7 +78,8 @@ def test_each_recording_is_tracked_as_in_a_run_of_its_own_and_named(logs: list[P
 def test_the_mean_of_the_run_is_that_of_all_recordings(logs: list[Path], tmp_path: Path) -> None:
     together = tracked(logs, tmp_path / "all")
     mean, quiet = together.average, tracked(logs[:1], tmp_path / "one").average
-    assert np.median(mean.sigma / quiet.sigma) == pytest.approx(1 / np.sqrt(2), rel=0.2)
+    # By the noise alone 1/√2 with two quiet ones; the scatter of three recordings adds to it.
+    assert 0.6 < np.median(mean.sigma / quiet.sigma) < 1.0
     assert np.all(np.abs(mean.value - PLANT) < mean.bound(2.5))
     between = together.summary["between"]
     assert (between["recordings"], between["realisations"], between["differs"]) == (3, False, False)

@@ -97,9 +97,9 @@ class RecordingsMean:
     noise²) is the variance of the stochastic nonlinear distortion.
 
     Sigma is from the noise if noise explains the differences: Σ|Ĝᵢ − Ĝ|²/vᵢ follows F at each line, and the lines are
-    combined as in `DriftTest`. It is enlarged by the mean ratio over all lines, if that is above 1. If the probability
-    by chance is below 1 %, τ² is in the weights, and sigma is the larger one of total and noise with M − 1 degrees of
-    freedom: 2 recordings then give wide bounds. Differences below that are not completely in sigma.
+    combined as in `DriftTest`. The share 1 − p of τ² is then added to vᵢ, with p the probability by chance. If p is
+    below 1 %, τ² is in the weights, and sigma is the larger one of total and noise with M − 1 degrees of freedom: 2
+    recordings then give wide bounds. Differences that are hardly detected are not completely in sigma.
 
     Errors that repeat: of realisations (other phases) the mean is the best linear approximation, and the distortion is
     in `total`. Of recordings with the same excitation, the distortion of each line is added without reduction. A drift
@@ -140,11 +140,11 @@ class RecordingsMean:
         """The present mean, and how the recordings scatter about it; SignalError as `response`."""
         ones, each = self._each()
         with np.errstate(invalid="ignore", divide="ignore"):
-            ratio, excess, chance = _excess(each)
-            weights = _weights(each, excess)
+            excess, chance = _excess(each)
+            weights = _weights(each, excess * (chance < BY_CHANCE))
             value = np.nansum(weights * each.value, axis=0) / np.nansum(weights, axis=0)
             between = self._between(each, weights, value, chance)
-            sigma, dof = _sigma(each, weights, between, ratio)
+            sigma, dof = _sigma(each, weights, between, excess)
             repeated = _mean_of(np.abs(weights), each.repeated)
         valid = each.count >= _RECORDINGS_MIN
         newest = ones[-1]
@@ -268,25 +268,21 @@ def _beyond_noise(each: _Each) -> tuple[Floats, Floats, Floats]:
     return (found - by_noise) / spread, found, by_noise
 
 
-def _excess(each: _Each) -> tuple[float, Floats, float]:
-    """Ratio of the differences to those by noise, variance beyond noise (lines,), and the probability by chance.
-
-    The variance is smooth over the lines, and 0 unless the differences are significant.
-    """
+def _excess(each: _Each) -> tuple[Floats, float]:
+    """Variance between recordings beyond noise, smooth over the lines, and the probability of it by chance."""
     beyond, found, by_noise = _beyond_noise(each)
     judged = (each.count >= _RECORDINGS_MIN) & (by_noise > 0)
     noise = _mean(np.where(each.used, each.variance, np.nan))
     excess = np.maximum(_smooth(np.where(judged, beyond / noise, np.nan)), 0.0) * noise
     if not judged.any():
-        return np.nan, np.zeros(each.value.shape[1]), np.nan
+        return np.zeros(each.value.shape[1]), np.nan
     free = 2.0 * (each.count[judged] - 1)
     of_noise = 2 * np.sum(np.where(each.used[:, judged], each.dof, 0.0), axis=0)
     p = scipy.special.fdtrc(free, of_noise, found[judged] / by_noise[judged])
     log_p = np.log(np.maximum(p, 1e-300))
     together = float(scipy.special.gammaincc(p.size, -log_p.sum()))
     chance = min(1.0, 2 * min(together, float(p.min()) * p.size))
-    ratio = float(np.sum(found[judged] / by_noise[judged] * free) / free.sum())
-    return ratio, np.nan_to_num(excess) * (chance < BY_CHANCE), chance
+    return np.nan_to_num(excess), chance
 
 
 def _weights(each: _Each, excess: Floats) -> Complex:
@@ -294,11 +290,13 @@ def _weights(each: _Each, excess: Floats) -> Complex:
     return np.asarray(each.weight / _mean(np.abs(each.weight)) / size / (_noise(each) + excess))
 
 
-def _sigma(each: _Each, weights: Complex, between: Between, ratio: float) -> tuple[Floats, float]:
+def _sigma(each: _Each, weights: Complex, between: Between, excess: Floats) -> tuple[Floats, float]:
     """Sigma of the mean (lines,) and its degrees of freedom."""
     several = each.count >= _RECORDINGS_MIN
     if between.differs or np.isnan(between.noise[several]).any():
         return np.fmax(between.total, between.noise), float(each.count[several].min() - 1)
-    share = np.abs(weights) ** 2 * each.variance
+    size = np.abs(weights) ** 2
+    added = (1 - between.chance) * excess * np.nansum(size, axis=0)
+    share = size * each.variance
     of_line = np.nansum(share, axis=0) ** 2 / np.nansum(share**2 / each.dof, axis=0)
-    return between.noise * np.sqrt(max(ratio, 1.0)), float(of_line[several].min())
+    return np.sqrt(between.noise**2 + added / np.abs(np.nansum(weights, axis=0)) ** 2), float(of_line[several].min())
