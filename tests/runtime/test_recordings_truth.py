@@ -202,6 +202,8 @@ def test_a_configuration_lists_recordings_beside_it(logs: list[Path], tmp_path: 
     both = livebode("run", tmp_path / "axis.toml", logs[0])
     assert (both.code, both.err.count("\n") > 0) == (2, True)
     assert "a configuration cannot be combined with other arguments" in " ".join(both.err.split())
+    alone = livebode("run", *logs[:2], *ROLES, "--out", tmp_path / "two")
+    assert "mean of 2 recordings, which differ by no more than their noise" in alone.out
     checked = livebode("doctor", tmp_path / "axis.toml")
     logs[1].unlink()
     missing = livebode("doctor", tmp_path / "axis.toml")

@@ -14,7 +14,6 @@ from livebode.core import Lines, Stage, StatefulBase
 from livebode.core.mains import meets_mains
 from livebode.estimation.bounds import power
 from livebode.estimation.detection import Interpolation
-from livebode.estimation.moments import PeriodMoments
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
 
@@ -110,7 +109,7 @@ class DistortionLevels(StatefulBase):
     """
 
     _stage = Stage("distortion-levels", 1)
-    _STATE = ("_moments", "_now", "_stretches", "_periods", "_power", "_scatter", "_output")
+    _STATE = ("_mean", "_spread", "_now", "_stretches", "_periods", "_power", "_scatter", "_output")
 
     def __init__(self, settings: Settings) -> None:
         lines, method = settings.lines, settings.method
@@ -123,22 +122,28 @@ class DistortionLevels(StatefulBase):
         self._at, self._lines, self._beside = np.concatenate([at, self.bins]), len(at), slice(len(at), None)
         differenced = np.array([settings.channel(role) in settings.differenced for role in settings.roles])
         advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
-        self._after = after(self._at, lines.window, differenced, advanced)
-        self._rows = [settings.roles.index(role) for role in ("output", method.denominator, method.reference)]
+        rows = [settings.roles.index(role) for role in ("output", method.denominator, method.reference)]
+        self._after = after(self._at, lines.window, differenced, advanced)[rows]
+        self._places = np.ix_(rows, self._at)
         self._excited = _SAME_EXCITATION if method.reference == "excitation" else _SAME_INPUT
-        self._moments = PeriodMoments(1, self._at.size, 1.0, own=True)
-        self._now = self._stretches = self._periods = 0
+        self._begin()
+        self._stretches = self._periods = 0
         self._power, self._scatter, self._output = np.zeros(self.bins.size), np.zeros(self.bins.size), np.zeros(len(at))
+
+    def _begin(self) -> None:
+        """Begin a stretch: number of its periods, means of the three signals, and moments of the first two."""
+        self._now, self._mean = 0, np.zeros((3, self._at.size), dtype=np.complex128)
+        self._spread = np.zeros((3, self._at.size), dtype=np.complex128)  # Σ|δY|², Σ|δU|², ΣδY·conj(δU)
 
     def take(self, spectra: Complex) -> None:
         """Process the spectra of a complete period, all bins of all signals: shape (signals, bins)."""
         if not self.bins.size:
             return
-        three = (spectra[:, self._at] * self._after)[self._rows]
-        powers = np.zeros((4, 1, self._at.size))
-        powers[0] = power(three[2])
-        self._moments.update(0, three[:, np.newaxis], powers, np.zeros((3, 1)), np.array([True]))
+        apart = spectra[self._places] * self._after - self._mean
         self._now += 1
+        self._mean += apart / self._now
+        two = apart[[0, 1, 0]] * apart[[0, 1, 1]].conj()
+        self._spread += two * (1 - 1 / self._now)
 
     def end_stretch(self) -> None:
         """The next period may have another phase."""
@@ -146,7 +151,7 @@ class DistortionLevels(StatefulBase):
             return
         self._power, self._scatter, self._output = self._sums()
         self._stretches, self._periods = self._stretches + 1, self._periods + self._now
-        self._moments, self._now = PeriodMoments(1, self._at.size, 1.0, own=True), 0
+        self._begin()
 
     def add(self, before: DistortionLevels) -> None:
         """Include the stretches of an earlier recording."""
@@ -159,17 +164,17 @@ class DistortionLevels(StatefulBase):
         """The sums over all stretches, including the present one."""
         if not self._now:
             return self._power, self._scatter, self._output
-        now = self._moments.now
-        output, denominator = now.pair[:, 0]
+        output, denominator, reference = self._mean
         ratio = output[: self._lines] / denominator[: self._lines]
         model = self._interpolation.at(ratio)
         rest = output[self._beside] - model * denominator[self._beside]
-        reference = now.power[0, 0]
-        excited = reference[self._beside] > self._excited * reference[: self._lines].mean()
-        scatter = now.unexplained(np.concatenate([ratio, model])[np.newaxis])[0, self._beside]
+        excitation = power(reference)
+        excited = excitation[self._beside] > self._excited * excitation[: self._lines].mean()
+        of_output, of_input, shared = self._spread[:, self._beside]
+        scatter = of_output.real - 2 * (model.conj() * shared).real + power(model) * of_input.real
         return (
             self._power + np.where(excited, np.nan, self._now * power(rest)),
-            self._scatter + scatter,
+            self._scatter + np.maximum(scatter, 0.0),
             self._output + self._now * power(output[: self._lines]),
         )
 
