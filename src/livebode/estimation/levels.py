@@ -124,7 +124,7 @@ class DistortionLevels(StatefulBase):
         advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
         rows = [settings.roles.index(role) for role in ("output", method.denominator, method.reference)]
         self._after = after(self._at, lines.window, differenced, advanced)[rows]
-        self._places = np.ix_(rows, self._at)
+        self._places = np.ix_(np.asarray(rows), self._at)
         self._excited = _SAME_EXCITATION if method.reference == "excitation" else _SAME_INPUT
         self._begin()
         self._stretches = self._periods = 0
