@@ -98,6 +98,14 @@ def test_a_pause_or_another_phase_does_not_change_the_levels() -> None:
     assert level.db == pytest.approx(expected_db(0.01 * period(0) ** 2, 2 * period(0), EVEN), abs=0.3)
 
 
+def test_a_line_without_excitation_has_no_levels_beside_it() -> None:
+    part = Lines.of_bins([k for k in LINES.bins if k != LINES.bins[20]], WINDOW, RATE_HZ)
+    u = np.tile(multisine(part, 1.0, "schroeder"), 8)
+    level = tracked({"w": u, "u": u, "y": 2 * u + 0.001 * u**2})[0]["even"]
+    assert level is not None
+    assert EVEN.size - 8 < level.bins < EVEN.size
+
+
 def test_distortion_that_feedback_returned_is_subtracted() -> None:
     w = np.tile(period(2), PERIODS)
     y = (2 * w + 0.01 * w**2) / (1 + 2 * 0.5)  # y = 2·u + 0.01·w², u = w − y/2

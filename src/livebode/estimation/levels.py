@@ -28,6 +28,7 @@ _BINS_MIN = 2
 _95_PERCENT = 1.96
 _ROUNDING = 1e-24  # of the output's power at a line
 _ON_BIN = 0.1  # bins: hum this close to a bin repeats with the excitation
+_EXCITED = 1e-12  # of the mean power: a line with less has no response
 _SAME_EXCITATION, _SAME_INPUT = 1e-4, 1e-2  # of the power at the lines: a bin with more is not a detection line
 
 
@@ -165,11 +166,14 @@ class DistortionLevels(StatefulBase):
         if not self._now:
             return self._power, self._scatter, self._output
         output, denominator, reference = self._mean
-        ratio = output[: self._lines] / denominator[: self._lines]
-        model = self._interpolation.at(ratio)
-        rest = output[self._beside] - model * denominator[self._beside]
         excitation = power(reference)
-        excited = excitation[self._beside] > self._excited * excitation[: self._lines].mean()
+        of_line = excitation[: self._lines]
+        with np.errstate(all="ignore"):
+            ratio = output[: self._lines] / np.where(of_line > _EXCITED * of_line.mean(), denominator[: self._lines], 0)
+            model = self._interpolation.at(ratio)
+        model = np.where(np.isfinite(model), model, np.nan)
+        rest = output[self._beside] - model * denominator[self._beside]
+        excited = excitation[self._beside] > self._excited * of_line.mean()
         of_output, of_input, shared = self._spread[:, self._beside]
         scatter = of_output.real - 2 * (model.conj() * shared).real + power(model) * of_input.real
         return (
@@ -196,13 +200,14 @@ class DistortionLevels(StatefulBase):
         periods, stretches = self._periods + self._now, self._stretches + (self._now > 0)
         found, scatter, _ = self._sums()
         noise = scatter / (periods - stretches) / periods
-        amplitude = self._scale * np.sqrt(found / periods)
+        amplitudes = self._scale * np.sqrt(np.array([found / periods, noise]))
+        amplitude, of_noise = ([None if np.isnan(a) else float(a) for a in row] for row in amplitudes)
         return {
             "periods": periods,
             **{kind: level and level.plain() for kind, level in levels.items()},
             "frequency_hz": (self.bins * self._resolution_hz).tolist(),
-            "amplitude": [None if np.isnan(a) else float(a) for a in amplitude],
-            "noise": (self._scale * np.sqrt(noise)).tolist(),
+            "amplitude": amplitude,
+            "noise": of_noise,
         }
 
     def sentence(self) -> str:
