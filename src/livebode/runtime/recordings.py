@@ -104,7 +104,8 @@ def _prepared(axis: Axis) -> list[_Part]:
         own = axis.model_copy(update={"source": axis.source.model_copy(update={"log": path})})
         with located(path):
             log = configured_part(own, open_recording(own))
-            log = log.naming([name for name in axis.signals.model_dump().values() if name])
+            signals = [name for name in axis.signals.model_dump().values() if name]
+            log = log.naming(list(dict.fromkeys([*signals, *axis.monitoring.covariates])))
             settings = make_settings(own, log)
             if parts:
                 check_same(parts[0].log, parts[0].tracker.settings, log, settings)
