@@ -12,7 +12,7 @@ import pytest
 
 import livebode as lb
 from livebode.configuration import Axis
-from livebode.core import ConfigError, Lines, RecordingError
+from livebode.core import ConfigError, Lines, RecordingError, SignalError
 from livebode.excitation import multisine
 from livebode.runtime import Destination, run
 from livebode.sources import open_log
@@ -170,6 +170,19 @@ def test_other_lines_and_another_window_are_refused_by_name(tmp_path: Path) -> N
     logs = [write_parquet(tmp_path / f"{i}.parquet", part) for i, part in enumerate((first, other))]
     with pytest.raises(RecordingError, match=r"in its lines: 9 \(only there: 190 Hz\) instead of 8"):
         tracked(logs, tmp_path / "run")
+
+
+def test_a_channel_that_is_constant_or_missing_in_one_recording_is_refused_by_name(
+    logs: list[Path], tmp_path: Path
+) -> None:
+    write_parquet(tmp_path / "constant.parquet", columns(5) | {"y": np.ones(1200)})
+    with pytest.raises(SignalError, match=r"constant.parquet: channel 'y' is constant at 1"):
+        tracked([*logs, tmp_path / "constant.parquet"], tmp_path / "run")
+    missing = columns(5)
+    del missing["u"]
+    write_parquet(tmp_path / "missing.parquet", missing)
+    with pytest.raises(RecordingError, match=r"missing.parquet: there is no channel 'u'"):
+        tracked([*logs, tmp_path / "missing.parquet"], tmp_path / "run")
 
 
 def test_a_recording_that_is_given_twice_is_refused(logs: list[Path], tmp_path: Path) -> None:

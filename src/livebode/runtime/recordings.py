@@ -17,6 +17,7 @@ from livebode.estimation import Tracker
 from livebode.estimation.successive import SuccessiveTrackers
 from livebode.fitting import RecordingsMean
 from livebode.preparation.aligned import AlignedLog
+from livebode.preparation.checks import ChannelCheck
 from livebode.preparation.part import configured_part
 from livebode.preparation.plan import make_settings
 from livebode.preparation.recordings import check_same, realisations
@@ -132,12 +133,15 @@ def _sha256(path: Path, before: Sequence[_Part]) -> str:
 
 def _part(axis: Axis, log: Log, sha256: str, tracker: Tracker, behind: int) -> _Part:
     """The recording with whole periods between it and the number `behind`, so that its phases stay as they are."""
-    window = tracker.settings.lines.window
+    settings = tracker.settings
+    window, names = settings.lines.window, [name for role in settings.roles if (name := settings.channel(role))]
     shift = -(-(behind + window - log.first) // window) * window if behind else 0
     of = examined(axis, log, tracker, shift)
-    stop = of.source.first
-    for block in of.source.blocks([tracker.settings.output]):
+    stop, check = of.source.first, ChannelCheck(tuple(names), settings.channel(settings.method.reference) or "")
+    for block in of.source.blocks(list(dict.fromkeys(names))):
+        check.take(block)
         stop = block.stop
+    check.finish()
     return _Part(log, sha256, of, tracker, shift, stop + shift)
 
 
