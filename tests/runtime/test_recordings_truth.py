@@ -94,10 +94,11 @@ def test_a_machine_that_changed_between_recordings_is_reported(tmp_path: Path) -
     parts = [columns(i) for i in range(3)]
     parts[2]["y"] = 1.1 * parts[2]["y"]
     logs = [write_parquet(tmp_path / f"{i}.parquet", part) for i, part in enumerate(parts)]
-    done = livebode("run", *logs, *ROLES, "--out", tmp_path / "run")
-    assert done.code == 0, done.err
-    assert "the 3 recordings differ by more than their noise: by -2" in " ".join(done.err.split())
-    mean = lb.Run(tmp_path / "run").average
+    found = tracked(logs, tmp_path / "run")
+    (event,) = found.events
+    assert event.kind == "recordings-differ"
+    assert event.message.startswith("the 3 recordings differ by more than their noise: by -2")
+    mean = found.average
     assert np.all(mean.sigma > 0.03 * np.abs(mean.value))
 
 
@@ -209,14 +210,14 @@ def test_a_configuration_lists_recordings_beside_it(logs: list[Path], tmp_path: 
     (tmp_path / "axis.toml").write_text(
         '[source]\nlog = ["0.parquet", "1.parquet"]\n[signals]\noutput = "y"\ninput = "u"\nexcitation = "w"\n'
     )
-    done = livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run", "--json")
+    done = livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run")
     assert done.code == 0, done.err
-    assert [r["file"] for r in json.loads(done.out)["found"]["recordings"]] == [str(log) for log in logs[:2]]
+    assert "mean of 2 recordings, which differ by no more than their noise" in done.out
+    recordings = lb.Run(tmp_path / "run").summary["found"]["recordings"]
+    assert [recording["file"] for recording in recordings] == [str(log) for log in logs[:2]]
     both = livebode("run", tmp_path / "axis.toml", logs[0])
     assert (both.code, both.err.count("\n") > 0) == (2, True)
     assert "a configuration cannot be combined with other arguments" in " ".join(both.err.split())
-    alone = livebode("run", *logs[:2], *ROLES, "--out", tmp_path / "two")
-    assert "mean of 2 recordings, which differ by no more than their noise" in alone.out
     checked = livebode("doctor", tmp_path / "axis.toml")
     logs[1].unlink()
     missing = livebode("doctor", tmp_path / "axis.toml")
