@@ -85,7 +85,7 @@ if TYPE_CHECKING:
         StateError,
         UsageError,
     )
-    from livebode.estimation import Settings, Tracker, welch
+    from livebode.estimation import NonPeriodicTracker, Settings, Tracker, welch
     from livebode.excitation import (
         Excitation,
         chirp,
@@ -111,7 +111,7 @@ logging.getLogger(__name__).addHandler(logging.NullHandler())  # quiet, but for 
 
 _HOME = {
     "analysis.learning": ("learn",),
-    "estimation": ("Settings", "Tracker", "welch"),
+    "estimation": ("NonPeriodicTracker", "Settings", "Tracker", "welch"),
     "excitation": (
         "Excitation",
         "chirp",
@@ -189,6 +189,7 @@ __all__ = [
     "Model",
     "Monitor",
     "MotionCorrection",
+    "NonPeriodicTracker",
     "OutputError",
     "Parameter",
     "Parameters",

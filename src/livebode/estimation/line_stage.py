@@ -16,7 +16,7 @@ from livebode.estimation.estimators import Role
 from livebode.estimation.hann import Hann
 from livebode.estimation.moments import Moments, PeriodMoments
 from livebode.estimation.movement import Movement
-from livebode.estimation.quantities import convert
+from livebode.estimation.quantities import from_plant
 from livebode.estimation.repeating import Repeating
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows
@@ -270,11 +270,8 @@ class LineStage(StatefulBase):
         # U/W is (Y/W)/G, whatever it is that was divided.
         weight = powers[0] + 0j if s.method.reference == "input" else numerator / excitation / value
         if s.quantity != "plant":
-            entered = s.loop.entry_at(f) * excitation
-            # Without a description of the controller the signals contain its action: F·y = E·w − u.
-            known = s.loop.feedback is not None
-            feedback = s.loop.feedback_at(f) if known else (entered - denominator) / numerator
-            value, by_plant = convert(s.quantity, value, feedback)
+            signals = numerator, denominator, excitation + 0j
+            value, by_plant = from_plant(s.quantity, value, s.loop, signals, f)
             slope, weight = slope * by_plant, np.full_like(value, complex(np.nan, np.nan))
         scale = np.abs(slope)
         return Estimate(value, sigma * scale, dof, distortion * scale, weight)
