@@ -31,7 +31,7 @@ With a machine, in this order:
 Names by subject:
 
 - Samples and lines: Block, Channel, Lines, Log, open_log
-- Responses: Response, Responses, Settings, Tracker, MotionCorrection, SlidingDFT, welch
+- Responses: Response, Responses, Settings, Tracker, NonPeriodicTracker, MotionCorrection, SlidingDFT, welch
 - Runs: Run
 - Excitation: design, Excitation, chirp, low_crest_phases, multisine, odd_lines, prbs, quantised, recognise,
   stepped_sine

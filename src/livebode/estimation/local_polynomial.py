@@ -18,6 +18,8 @@ Complex = NDArray[np.complex128]
 HALF_WIDTH = 6
 """Bins on each side of a line that its polynomials are fitted to."""
 WIDTH = 2 * HALF_WIDTH + 1
+WINDOW_MIN = 2 * WIDTH + 1
+"""Samples in a window that has this many bins between 0 and the Nyquist frequency."""
 _COUNT = 3  # coefficients of a polynomial of order 2
 _FREE = WIDTH - _COUNT  # equations of a window after its transient is eliminated
 # Singular values below this are the rounding of bins without excitation, next to a line of a periodic one.
@@ -53,10 +55,10 @@ class LocalPolynomial(StatefulBase):
             raise UsageError(
                 "out-of-range",
                 f"a window of {lines.window} samples has {last} bins, but a local polynomial needs {WIDTH}",
-                f"choose a window of at least {2 * WIDTH + 1} samples",
+                f"choose a window of at least {WINDOW_MIN} samples",
                 argument="window",
                 value=lines.window,
-                low=2 * WIDTH + 1,
+                low=WINDOW_MIN,
             )
         first = np.clip(bins - HALF_WIDTH, 1, last - WIDTH + 1)
         self._at = first[:, np.newaxis] + np.arange(WIDTH)

@@ -174,6 +174,7 @@ SENTENCES = (
     "the output leads the input by {angle}° on average",
     "to keep these roles, set tracking.accept_roles",
     "name the channel of the signal that is added",
+    "for noise or a single chirp set tracking.estimator to 'lpm' (--estimator lpm)",
     "name another channel, or raise the amplitude",
     "{signal} does not respond to {reference} at any line: their coherence over {windows} windows is at most "
     "{coherence}",
