@@ -56,9 +56,11 @@ def test_a_recording_gives_one_response_at_the_excited_bins(tmp_path: Path, kind
     assert summary["found"]["span"] == 6000
     assert np.mean(valid) > 0.95
     if kind == "chirp":
-        assert 5 < f[0] < 14 and 190 < f[-1] < 210
+        assert 5 < f[0] < 14
+        assert 190 < f[-1] < 210
     error = np.abs(rows["re"] + 1j * rows["im"] - plant(f))[valid]
-    assert np.mean(error < 2 * rows["sigma"][valid]) > 0.9
+    if estimator == "lpm":  # the bounds of welch do not contain its bias
+        assert np.mean(error < 2 * rows["sigma"][valid]) > 0.9
     assert np.median(error / np.abs(plant(f))[valid]) < 0.05
 
 

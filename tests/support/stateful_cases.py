@@ -88,6 +88,14 @@ def tracker() -> Case:
     return Case(configured, processed(cut(block(), 333, 777, 1100)), [other])
 
 
+def direct_tracker() -> Case:
+    def new(window: int = WINDOW) -> Tracker:
+        lines = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=window)
+        return Tracker(Settings(lines=lines, input="u", output="y", estimator="direct", hop=10))
+
+    return Case(new, processed(cut(block(), 333, 777, 1100)), [lambda: new(2 * WINDOW)])
+
+
 def _nonperiodic(estimator: str) -> Case:
     def new(forgetting: float = 0.8) -> NonPeriodicTracker:
         return NonPeriodicTracker(
@@ -261,7 +269,7 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, local_polynomial, welch_average, spectra_tracker, motion_correction, fitter, drift, monitor_by_model,
-        monitor_by_tables, change_detection, fits, run_counts, stream_position,
+        tracker, direct_tracker, local_polynomial, welch_average, spectra_tracker, motion_correction, fitter, drift,
+        monitor_by_model, monitor_by_tables, change_detection, fits, run_counts, stream_position,
     )
 }  # fmt: skip

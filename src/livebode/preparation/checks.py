@@ -14,6 +14,7 @@ POWERLESS_SHARE = 1e-20
 _POWERLESS_DB = -80.0
 _REPEATS = 0.5  # noise alone repeats by 1/m over m periods
 _PERIODS_TO_JUDGE = 4
+_LISTED_MAX = 20
 
 
 class ChannelCheck(StatefulBase):
@@ -171,6 +172,17 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
             f"excitation: {lines}",
             "see events.jsonl for the remedy at each",
             reason="lines-invalid",
+            responses=responses,
+            window=window,
+        )
+    if at := tracker.found().get("judged", {}).get("not_repeating_hz"):
+        name = tracker.settings.channel(tracker.settings.method.reference)
+        raise SignalError(
+            "no-valid-response",
+            f"none of {responses} responses is valid: {name!r} does not repeat every {window} samples at "
+            f"{', '.join(f'{f:g}' for f in at[:_LISTED_MAX])}{' …' * (len(at) > _LISTED_MAX)} Hz",
+            f"set lines.window to its period; {ANY_EXCITATION}",
+            reason="not-periodic",
             responses=responses,
             window=window,
         )
