@@ -61,6 +61,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.fits
 	$(BIN)/python -m bench.bandwidth
 	$(BIN)/python -m bench.repeating
+	$(BIN)/python -m bench.nonperiodic
 	$(BIN)/python -m bench.live
 	$(BIN)/python -m bench.overload
 	$(BIN)/python -m bench.segments

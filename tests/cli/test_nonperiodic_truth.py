@@ -122,6 +122,13 @@ def test_inspect_names_the_estimator(tmp_path: Path, kind: str, estimator: str) 
     assert json.loads(livebode("inspect", path, "--excitation", "w", "--json").out)["estimator"] == estimator
 
 
+def test_a_baseline_is_not_learned_from_noise(tmp_path: Path) -> None:
+    tracked(tmp_path, "noise", "--estimator", "lpm", "--lines", "20:100:10", "--window", 500)
+    done = livebode("learn", tmp_path / "run", "--out", tmp_path / "baseline.json")
+    assert done.code == 2
+    assert "a baseline needs an excitation that repeats" in done.err
+
+
 AXIS = """
 [signals]
 output = "y"

@@ -25,6 +25,9 @@ _EXCITED = 1e-12  # of the largest power so far, as for a LineStage
 # The input must respond to the excitation significantly. Where it contains only noise that came around the loop, the
 # quotient is that of the feedback, −1/F, with a small residual.
 _CHANCE = 1e-4
+# Variance of a gain relative to that of one bin: 0.1 usually. A reference that is as smooth over frequency as the
+# transient, as at the ends of a chirp, cannot be told from it, and the error of the parabolas grows as the variance.
+_INFLATED_MAX = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,13 +140,14 @@ class NonPeriodicStage(StatefulBase):
         unexplained = self._after[1:][: len(gains)].copy()
         unexplained[1:] *= -plant
         sigma = np.sqrt(quotient.noise(unexplained) * quotient.variance) / np.abs(divisor * self._after[0])
-        valid = np.isfinite(sigma) & np.isfinite(plant) & (quotient.power > _EXCITED * self._largest)
+        separable = quotient.variance * quotient.power < _INFLATED_MAX
+        valid = separable & np.isfinite(sigma) & np.isfinite(plant) & (quotient.power > _EXCITED * self._largest)
         coherence = _coherence(quotient, 0)
         input_coherence = np.full(plant.size, np.nan)
         weight = quotient.power.astype(np.complex128)
         if self._divided:
             valid &= _significant(quotient, 1)
-            input_coherence, weight = _coherence(quotient, 1), divisor
+            input_coherence, weight = _coherence(quotient, 1), divisor * quotient.power
         value, derivative, weight = self._quantity(plant, gains[0], divisor, weight)
         nothing = complex(np.nan, np.nan)
         return {
