@@ -199,6 +199,7 @@ def test_a_recording_that_is_given_twice_is_refused(logs: list[Path], tmp_path: 
         ({"motion": {"radius_m": 0.02}}, "motion"),
         ({"monitoring": {"baseline": "healthy.json"}}, "monitoring.baseline"),
         ({"source": {"follow": True}}, "source.follow"),
+        ({"tracking": {"estimator": "lpm"}}, "tracking.estimator 'lpm'"),
     ],
 )
 def test_what_needs_one_recording_is_refused(sections: dict[str, Any], key: str, tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     of = examined(axis, log, pipeline.follower)
     settings = pipeline.follower.settings
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": of.found}
-    if settings.quantity == "plant" and not settings.average:
+    if settings.quantity == "plant" and settings.periodic and not settings.average:
         pipeline = replace(pipeline, drift=DriftTest(settings.lines))
     loop = RunLoop(
         of.source, pipeline, to, about=about, segments=axis.record, started=started, control=control,
@@ -65,7 +65,7 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     if slips:
         noticed.append(slip_event(slips, settings))
     source = AlignedLog(log, slips, log.first)
-    if not axis.tracking.all_periods and axis.motion is None:
+    if settings.periodic and not axis.tracking.all_periods and axis.motion is None:
         source = _steady(source, follower, noticed, shift)
     if isinstance(follower, Tracker):
         follower.know_spikes(early_spikes(source, settings) + shift)
