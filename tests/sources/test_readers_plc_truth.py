@@ -26,7 +26,15 @@ def group(rate_hz, samples, **channels):
 
 @pytest.mark.parametrize(
     ("delimiter", "decimal", "end"),
-    [("\t", ".", ""), ("\t", ",", "EOF"), (";", ",", ""), (",", ".", "EOF"), ("|", ".", "")],
+    [
+        ("\t", ".", ""),
+        ("\t", ",", "EOF"),
+        (";", ",", ""),
+        (",", ".", "EOF"),
+        ("|", ".", ""),
+        (":", ".", ""),
+        (" ", ",", "EOF"),
+    ],
 )
 def test_every_dialect_of_twincat_scope_gives_names_units_and_time(tmp_path, delimiter, decimal, end):
     path = tmp_path / "scope.csv"
@@ -36,6 +44,44 @@ def test_every_dialect_of_twincat_scope_gives_names_units_and_time(tmp_path, del
     assert (log.rate_hz, log.samples, log.format) == (1000, 300, "twincat")
     for name in ("vel", "MAIN.vel"):
         np.testing.assert_array_equal(values(log, name), np.arange(300) / 1000 * 3)
+
+
+def test_a_twincat_export_without_the_lines_of_its_file_is_read_alike(tmp_path):
+    path = tmp_path / "scope.csv"
+    write_scope(path, [group(1000, 300, pos=("mm", 2))])
+    path.write_text(path.read_text().partition("\n\n\n")[2])
+    log = open_log(path)
+    assert [(channel.name, channel.unit) for channel in log.channels] == [("t", "ms"), ("pos", "mm")]
+    assert (log.rate_hz, log.samples) == (1000, 300)
+
+
+def test_a_twincat_export_without_any_header_is_a_table_that_may_end_with_eof(tmp_path):
+    path = tmp_path / "scope.csv"
+    write_scope(path, [group(1000, 300, pos=("mm", 2))], decimal=",", end="EOF")
+    path.write_text(path.read_text().rpartition("\n\n")[2])
+    log = open_log(path, time="c1 [ms]")
+    assert (log.format, log.rate_hz) == ("csv", 1000)
+    np.testing.assert_array_equal(values(log, "c2"), np.arange(300) / 1000 * 2)
+
+
+def test_names_with_blanks_between_blanks_are_read_as_their_symbols(tmp_path):
+    """Nothing shows where such a name ends, except where it is the only one of its time column."""
+    path = tmp_path / "scope.csv"
+    head = [
+        'Name "a scope"\nFile "a.csv"\n\n\nName my pos vel Name motor current',
+        "SymbolName MAIN.x MAIN.x SymbolName MAIN.i",
+        "Unit mm (Length) (None) Unit A (Electric current)",
+        "Unit ScaleFactor 1 1 Unit ScaleFactor 1",
+    ]
+    first = [f"{k} {2 * k} {3 * k} {k + 0.5} {k}" for k in range(100)]
+    second = [f"      {k + 0.5} {k}" for k in range(100, 140)]  # a blank is an empty cell, too
+    path.write_text("\n".join([*head, "", *first, *second]) + "\n")
+    log = open_log(path)
+    assert [(c.name, c.unit) for c in log.channels] == [("t", "ms"), ("MAIN.x", "mm"), ("MAIN.x (2)", "")]
+    np.testing.assert_array_equal(values(log, "MAIN.x (2)"), 3 * np.arange(100))
+    other = open_log(path, channels=["motor current"])
+    assert (other.samples, other.channels[1].unit) == (140, "A")
+    np.testing.assert_array_equal(values(other, "motor current"), np.arange(140))
 
 
 def test_time_columns_of_each_channel_with_equal_times_are_one(tmp_path):

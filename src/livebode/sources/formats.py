@@ -57,7 +57,11 @@ def is_xml(head: bytes) -> bool:
     return head.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<")
 
 
-TWINCAT = re.compile(rb"(?:\xef\xbb\xbf)?Name[\t;,|][^\r\n]*\r?\nFile[\t;,|]")
+TWINCAT = re.compile(
+    rb"(?:\xef\xbb\xbf)?Name([\t;,|: ])[^\r\n]*\r?\n"
+    rb"(?:File|SymbolComment|Data-Type|SampleTime\[ms\]|NetI[dD]|SymbolName)\1"
+)
+"""First two lines of a TwinCAT export: of its file, or of its channels where the file's own lines were left out."""
 
 
 def is_wav(head: bytes) -> bool:
