@@ -344,6 +344,7 @@ def test_hdf5_without_its_library_names_the_extra(tmp_path, monkeypatch):
             "\ufeff",
             "Name\tscope\nFile\tx\nName\tu\n0\t1\n",
             "LabVIEW Measurement\nX_Value\tu\n0\t1\n",
+            "\x14" + 19 * "\0",
         ]
     ),
 )
@@ -488,6 +489,28 @@ def test_memory_of_a_long_wav_file_is_that_of_a_block(tmp_path):
     tracemalloc.stop()
     assert read == frames
     assert peak < frames * 16 / 4
+
+
+def test_a_scope_project_is_read_in_pieces_and_hostile_sizes_are_refused(tmp_path):
+    peaks = []
+    for samples in (150_000, 450_000):
+        path = write("svdx", tmp_path, signals(samples))
+        tracemalloc.start()
+        read = sum(len(block) for block in open_log(path).blocks(["input"], 4096))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert read == samples
+    assert peaks[1] < 1.1 * peaks[0]
+    whole = write("svdx", tmp_path, signals(40)).read_bytes()
+    at = 20 + 2 * 20 + 67 + 2 * 56 + 8  # behind the table, the head and levels of the first acquisition, and a time
+    assert whole[at : at + 8] == struct.pack("<Q", 16)
+    for wrong in (0, 17, 1 << 40, (1 << 64) - 1):
+        raw = whole[:at] + struct.pack("<Q", wrong) + whole[at + 8 :]
+        with refused(RecordingError, "damaged"):
+            drain(text(tmp_path, raw, "a.svdx"))
+    for first, wrong in ((0, 1 << 40), (8, 1 << 63), (20, 1 << 50), (28, 1 << 50)):
+        raw = whole[:first] + struct.pack("<Q", wrong) + whole[first + 8 :]
+        assert not survives(text(tmp_path, raw, "b.svdx"))
 
 
 @pytest.mark.parametrize("long", ['<a b="{}"/>', "<a><!-- {} --></a>", "<{}/>", "<a><?b {}?></a>"])

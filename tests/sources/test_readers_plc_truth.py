@@ -12,7 +12,9 @@ from livebode.sources import open_log
 from livebode.sources.dialect import Dialect
 from livebode.sources.tidy import Tidied
 from tests.support.errors import refused
+from tests.support.real_recordings import recording
 from tests.support.recordings import write_scope
+from tests.support.scope_project import Acquired, write_project
 
 
 def values(log, name):
@@ -62,6 +64,44 @@ def test_a_twincat_export_without_any_header_is_a_table_that_may_end_with_eof(tm
     log = open_log(path, time="c1 [ms]")
     assert (log.format, log.rate_hz) == ("csv", 1000)
     np.testing.assert_array_equal(values(log, "c2"), np.arange(300) / 1000 * 2)
+
+
+def test_a_scope_project_gives_what_its_charts_show(tmp_path):
+    """Names, scaling and units of the charts; variables that no chart shows; what ends after the record is left out."""
+    time_s, count = np.arange(300) / 1000, np.arange(300)
+    slow_s = np.arange(60) / 200 + 0.0003
+    given = [
+        Acquired("MAIN.r", time_s, count.astype("<f4") / 8, "r", "mm (Length)", 2.0, 1.0, -10.0, 10.0),
+        Acquired("MAIN.n", time_s, count.astype("<i2"), "r", "(None)"),
+        Acquired("MAIN.hidden", time_s, count.astype("<u8") * 3),
+        Acquired("MAIN.slow", slow_s, np.arange(60.0), "slow"),
+        Acquired("MAIN.packed", time_s, count.astype("<f4"), "packed", compression="Compressed"),
+        Acquired("MAIN.text", time_s, count.astype("<u8"), "text", type="STRING"),
+        Acquired("MAIN.bit", time_s, count.astype("<u8"), "bit", bits=4),
+    ]
+    path = tmp_path / "project.svdx"
+    write_project(path, given, after_s=0.01)
+    log = open_log(path)
+    assert [(c.name, c.unit) for c in log.channels] == [("MAIN.r", "mm"), ("MAIN.n", ""), ("hidden", "")]
+    assert (log.rate_hz, log.samples, log.other_clocks) == (1000, 290, {"slow.t": ("slow",)})
+    assert [skipped.name for skipped in log.skipped] == ["packed", "text", "bit"]
+    np.testing.assert_array_equal(values(log, "MAIN.r"), -10 * (2 * count[:290] / 8 + 1) + 10)
+    np.testing.assert_array_equal(values(log, "MAIN.n"), count[:290])
+    np.testing.assert_array_equal(values(open_log(path, time="slow.t"), "slow"), np.arange(58))
+
+
+def test_a_scope_project_and_its_export_give_the_same():
+    """Written by TwinCAT. The export has raw values, to which the factors in its header belong."""
+    project, export = (recording(f"twincat-scope/tc3_scope_3_4_3145_3{end}") for end in (".svdx", "-default.csv"))
+    scaled = {"func_scaled": (-1, 1), "func_scaled_int": (-1, 1), "func_units_scaled": (-10, 10)}
+    assert open_log(project).clock_kind == "utc"
+    for time in (None, "func_OS.t", "func_freesample.t"):
+        log, text = open_log(project, time=time), open_log(export, time=time)
+        assert (log.rate_hz, log.samples) == (text.rate_hz, text.samples)
+        for channel in text.channels[1:]:
+            factor, offset = scaled.get(channel.name, (1, 0))
+            assert channel in log.channels
+            np.testing.assert_allclose(values(log, channel.name), values(text, channel.name) * factor + offset, 1e-6)
 
 
 def test_names_with_blanks_between_blanks_are_read_as_their_symbols(tmp_path):

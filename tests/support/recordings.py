@@ -25,6 +25,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from livebode.sources import Log
 from livebode.sources import open_log as open_alone
+from tests.support.scope_project import Acquired, write_project
 from tests.support.ulog_file import ulog_file
 
 RATE_HZ = 4000.0
@@ -114,6 +115,13 @@ def write_twincat(path: Path, signals: Signals) -> None:
     time = signals.get("t", np.arange(len(next(iter(signals.values())))) / RATE_HZ)
     given = {name: values for name, values in signals.items() if name != "t"}
     write_scope(path, [(time, {name: ("", values) for name, values in given.items()})])
+
+
+def write_svdx(path: Path, signals: Signals) -> None:
+    """A project with a chart; its times have the resolution of 100 ns."""
+    given = {name: values.astype("<f8") for name, values in signals.items() if name != "t"}
+    time_s = clock_s(signals)
+    write_project(path, [Acquired(f"MAIN.{name}", time_s, values, name) for name, values in given.items()])
 
 
 def write_scope(
@@ -288,6 +296,7 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "mdf": (".mf4", write_mdf),
     "sinumerik": (".xml", write_sinumerik),
     "lvm": (".lvm", write_lvm),
+    "svdx": (".svdx", write_svdx),
     "twincat": (".csv", write_twincat),
     "ulog": (".ulg", write_ulog),
     "wav": (".wav", write_wav),
@@ -314,6 +323,7 @@ CLOCKS = {
     "mcap": "/log.header.stamp",
     "mdf": "t",
     "rosbag": "/log.header.stamp",
+    "svdx": "t",
     "twincat": "t",
     "ulog": "log.timestamp",
 }

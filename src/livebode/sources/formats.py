@@ -12,6 +12,7 @@ from pathlib import Path
 from livebode.core import LivebodeError, RecordingError
 from livebode.sources.dbc import no_frames
 from livebode.sources.recording import Recording, contained
+from livebode.sources.svdxdata import is_project
 
 HEAD_BYTES = 1024
 MDF_MAGIC = b"MDF     ", b"UnFinMF "
@@ -89,6 +90,7 @@ FORMATS = (
     Format("ROS 2 bag", (".db3",), lambda head: head.startswith(b"SQLite format 3\0"), "rosbag"),
     Format("BLF", (".blf",), lambda head: head.startswith(b"LOGG"), "blf", takes_dbc=True),
     Format("ASC", (".asc",), lambda head: ASC_HEAD.match(head) is not None, "asc", takes_dbc=True),
+    Format("TwinCAT Scope project", (".svdx",), is_project, "svdx"),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
     Format("TwinCAT Scope export", (".csv", ".txt"), lambda head: TWINCAT.match(head) is not None, "twincat"),
     Format("LabVIEW LVM", (".lvm",), lambda head: head.startswith(b"LabVIEW Measurement"), "lvm"),

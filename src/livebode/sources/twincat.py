@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from livebode.sources.delimited import DelimitedRecording
 from livebode.sources.dialect import Dialect, Sample
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.timed import TimedColumns, as_columns, merged, trimmed
-from livebode.sources.twincatwords import properties_of_words
+from livebode.sources.twincatwords import properties_of_words, unique_names
 
 ROW = re.compile(r'[\s"]*[-+.\d]')
 """A row of values; each row above the table begins with the name of a property."""
@@ -65,16 +64,16 @@ def timed_columns(properties: dict[str, list[str]]) -> list[TimedColumns]:
     """
     names = properties["Name"]
     symbols, units = (padded(properties.get(name, []), len(names)) for name in ("SymbolName", "Unit"))
-    count = Counter(names)
+    own = [at > 0 and name != "Name" for at, name in enumerate(names)]
+    unique = unique_names([name if is_own else "" for name, is_own in zip(names, own)], symbols)
     groups: list[TimedColumns] = []
-    for at, name in enumerate(names):
-        if at == 0 or name == "Name":
+    for at, is_channel in enumerate(own):
+        if not is_channel:
             groups.append(TimedColumns(Column(TIME, "ms", key=at), ()))
             continue
         symbol, unit = symbols[at], QUANTITY.sub("", units[at])
-        unique = symbol if count[name] > 1 and symbol else name
-        if unique:  # older exports end each row with a delimiter
-            column = Column(unique, unit, aliases=(symbol,) if symbol not in ("", unique) else (), key=at)
+        if name := unique[at]:  # older exports end each row with a delimiter
+            column = Column(name, unit, aliases=(symbol,) if symbol not in ("", name) else (), key=at)
             groups[-1] = TimedColumns(groups[-1].time, (*groups[-1].channels, column))
     return [group for group in groups if group.channels]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 UNIT = re.compile(r"\S* ?\([^()]*\)")
 """A unit with its quantity: "mm (Length)", "(None)"."""
@@ -24,7 +25,8 @@ def properties_of_words(lines: Sequence[str]) -> dict[str, list[str]]:
     """
     rows = {line.split(" ")[0]: line for line in lines if not any(f"Unit{ending}" in line for ending in OTHER)}
     symbols = list(groups(rows.get("SymbolName", "").split(), "SymbolName"))
-    unique = numbered(symbols)
+    flat = iter(unique_names(list(chain(*symbols)), list(chain(*symbols))))
+    unique = [[next(flat) for _ in group] for group in symbols]
     names = list(groups(rows.get("Name", "").split(), "Name"))
     if len(names) != len(symbols):
         return {}
@@ -52,19 +54,19 @@ def named(words: list[str], symbols: list[str]) -> list[str]:
     return [" ".join(words)] if len(symbols) == 1 else symbols
 
 
-def numbered(symbols: Sequence[Sequence[str]]) -> list[list[str]]:
-    """The symbols with a number from 2 where they are repeated.
+def unique_names(names: Sequence[str], symbols: Sequence[str]) -> list[str]:
+    """The names; where several are equal the symbols, and where these are, too, with a number from 2.
 
-    >>> numbered([["a"], ["a", "b"]])
-    [['a'], ['a (2)', 'b']]
+    >>> unique_names(["x", "x", "y", "y"], ["A.x", "B.x", "A.y", "A.y"])
+    ['A.x', 'B.x', 'A.y', 'A.y (2)']
     """
+    count = Counter(name for name in names if name)
     seen: Counter[str] = Counter()
-    unique: list[list[str]] = []
-    for group in symbols:
-        unique.append([])
-        for symbol in group:
-            seen[symbol] += 1
-            unique[-1].append(symbol if seen[symbol] == 1 else f"{symbol} ({seen[symbol]})")
+    unique = []
+    for name, symbol in zip(names, symbols, strict=True):
+        own = symbol if count[name] > 1 and symbol else name
+        seen[own] += 1
+        unique.append(own if seen[own] == 1 or not own else f"{own} ({seen[own]})")
     return unique
 
 
