@@ -44,7 +44,7 @@ from tests.support.recordings import (
 )
 
 MODULES = sorted(WRITERS)
-MAY_END_ANYWHERE = "asc", "delimited", "lvm", "twincat", "ulog"
+MAY_END_ANYWHERE = "asc", "codesys", "delimited", "lvm", "twincat", "ulog"
 """A table may end after any row, and a flight recorder when its battery is removed."""
 ROUNDS = int(os.environ.get("LIVEBODE_FUZZ_ROUNDS", "150"))
 """Damaged files of each kind; raise it for a campaign."""
@@ -345,6 +345,7 @@ def test_hdf5_without_its_library_names_the_extra(tmp_path, monkeypatch):
             "Name\tscope\nFile\tx\nName\tu\n0\t1\n",
             "LabVIEW Measurement\nX_Value\tu\n0\t1\n",
             "\x14" + 19 * "\0",
+            "[key]; [value]\n0.Variable; u\n0.Data; \n; 0; 1\n; 1; 2\n",
         ]
     ),
 )

@@ -13,7 +13,7 @@ from livebode.sources.dialect import Dialect
 from livebode.sources.tidy import Tidied
 from tests.support.errors import refused
 from tests.support.real_recordings import recording
-from tests.support.recordings import write_scope
+from tests.support.recordings import write_scope, write_trace
 from tests.support.scope_project import Acquired, write_project
 
 
@@ -223,6 +223,40 @@ def test_a_trace_of_codesys_2_as_text_gives_its_variables(tmp_path):
     log = open_log(path, rate_hz=1000)
     assert [channel.name for channel in log.channels] == ["Cycle", "PLC_PRG.rPos", "PLC_PRG.bOn"]
     np.testing.assert_array_equal(values(log, "PLC_PRG.rPos"), 2 * np.arange(100.0))
+
+
+@pytest.mark.parametrize(
+    ("flags", "unit_s"),
+    [("Flags; 16", 1e-3), ("Flags; 20", 1e-3), ("Flags; 32", 1e-6), ("Flags; 36", 1e-6), ("", 1e-3)],
+)
+def test_a_trace_of_codesys_3_gives_its_variables_with_their_clocks(tmp_path, flags, unit_s):
+    """Each has its own times; where they are equal there is one clock. The flags contain the unit of the times."""
+    path = tmp_path / "trace.csv"
+    fast, slow = np.arange(300) * 0.001 / unit_s, np.arange(40) * 0.02 / unit_s
+    variables = {
+        "PLC_PRG.rPos": (fast, (np.arange(300) * 0.5).tolist()),
+        "PLC_PRG.bOn": (fast, ["TRUE", "FALSE"] * 150),
+        "PLC_PRG.rTemp": (slow, np.arange(40.0).tolist()),
+        "PLC_PRG.sState": (slow, ["running; fine"] * 40),
+        "PLC_PRG.rNever": ([], []),
+    }
+    write_trace(path, variables, flags)
+    log = open_log(path)
+    assert [(c.name, c.unit) for c in log.channels[1:]] == [("PLC_PRG.rPos", ""), ("PLC_PRG.bOn", "")]
+    assert (log.rate_hz, log.format, log.other_clocks) == (1000, "codesys", {"PLC_PRG.rTemp.t": ("PLC_PRG.rTemp",)})
+    assert [skipped.name for skipped in log.skipped] == ["PLC_PRG.sState", "PLC_PRG.rNever"]
+    np.testing.assert_array_equal(values(log, "PLC_PRG.rPos"), np.arange(300) * 0.5)
+    np.testing.assert_array_equal(values(log, "PLC_PRG.bOn"), [1, 0] * 150)
+    other = open_log(path, channels=["PLC_PRG.rTemp"])
+    assert (other.rate_hz, other.samples) == (50, 40)
+
+
+def test_text_in_a_trace_of_codesys_3_names_its_line(tmp_path):
+    path = tmp_path / "trace.csv"
+    write_trace(path, {"a": (range(100), range(100)), "b": (range(100), [*range(50), "x", *range(49)])})
+    assert len(values(open_log(path), "a")) == 100
+    with refused(RecordingError, "cell-not-a-number", line=163, value="x"):
+        values(open_log(path), "b")
 
 
 def test_short_lines_of_a_wide_table_are_completed_in_small_pieces():

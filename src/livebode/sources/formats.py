@@ -65,6 +65,9 @@ TWINCAT = re.compile(
 """First two lines of a TwinCAT export: of its file, or of its channels where the file's own lines were left out."""
 
 
+CODESYS = re.compile(rb"(?:\xef\xbb\xbf)?\[key\];[ \t]*\[value\]\s*\n")
+
+
 def is_wav(head: bytes) -> bool:
     return head.startswith((b"RIFF", b"RIFX", b"RF64")) and head[8:12] == b"WAVE"
 
@@ -93,6 +96,7 @@ FORMATS = (
     Format("TwinCAT Scope project", (".svdx",), is_project, "svdx"),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
     Format("TwinCAT Scope export", (".csv", ".txt"), lambda head: TWINCAT.match(head) is not None, "twincat"),
+    Format("CODESYS trace", (".csv", ".txt"), lambda head: CODESYS.match(head) is not None, "codesys"),
     Format("LabVIEW LVM", (".lvm",), lambda head: head.startswith(b"LabVIEW Measurement"), "lvm"),
     Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, "delimited"),
 )  # fmt: skip
