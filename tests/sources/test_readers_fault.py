@@ -398,6 +398,17 @@ def test_damaged_files_are_read_or_refused(module, tmp_path):
         survives(path, rate_hz=rng.choice([None, 4000.0]), time=rng.choice([None, "none"]))
 
 
+@pytest.mark.parametrize(("module", "rounds"), [("mdf", (625, 805, 980, 1494)), ("ulog", (3, 13, 104, 157))])
+def test_libraries_print_nothing_about_damaged_files(module, rounds, tmp_path, capsys):
+    """asammdf and pyulog printed what they had found in these; standard output is still that of the process."""
+    whole, output = seeds(module, tmp_path), sys.stdout
+    for round_ in rounds:
+        path = text(tmp_path, damaged(whole, random.Random(f"{module} {round_}")), "damaged.bin")
+        survives(path, rate_hz=4000)
+        assert sys.stdout is output
+    assert capsys.readouterr() == ("", "")
+
+
 def test_damaged_dbc_files_are_read_or_refused(tmp_path):
     path = write("blf", tmp_path, with_time(signals(20)))
     whole = (tmp_path / DBC).read_bytes()
