@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.core.mains import MAINS_HZ, meets_mains
 from livebode.excitation.blocks import cut, spectra
+from livebode.excitation.doubtful import with_lines_beside
 from livebode.excitation.significance import BinClasses, find_lines
 
 Floats = NDArray[np.float64]
@@ -20,6 +21,7 @@ _NEAR_BINS = 0.1  # the period is a multiple of the hum's, otherwise the recordi
 _POWER_MAX, _LEVEL_MAX = 0.1, 0.5
 _WEAK = 0.1  # of the strongest line
 _ORDER_MAX = 2  # of the lowest hum: 50 Hz, or 100 Hz of a rectifier
+_BELOW_ORDER = 6.5  # hum begins there, at the sixth harmonic of a six-pulse rectifier, at the latest
 _FAR_BELOW = 0.05  # 26 dB: few designs have lines that far apart, and then hardly at the mains alone
 
 
@@ -37,15 +39,16 @@ def without_mains(calm: Floats, period: int, rate_hz: float, step: float) -> int
     step
         The samples are multiples of it; 0 for none.
     """
-    found = find_lines(spectra(cut(calm, period)), step=step)
+    found = with_lines_beside(find_lines(spectra(cut(calm, period)), step=step), rate_hz / period)
     bins = np.flatnonzero(found.excited)
     level, resolution_hz = found.amplitude[bins], rate_hz / period
-    at_mains = [_at_harmonics(bins, resolution_hz, mains_hz) for mains_hz in MAINS_HZ]
+    at_mains = [(mains_hz, _at_harmonics(bins, resolution_hz, mains_hz)) for mains_hz in MAINS_HZ]
     for shorter in (divisor for divisor in range(1, period) if period % divisor == 0):
         on = bins % (period // shorter) == 0
         if on.all() and bins.size:
             return shorter
-        if on.any() and any(at[~on].all() for at in at_mains) and _weaker(level[~on], level[on]):
+        hum = [hz for hz, at in at_mains if at[~on].all() and np.min(bins[~on]) * resolution_hz < hz * _BELOW_ORDER]
+        if on.any() and hum and _weaker(level[~on], level[on]):
             return shorter
     return period
 

@@ -152,7 +152,7 @@ def inspect(
             w = beginning(log, excitation)
             found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
         except LivebodeError as error:
-            if quiet is None:
+            if quiet is None and error.code != "signal.lines-ambiguous":
                 raise
             unrecognised = str(error)
     return Inspection(log, contents, found, quiet, unrecognised, without_rate)
@@ -177,5 +177,5 @@ def _periods_in(log: Log, excitation: str | None) -> tuple[int, int]:
             "name the excitation, or give the limit in seconds or samples",
             argument="excitation",
         )
-    found = recognise(beginning(log, excitation), log.rate_hz)
+    found = recognise(beginning(log, excitation), log.rate_hz, doubtful=True)
     return log.first + found.start, found.period
