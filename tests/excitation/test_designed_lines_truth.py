@@ -182,3 +182,14 @@ def test_lines_far_below_the_others_that_the_output_does_not_show_are_left_out()
     y = 0.5 * w + 0.3 * np.abs(w).max() * np.random.default_rng(2).standard_normal(w.size)
     assert len(recognise(w, RATE_HZ).lines.bins) > 200
     assert recognise(w, RATE_HZ, y).lines.bins == lines.bins
+
+
+def test_hum_far_below_the_lines_on_both_sides_is_no_line_of_a_sloping_design() -> None:
+    """50 and 150 Hz fit the period; the weakest line is weaker than the hum."""
+    bins = np.array([3, 9, 21, 24, 33, 41, 60, 70, 81, 90, 120, 200])
+    n = np.arange(2000)
+    amplitude = 10 ** (-np.arange(bins.size) / 6)
+    w = sum(a * np.cos(2 * np.pi * k * n / 2000 + k * k) for a, k in zip(amplitude, bins))
+    hum = 0.02 * np.cos(2 * np.pi * 25 * n / 2000) + 0.004 * np.cos(2 * np.pi * 75 * n / 2000)
+    assert recognise(np.tile(w + hum, 4), RATE_HZ).lines.bins == tuple(bins)
+    assert recognise(np.tile(w + 10 * hum, 4), RATE_HZ).lines.bins == tuple(sorted({*bins.tolist(), 25, 75}))

@@ -22,6 +22,7 @@ _POWER_MAX, _LEVEL_MAX = 0.1, 0.5
 _WEAK = 0.1  # of the strongest line
 _ORDER_MAX = 2  # of the lowest hum: 50 Hz, or 100 Hz of a rectifier
 _BELOW_ORDER = 6.5  # hum begins there, at the sixth harmonic of a six-pulse rectifier, at the latest
+_BELOW_BESIDE = 0.125  # 18 dB below the lines on both sides: the amplitudes of a design are smooth
 _FAR_BELOW = 0.05  # 26 dB: few designs have lines that far apart, and then hardly at the mains alone
 
 
@@ -54,13 +55,17 @@ def without_mains(calm: Floats, period: int, rate_hz: float, step: float) -> int
 
 
 def separate_hum(found: BinClasses, resolution_hz: float) -> BinClasses:
-    """Count weak lines at harmonics of the mains as distortion, if all other lines are much stronger."""
+    """Count weak lines at harmonics of the mains as distortion, if all lines, or those beside, are much stronger."""
     bins = np.flatnonzero(found.excited)
     level = found.amplitude[bins]
     for mains_hz in MAINS_HZ:
-        weak = _at_harmonics(bins, resolution_hz, mains_hz) & (level <= _FAR_BELOW * level.max())
+        at = _at_harmonics(bins, resolution_hz, mains_hz)
+        weak = at & (level <= _FAR_BELOW * level.max())
+        if weak.any() and level[weak].max() > _FAR_BELOW * level[~weak].min():
+            weak[:] = False
+        weak |= at & (level <= _BELOW_BESIDE * _beside(level, at))
         order = np.rint(bins[weak] * resolution_hz / mains_hz)
-        if np.any(order <= _ORDER_MAX) and level[weak].max() <= _FAR_BELOW * level[~weak].min():
+        if np.any(order <= _ORDER_MAX):
             hum = np.isin(np.arange(found.excited.size), bins[weak])
             return replace(found, excited=found.excited & ~hum, distortion=found.distortion | hum)
     return found
@@ -68,6 +73,16 @@ def separate_hum(found: BinClasses, resolution_hz: float) -> BinClasses:
 
 def _at_harmonics(bins: NDArray[np.intp], resolution_hz: float, mains_hz: float) -> NDArray[np.bool_]:
     return meets_mains(bins, resolution_hz, (mains_hz,), _NEAR_BINS + _MAINS_DRIFT * bins)
+
+
+def _beside(level: Floats, at: NDArray[np.bool_]) -> Floats:
+    """Of each line the weaker one of its neighbours that are not at the mains; 0 without one on both sides."""
+    others = np.flatnonzero(~at)
+    after = np.searchsorted(others, np.arange(level.size))
+    inside = (after > 0) & (after < others.size)
+    weaker = np.zeros(level.size)
+    weaker[inside] = np.minimum(level[others[after[inside] - 1]], level[others[after[inside]]])
+    return weaker
 
 
 def _weaker(hum: Floats, lines: Floats) -> bool:
