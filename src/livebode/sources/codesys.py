@@ -28,7 +28,7 @@ TIME, VALUE = 1, 2
 
 
 @dataclass(frozen=True)
-class Section:
+class TracedVariable:
     """The samples of a variable: byte and line at which they begin, their number, and a fingerprint of their times."""
 
     name: str
@@ -69,7 +69,7 @@ class CodesysRecording(Recording):
         with self.path.open("rb") as file:
             for first in range(0, samples, rows):
                 count = min(rows, samples - first)
-                read: dict[Section, list[tuple[float, float]]] = {}
+                read: dict[TracedVariable, list[tuple[float, float]]] = {}
                 for section in sections:
                     file.seek(place[section])
                     read[section] = [row_of(file, section.line + first + k) for k in range(count)]
@@ -80,14 +80,14 @@ class CodesysRecording(Recording):
                 ]
 
 
-def unusable(section: Section) -> str:
+def unusable(section: TracedVariable) -> str:
     return "it has no samples" if not section.samples else "it contains text" if section.is_text else ""
 
 
-def read_sections(file: IO[bytes]) -> tuple[str, list[Section]]:
+def read_sections(file: IO[bytes]) -> tuple[str, list[TracedVariable]]:
     """Unit of the times, and the variables; the values are not read."""
     unit, name, number = "ms", "", 0
-    sections: list[Section] = []
+    sections: list[TracedVariable] = []
     while line := file.readline(LINE_BYTES_MAX):
         number += 1
         if found := FLAGS.match(line):
@@ -103,7 +103,7 @@ def read_sections(file: IO[bytes]) -> tuple[str, list[Section]]:
     return unit, sections
 
 
-def read_section(file: IO[bytes], name: str, number: int) -> Section:
+def read_section(file: IO[bytes], name: str, number: int) -> TracedVariable:
     """The samples from here to the first line that is not one, which remains to be read."""
     at = end = file.tell()
     samples, digest, is_text = 0, hashlib.blake2b(), False
@@ -114,7 +114,7 @@ def read_section(file: IO[bytes], name: str, number: int) -> Section:
         samples += 1
         end = file.tell()
     file.seek(end)
-    return Section(name, at, number, samples, digest.digest(), is_text)
+    return TracedVariable(name, at, number, samples, digest.digest(), is_text)
 
 
 def row_of(file: IO[bytes], number: int) -> tuple[float, float]:
