@@ -75,7 +75,7 @@ def _mode(track: dict[str, Any]) -> str:
     return (
         f"{track['name']}: {newest['frequency_hz']:.5g} ± {1.96 * newest['frequency_hz_sigma']:.2g} Hz, damping "
         f"{100 * newest['damping']:.3g} ± {100 * 1.96 * newest['damping_sigma']:.2g} %, "
-        f"{100 * newest['share']:.2g} % of the power (newest); {_range(track)}"
+        f"{100 * newest['share']:.0f} % of the power (newest); {_range(track)}"
     )
 
 

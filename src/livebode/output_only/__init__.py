@@ -6,10 +6,9 @@ from livebode.output_only.mode_tracker import ModeTracker, WindowModes
 from livebode.output_only.reduction import lost_samples
 from livebode.output_only.settings import OUTPUTS_MAX, OutputOnlySettings, reduced, window_of
 from livebode.output_only.stabilisation import Mode
-from livebode.output_only.tracks import NOT_FOUND, Tracks
+from livebode.output_only.tracks import Tracks
 
 __all__ = [
-    "NOT_FOUND",
     "OUTPUTS_MAX",
     "Mode",
     "ModeCurve",

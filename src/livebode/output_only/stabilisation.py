@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ Floats = NDArray[np.float64]
 
 ORDER_MAX = 20
 """Largest order from which modes are taken."""
-EXCESS_MAX = 2.0
+EXCESS_MAX = 3.0
 """A model suffices if the singular values that it leaves out are not larger than this many times their scatter."""
 HIGHER_ORDERS, REPEATED_MIN = 5, 4
 """Higher orders in which a mode is looked for, and in which it must be found."""
@@ -22,7 +23,7 @@ DAMPING_MAX = 0.2
 """Poles with more damping are not listed: they describe the colour of excitation and noise."""
 SHARE_MIN = 0.005
 """Of the outputs' power; weaker modes are not listed."""
-UNCERTAINTY_MAX = 0.02
+UNCERTAINTY_MAX = 0.01
 """Sigma of a mode's frequency as a share of the frequency; poles that are less certain are not listed."""
 _SAME_FREQUENCY, _SAME_DAMPING = 0.01, 0.05  # relative, as usual in stabilisation diagrams (Peeters & De Roeck 2001)
 _SIGMAS = 2.0  # a difference that the bounds explain is no difference
@@ -65,10 +66,10 @@ def stable_modes(subspace: Subspace, band_hz: tuple[float, float]) -> tuple[int,
         Lowest and highest frequency of a mode.
     """
     highest = min(ORDER_MAX, subspace.order_max - 2 * HIGHER_ORDERS)
-    models = {n: subspace.poles(n) for n in range(2, highest + 2 * HIGHER_ORDERS + 1, 2)}
     sufficient = [n for n in range(2, highest + 1, 2) if subspace.excess(n) <= EXCESS_MAX] or [highest]
+    models = cache(subspace.poles)
     for order in sufficient:
-        poles = models[order]
+        poles = models(order)
         stable = [i for i in range(len(poles)) if _possible(poles, i, band_hz) and _stable(models, order, i)]
         if stable and int(np.argmax(poles.share)) in stable:
             break
@@ -93,9 +94,9 @@ def _mode(poles: Poles, i: int) -> Mode:
     return Mode(f, z, poles.covariance[i], float(min(poles.share[i], 1.0)), poles.shape[i])
 
 
-def _stable(models: Mapping[int, Poles], order: int, i: int) -> bool:
-    higher = (models[order + 2 * n] for n in range(1, HIGHER_ORDERS + 1))
-    return sum(_repeats(model, models[order], i) for model in higher) >= REPEATED_MIN
+def _stable(models: Callable[[int], Poles], order: int, i: int) -> bool:
+    higher = (models(order + 2 * n) for n in range(1, HIGHER_ORDERS + 1))
+    return sum(_repeats(model, models(order), i) for model in higher) >= REPEATED_MIN
 
 
 def _possible(poles: Poles, i: int, band_hz: tuple[float, float]) -> bool:
