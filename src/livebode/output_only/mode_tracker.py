@@ -19,6 +19,9 @@ from livebode.output_only.subspace import Subspace
 Floats = NDArray[np.float64]
 
 
+_PLAUSIBLE_MAX = 1e100  # products of larger samples overflow
+
+
 @dataclass(frozen=True, eq=False)
 class WindowModes:
     """Result of one window.
@@ -86,6 +89,7 @@ class ModeTracker:
         """The windows that end in these samples."""
         names = self.settings.outputs
         x = np.array([block[name] for name in names])
+        x[np.abs(x) > _PLAUSIBLE_MAX] = np.nan
         schedule = np.full(len(block), np.nan) if self.settings.schedule is None else block[self.settings.schedule]
         self._count(block, x, emit)
         missing = block.start - self._next if self._next >= 0 else 0
@@ -149,7 +153,10 @@ class ModeTracker:
         whole = [(r, y) for r, y in self._hops if r.size]
         if len(whole) < max(HOPS_MIN, of.hops // 2):
             return WindowModes(newest, time_s, schedule, (), (), "gaps")
-        subspace = Subspace(np.array([r for r, _ in whole]), of.rows, of.reduced_rate_hz)
+        correlations = np.array([r for r, _ in whole])
+        if not np.all(np.einsum("kii->i", correlations[:, 0]) > 0):  # an output does not change
+            return WindowModes(newest, time_s, schedule, (), ())
+        subspace = Subspace(correlations, of.rows, of.reduced_rate_hz)
         samples = np.array([y for _, y in whole])
         modes, harmonics = list[Mode](), list[Mode]()
         order, found = stable_modes(subspace, of.band_hz)

@@ -111,6 +111,6 @@ def _repeats(model: Poles, poles: Poles, i: int) -> bool:
     """Whether a model has a pole again; one that it splits into two uncertain ones is there too."""
     f, z = poles.frequency_hz[i], poles.damping[i]
     sigma = np.sqrt(np.diagonal(poles.covariance[i] + model.covariance, axis1=-2, axis2=-1))
-    same = np.abs(model.frequency_hz - f) <= np.maximum(_SAME_FREQUENCY * f, _SIGMAS * sigma[:, 0])
-    same &= np.abs(model.damping - z) <= np.maximum(_SAME_DAMPING * abs(z), _SIGMAS * sigma[:, 1])
+    same = np.abs(model.frequency_hz - f) <= np.fmax(_SAME_FREQUENCY * f, _SIGMAS * sigma[:, 0])
+    same &= np.abs(model.damping - z) <= np.fmax(_SAME_DAMPING * abs(z), _SIGMAS * sigma[:, 1])
     return bool(same.any())

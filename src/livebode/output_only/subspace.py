@@ -12,6 +12,8 @@ from livebode.output_only.correlations import hankel
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+_ROUNDING = 1e-9  # of the largest singular value: smaller ones are rounding
+
 
 @dataclass(frozen=True, eq=False)
 class Poles:
@@ -68,6 +70,7 @@ class Subspace:
         self._matrix = hankel(mean, rows)
         self._left, self._values, right = np.linalg.svd(self._matrix)
         self._right = right.T
+        self._rank = int(np.count_nonzero(self._values > _ROUNDING * self._values[0]))
         self._outputs, self._rate_hz = outputs, rate_hz
         self._power = float(np.trace(mean[0]))
         directions = hankel(deviations, rows)
@@ -87,7 +90,8 @@ class Subspace:
         return float(np.sum(self._values[order:] ** 2) / noise) if noise > 0 else np.inf
 
     def poles(self, order: int) -> Poles:
-        """The poles of the model with so many states."""
+        """The poles of the model with so many states; of fewer if the outputs have no noise that needs more."""
+        order = min(order, self._rank)
         observability = self._left[:, :order]
         upper, lower = observability[: -self._outputs], observability[self._outputs :]
         inverse = np.linalg.pinv(upper)

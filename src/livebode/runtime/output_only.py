@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from livebode.configuration.axis import Axis
 from livebode.configuration.recording import open_recording
 from livebode.core import Event, Parameters, SignalError
@@ -66,7 +68,8 @@ def run_output_only(
     log = log.naming([*settings.outputs, *filter(None, [settings.schedule])])
     with moments_by(RunClock.of_kind(log.clock_kind)), WholeRecord(directory, force=force, responses=False) as record:
         run = _OutputOnlyRun(axis, log, settings, Stream(record, subscribers, EventGroups()))
-        run.follow()
+        with threadpool_limits(1, user_api="blas"):  # the matrices are small: threads would wait for each other
+            run.follow()
         summary = run.summary(started)
         record.finish(summary, draw)
     return OutputOnlyOutcome(directory, summary)
