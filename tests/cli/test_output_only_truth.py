@@ -95,7 +95,7 @@ def test_what_needs_a_response_is_refused_by_one_sentence(
     done = livebode(*(word.format(run=run[0], log=log) for word in command))
     assert done.code == 2
     assert done.err.count("\n") == 1
-    assert "is an output-only run: it has modes and no responses; use" in done.err
+    assert "is an output-only run: it has modes and no responses; query its table" in done.err
 
 
 @pytest.mark.parametrize(

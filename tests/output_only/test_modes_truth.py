@@ -143,7 +143,7 @@ def test_missing_samples_are_a_gap_in_the_rows_and_the_curve_continues_after_it(
     assert not gap[-1]
 
 
-def test_a_gap_that_is_longer_than_a_window_begins_anew() -> None:
+def test_windows_start_again_after_a_gap_that_is_longer_than_a_window() -> None:
     of = settings(hop_samples=50)
     tracker, y = ModeTracker(of), two_modes(9, 4200)
     before = tracker.process(Block(y[:, :2100], of.outputs, RATE_HZ))

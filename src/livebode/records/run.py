@@ -111,7 +111,7 @@ class RunRecord:
             raise RecordError(
                 "no-responses",
                 f"{str(path)!r} is an output-only run: it has modes and no responses",
-                "use `livebode query`, or `livebode export --parameters`",
+                "query its table parameters, or export its parameters",
                 path=str(path),
             )
         try:

@@ -18,7 +18,7 @@ from tests.support.ringing import RATE_HZ, two_modes
 
 # Its Hankel matrix takes other samples at the ends of the record: a share of sigma, not rounding.
 SHARE_OF_SIGMA = 0.2
-ANSWERS = json.loads((Path(__file__).parent / "pyoma2.json").read_text("utf-8"))["rows"]
+ANSWERS = json.loads((Path(__file__).parent / "stored" / "pyoma2.json").read_text("utf-8"))["rows"]
 
 
 def poles(seed: int, outputs: int) -> Poles:
