@@ -33,20 +33,20 @@ def under(w: np.ndarray, noise: float, *, closed: bool = True) -> Block:
 
 
 def test_noise_of_a_quarter_of_the_power_is_taken_for_another_input_less_than_once_in_a_thousand_windows() -> None:
-    rng, false, lines = np.random.default_rng(1), 0, Lines(tuple(range(1, 101)), 400, RATE_HZ)
+    rng, lines = np.random.default_rng(1), Lines(tuple(range(1, 101)), 400, RATE_HZ)
     periodicity = Periodicity(lines, 1, "u", [])
-    noise = rng.standard_normal((2, 4000, len(lines))) / np.sqrt(2)
+    noise = rng.standard_normal((2, 2000, len(lines))) / np.sqrt(2)
     with np.errstate(all="ignore"):
-        every = np.arange(4000)
+        every = np.arange(2000)
         false = periodicity.process(2 + noise[0] + 1j * noise[1], every >= 0, every, every.astype(float)).mean()
     assert false < 1e-3
 
 
 @pytest.mark.parametrize("closed", [False, True], ids=["open", "closed"])
-@pytest.mark.parametrize("noise", [0.0, 0.01, 1.0])
+@pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_a_periodic_input_is_valid_with_noise_up_to_the_signal(noise: float, closed: bool) -> None:
-    for options in ({}, {"forgetting": 1.0}, {"average": True, "forgetting": 1.0}):
-        found, events = direct(under(np.tile(PERIOD, 200), noise, closed=closed), **options)
+    for options in ({}, {"average": True, "forgetting": 1.0}):
+        found, events = direct(under(np.tile(PERIOD, 100), noise, closed=closed), **options)
         assert found.valid.mean() > 0.999
         assert not events
 
