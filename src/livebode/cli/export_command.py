@@ -36,7 +36,7 @@ def export_command(
     from livebode import export
 
     _check(to, at, mean, parameters, tuple(export.TABLES if parameters else export.FORMATS))
-    record = RunRecord.open(run)
+    record = RunRecord.open(run, output_only=parameters)
     name = record.path.resolve()
     path = out or name.with_name(name.name + "-parameters" * parameters + export.ENDINGS[to])
     if parameters:

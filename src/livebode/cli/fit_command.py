@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from livebode.cli.band import parsed_band
 from livebode.cli.options import Json
 from livebode.cli.pictures import show_fit
 from livebode.configuration import Axis
@@ -59,7 +60,7 @@ def fit_command(
         "inertia_ratio": ratio,
         "fixed": dict(_pair(text) for text in fix) if fix else None,
         "free": free or None,
-        "band_hz": _band(band),
+        "band_hz": parsed_band(band),
         "hold": hold,
     }
     data = {"source": {"log": str(directory)}, "signals": {"output": "y"}}
@@ -95,19 +96,3 @@ def _pair(text: str) -> tuple[str, float]:
             argument="fix",
             value=text,
         ) from None
-
-
-def _band(text: str | None) -> list[float] | None:
-    if text is None:
-        return None
-    try:
-        low, high = (float(part) for part in text.split(":"))
-    except ValueError:
-        raise UsageError(
-            "unreadable",
-            f"the band {text!r} is not LOW:HIGH in Hz",
-            "write for example 30:120",
-            argument="band",
-            value=text,
-        ) from None
-    return [low, high]

@@ -17,7 +17,12 @@ from livebode.fitting import Fit
 from livebode.runtime import Draw, Outcome
 
 _ALARMS_SHOWN = 8
-_ONE_AT_A_TIME = threading.Lock()  # Matplotlib's settings belong to the whole process
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def one_drawing_at_a_time() -> threading.Lock:
+    """The lock for drawing, because Matplotlib's settings belong to the whole process."""
+    return _ONE_AT_A_TIME
 
 
 def drawing(title: str, names: tuple[str, str]) -> Draw:

@@ -3,22 +3,38 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 
 from livebode.cli import terminal
+from livebode.cli.band import Band, parsed_band
 from livebode.cli.notices import NoticePrinter
-from livebode.cli.options import Dbc, Excitation, From, Json, Output, Port, Rate, Serve, SkipPeriods, Time, To
+from livebode.cli.options import Dbc, Excitation, From, Json, Outputs, Port, Rate, Serve, SkipPeriods, Time, To
+from livebode.cli.output_only import draw_modes, show_modes
 from livebode.cli.pictures import drawing, show, tracked_amount
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
 from livebode.configuration.axis import ServeSection
 from livebode.core import ConfigError, LivebodeError, UsageError
 from livebode.records import to_json
-from livebode.runtime import Destination, Document, Draw, Outcome, Session, StoppedError, Subscriber, run
+from livebode.runtime import (
+    Destination,
+    Document,
+    Draw,
+    Outcome,
+    OutputOnlyOutcome,
+    Session,
+    StoppedError,
+    Subscriber,
+    run,
+    run_output_only,
+)
 from livebode.runtime.documents import TrackerResults
+
+T = TypeVar("T")
 
 
 def run_command(
@@ -27,7 +43,7 @@ def run_command(
         typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or several that are averaged, or a configuration."),
     ],
     excitation: Excitation = None,
-    output: Output = None,
+    output: Outputs = None,
     input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
     schedule: Annotated[
         str | None, typer.Option(metavar="CHANNEL", help="Channel that the responses depend on, such as the position.")
@@ -73,6 +89,11 @@ def run_command(
     hann: Annotated[
         bool | None, typer.Option(help="Use a Hann window, from three bins; for an axis in motion.")
     ] = None,
+    output_only: Annotated[
+        bool,
+        typer.Option("--output-only", help="Track frequencies and dampings of the modes from the output alone."),
+    ] = False,
+    band: Band = None,
     baseline: Annotated[
         Path | None,
         typer.Option(metavar="BASELINE", help="Detect changes from this baseline, a file of `livebode learn`."),
@@ -116,7 +137,12 @@ def run_command(
             "skip_periods": skip_periods,
             "dbc": dbc,
         },
-        "signals": {"output": output, "input": input, "excitation": excitation, "schedule": schedule},
+        "signals": {
+            "output": output[0] if output else None,
+            "input": input,
+            "excitation": excitation,
+            "schedule": schedule,
+        },
         "lines": {"frequencies": lines, "window": _window(window)},
         "tracking": {
             "estimator": estimator,
@@ -137,8 +163,10 @@ def run_command(
             "covariates": covariate or None,
         },
     }
+    given["output_only"] = _output_only(output_only, output or [], band)
     specified = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
     over = {section: values for section, values in specified.items() if values} | ({"record": {}} if go_on else {})
+    over |= {"output_only": specified["output_only"]} if output_only else {}
     target = targets[0]
     if len(targets) > 1 and any(path.suffix.lower() == ".toml" for path in targets):
         raise UsageError(
@@ -151,11 +179,27 @@ def run_command(
     axes = {"": _axis(targets, over)} if file is None else file.read()
     directory = out or Path("runs") / target.stem
     live = any(axis.source.live for axis in axes.values())
+    if (alone := axes.get("")) is not None and alone.output_only is not None:
+        _run_output_only(alone, directory, force, as_json, serve)
+        return
     with served(serve, _serving(axes), port, [name or target.stem for name in axes], stays=not live) as subscribers_of:
         if list(axes) == [""] and not live:
             _show(_run(axes[""], directory, force, as_json, subscribers_of(target.stem)), as_json)
         else:
             _run_axes(axes, directory, force, as_json, file, lambda name: subscribers_of(name or target.stem))
+
+
+def _output_only(chosen: bool, outputs: list[str], band: str | None) -> dict[str, Any]:
+    """The section from the options; UsageError for an option that only an output-only run has."""
+    others, band_hz = outputs[1:], parsed_band(band)
+    if not chosen and (others or band_hz):
+        raise UsageError(
+            "conflict",
+            "more than one output, and a band, belong to an output-only run",
+            "give one output, or add --output-only",
+            options=["--output", "--band"],
+        )
+    return {"others": others or None, "band_hz": band_hz}
 
 
 def _serving(axes: Axes) -> ServeSection:
@@ -202,7 +246,35 @@ def _window(text: str | None) -> int | str | None:
 
 
 def _run(axis: Axis, directory: Path, force: bool, quiet: bool, subscribers: tuple[Subscriber, ...]) -> Outcome:
-    """Track one recording, with a progress bar."""
+    """Track one recording."""
+    return _with_progress(
+        lambda own: run(axis, Destination(directory, _drawing(axis), force, (*subscribers, *own))), quiet
+    )
+
+
+def _run_output_only(axis: Axis, directory: Path, force: bool, as_json: bool, serve: bool) -> None:
+    """Track the modes of one recording, and print the result."""
+    if serve:
+        raise UsageError(
+            "conflict",
+            "the dashboard shows responses, and an output-only run has none",
+            "run it without the dashboard",
+            options=["--output-only", "--serve"],
+        )
+    title = f"{axis.source.title}: {axis.signals.output}"
+
+    def job(own: tuple[Subscriber, ...]) -> OutputOnlyOutcome:
+        return run_output_only(axis, directory, lambda into: draw_modes(into, title), force=force, subscribers=own)
+
+    outcome = _with_progress(job, as_json)
+    if as_json:
+        print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
+    else:
+        show_modes(outcome)
+
+
+def _with_progress(job: Callable[[tuple[Subscriber, ...]], T], quiet: bool) -> T:
+    """Run a job whose subscribers show a progress bar and notices."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = terminal.console(stderr=True)
@@ -222,7 +294,7 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool, subscribers: tup
         notices = NoticePrinter(
             lambda message: bar.console.print(f"livebode: {message}", highlight=False, markup=False)
         )
-        return run(axis, Destination(directory, _drawing(axis), force, (*subscribers, show_progress, notices)))
+        return job((show_progress, notices))
 
 
 def _run_axes(

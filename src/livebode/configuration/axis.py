@@ -8,9 +8,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from livebode.configuration.output_only import check_output_only
 from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, Quantity, counted, nearest_name
 from livebode.language import available
+from livebode.output_only import OUTPUTS_MAX
 from livebode.sources.live import SourceSettings, checked_address
 
 SAME_RATE = 1e-6
@@ -149,6 +151,22 @@ class MotionSection(_Section):
     radius_m: Positive
     chunk_s: Positive = 4.0
     driven_by: Literal["torque", "excitation"] = "torque"
+
+
+class OutputOnlySection(_Section):
+    """[output_only]: the modes are tracked from the output alone, also if the section is empty; there is no response.
+
+    Parameters
+    ----------
+    others
+        Channels of further outputs, measured at the same time as signals.output.
+    band_hz
+        Lowest and highest frequency of the modes, in Hz. Default: from a fortieth of the upper limit to 1.25 times the
+        frequency below which 99 % of the output's power is.
+    """
+
+    others: Annotated[list[str], Field(max_length=OUTPUTS_MAX - 1)] = []
+    band_hz: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
 
 
 class MonitoringSection(_Section):
@@ -457,6 +475,8 @@ class Axis(_Section):
         The effect of the axis's motion is removed from the responses.
     fit
         A model is fitted to every response.
+    output_only
+        The modes are tracked from the output alone.
     monitoring
         Comparison with a baseline.
     serve
@@ -471,6 +491,7 @@ class Axis(_Section):
     record: RecordSection | None = None
     motion: MotionSection | None = None
     fit: FitSection | None = None
+    output_only: OutputOnlySection | None = None
     monitoring: MonitoringSection = MonitoringSection()
     serve: ServeSection = ServeSection()
 
@@ -511,6 +532,8 @@ class Axis(_Section):
             ).at(origin)
         if axis.source.url is not None:
             checked_address(axis.source.url, axis.source)
+        if axis.output_only is not None:
+            check_output_only(axis, origin)
         return axis
 
     def beside(self, folder: Path) -> Axis:
@@ -529,6 +552,7 @@ def _of_one_recording(axis: Axis) -> list[str]:
         "source.follow": axis.source.follow,
         "[record] (option --continue)": axis.record is not None,
         "[motion]": axis.motion is not None,
+        "[output_only] (option --output-only)": axis.output_only is not None,
         "monitoring.baseline": axis.monitoring.baseline is not None,
         f"tracking.estimator {axis.tracking.estimator!r}": axis.tracking.estimator in ("lpm", "welch"),
     }

@@ -85,13 +85,15 @@ class RunRecord:
     on_damage: Callable[[Event], None] | None = field(default=None, compare=False)
 
     @classmethod
-    def open(cls, path: Path, on_damage: Callable[[Event], None] | None = None) -> RunRecord:
-        """The run in this directory.
+    def open(
+        cls, path: Path, on_damage: Callable[[Event], None] | None = None, *, output_only: bool = False
+    ) -> RunRecord:
+        """The run in this directory; with `output_only` also one without responses, of which `lines` raises KeyError.
 
         Raises
         ------
         RecordError
-            If it is not from a run, or run.json or the responses cannot be read.
+            If it is not from a run, or run.json or the responses cannot be read, or it has no responses.
         GridError
             If the lines in run.json are not a valid grid.
         """
@@ -105,8 +107,15 @@ class RunRecord:
                 path=str(path / RUN),
                 reason=wrong,
             )
+        if run.output_only and not output_only:
+            raise RecordError(
+                "no-responses",
+                f"{str(path)!r} is an output-only run: it has modes and no responses",
+                "query its table parameters, or export its parameters",
+                path=str(path),
+            )
         try:
-            len(run.lines)
+            len(() if run.output_only else run.lines)
         except LivebodeError as error:
             raise error.at(str(path / RUN)) from None
         if damaged:
@@ -127,6 +136,11 @@ class RunRecord:
     def found(self) -> dict[str, Any]:
         """Rate, window, lines, quantity and unit from run.json."""
         return dict(self.summary["found"])
+
+    @property
+    def output_only(self) -> bool:
+        """Whether the run has modes in its parameters and no responses."""
+        return bool(self.summary.get("output_only", False))
 
     @property
     def lines(self) -> Lines:
@@ -227,7 +241,7 @@ class RunRecord:
         file, parts = f"{name}.parquet", self.summary.get("files", {})
         if os.path.lexists(self.path / file):
             return StoredTable(self.path, file, parts.get(file), self.report)
-        if name == "responses" or file in parts:
+        if (name == "responses" and not self.output_only) or file in parts:
             self.report(Event(KIND, 0, 0.0, f"{file} is damaged: the file is missing", {"file": file}))
         return None
 

@@ -38,6 +38,8 @@ class RunDirectory:
         Path of the directory.
     force
         Whether to replace an existing directory. Only the directory of a run is replaced.
+    responses
+        Whether the run has responses; an output-only run has only parameters.
 
     Raises
     ------
@@ -45,16 +47,19 @@ class RunDirectory:
         If the path exists and must not be replaced, or the disk reports an error.
     """
 
-    def __init__(self, path: Path, *, force: bool = False) -> None:
+    def __init__(self, path: Path, *, force: bool = False, responses: bool = True) -> None:
         self.path = path
         self._force = force
+        self._has_responses = responses
 
     def __enter__(self) -> RunDirectory:
         self._check_free()
         with writing(self.path, RecordError), contextlib.ExitStack() as undo:
             self.partial = undo.enter_context(whole_directory(self.path, remove))
             self._events = (self.partial / "events.jsonl").open("wb")
-            self._responses = TableFile(self.partial / "responses.parquet", RESPONSES)
+            self._responses: TableFile | None = None
+            if self._has_responses:
+                self._responses = TableFile(self.partial / "responses.parquet", RESPONSES)
             self._parameters: TableFile | None = None
             self._place = undo.pop_all()
         _logger.info("%s: the record begins", self.path)
@@ -76,6 +81,7 @@ class RunDirectory:
 
     def write(self, responses: Responses) -> None:
         """Append responses."""
+        assert self._responses is not None
         with writing(self.path, RecordError):
             self._responses.write(as_batch(responses))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -58,6 +58,22 @@ class _Found(_Part):
     realisations: bool = False
 
 
+class _OutputOnlyFound(_Part):
+    rate_hz: Annotated[float, Field(gt=0)]
+    window: Positive
+    hop: Positive
+    outputs: list[Text]
+    band_hz: Annotated[list[float], Field(min_length=2, max_length=2)]
+    clock: ClockKind | None = None
+    part: _Samples | None = None
+
+
+class _Track(_Part):
+    name: Text
+    rows: Count
+    frequency_hz: Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
 class _Speed(_Part):
     recorded_s: float
     run_s: float
@@ -80,9 +96,8 @@ class _Configuration(_Part):
     loop: Section | None = None
 
 
-class _Summary(_Part):
+class _AnySummary(_Part):
     configuration: _Configuration = _Configuration()
-    found: _Found
     counts: dict[str, Count | None] = {}
     speed: _Speed | None = None
     versions: Section = {}
@@ -98,6 +113,18 @@ class _Summary(_Part):
     files: dict[str, list[Section]] = {}
 
 
+class _Summary(_AnySummary):
+    found: _Found
+    output_only: Literal[False] = False
+
+
+class _OutputOnlySummary(_AnySummary):
+    found: _OutputOnlyFound
+    output_only: Literal[True]
+    modes: list[_Track] = []
+    harmonics: list[_Track] = []
+
+
 def what_is_wrong(summary: dict[str, Any]) -> str:
     """Description of the first invalid value; empty if there is none.
 
@@ -105,7 +132,8 @@ def what_is_wrong(summary: dict[str, Any]) -> str:
     'found.rate_hz: Input should be a valid number'
     """
     try:
-        _Summary.model_validate(summary)
+        shape = _OutputOnlySummary if summary.get("output_only") is True else _Summary
+        shape.model_validate(summary)
     except ValidationError as error:
         first = error.errors()[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"

@@ -5,29 +5,18 @@ docs/decisions/0003-terminal-plot.md has the reasons for drawing it here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import groupby
-
 import numpy as np
 from numpy.typing import NDArray
-from rich.style import Style
 
 from livebode.core import Responses, counted
 from livebode.drawing import ticks
 from livebode.report import words
-from livebode.report.style import shortened
+from livebode.report.canvas import Canvas, Scale, written
 from livebode.report.summary import Summary, summarised
 
 Floats = NDArray[np.float64]
 
 _WIDTH_MIN, _HEIGHT_MIN = 40, 16
-_BRAILLE = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
-_CURVE, _CIRCLE = Style(color="cyan"), Style(color="bright_yellow")
-_PLAIN = str.maketrans(
-    {"─": "-", "│": "|", "–": "-", "−": "-", "…": "~", "·": "*", "×": "x", "°": "deg", "²": "2", "µ": "u", "μ": "u"}
-    | dict.fromkeys("┌┐└┘├┤┬┴┼", "+")
-    | {"Ω": "Ohm", "ω": "w", "φ": "phi", "θ": "theta"}
-)
 
 
 def terminal_bode(
@@ -49,12 +38,12 @@ def terminal_bode(
     middle = f"{words.quantity(responses)}: median of {counted(summary.count, 'valid response')}"
     if not summary.count:
         middle = f"{words.quantity(responses)}: no valid response"
-    caption = _written(f"{middle}, {words.lines_phrase(responses)}", width, unicode)
+    caption = written(f"{middle}, {words.lines_phrase(responses)}", width, unicode)
     if width < _WIDTH_MIN or height < _HEIGHT_MIN or not summary.count:
         return caption
     picture = _picture(summary, width, height - 1, colour, unicode)
     if not unicode:
-        picture = _written(picture)
+        picture = written(picture)
     return f"{caption}\n{picture}"
 
 
@@ -74,11 +63,11 @@ def _picture(summary: Summary, width: int, height: int, colour: bool, unicode: b
         (magnitude_db, unit, upper - 3, ranges[0], dict(zip(ticks_at[0], labels[0]))),
         (phase_deg, "phase in degrees", height - upper - 4, ranges[1], dict(zip(ticks_at[1], labels[1]))),
     ):
-        canvas = _Canvas.blank(rows, columns)
-        level = _Scale(limits[1], limits[0], rows)
+        canvas = Canvas.blank(rows, columns)
+        level = Scale(limits[1], limits[0], rows)
         _curve(canvas, frequency, level, summary.responses.lines.frequency_hz, values)
         marked = {level.cell(tick): label for tick, label in at.items()}
-        lines.append(_written(title, width, unicode).center(width).rstrip())
+        lines.append(written(title, width, unicode).center(width).rstrip())
         for row in range(rows):
             side = f"{marked.get(row, ''):>{margin}}{'┤' if row in marked else '│'}"
             lines.append(f"{side}{canvas.row(row, colour, unicode)}│")
@@ -86,54 +75,12 @@ def _picture(summary: Summary, width: int, height: int, colour: bool, unicode: b
     return "\n".join([*lines, "frequency in Hz".center(width).rstrip()])
 
 
-@dataclass(frozen=True)
-class _Scale:
-    """Linear from the first to the last of so many cells; `begin` may be larger than `end`."""
-
-    begin: float
-    end: float
-    cells: int
-
-    def dot(self, values: Floats, of_a_cell: int) -> NDArray[np.intp]:
-        """Numbers of the dots at these values, so many in each cell."""
-        share = (values - self.begin) / (self.end - self.begin)
-        return np.clip((share * self.cells * of_a_cell).astype(np.intp), 0, self.cells * of_a_cell - 1)
-
-    def cell(self, value: float) -> int:
-        return int(self.dot(np.array([value]), 1)[0])
-
-
-@dataclass(frozen=True)
-class _Canvas:
-    """Cells of 4 × 2 dots, and the cells with a circle."""
-
-    dots: NDArray[np.bool_]
-    circles: NDArray[np.bool_]
-
-    @classmethod
-    def blank(cls, rows: int, columns: int) -> _Canvas:
-        return cls(np.zeros((4 * rows, 2 * columns), bool), np.zeros((rows, columns), bool))
-
-    def row(self, row: int, colour: bool, unicode: bool) -> str:
-        """Text of a row; its parts have the colour of a curve or a circle."""
-        dots = self.dots[4 * row : 4 * row + 4].reshape(4, -1, 2)
-        patterns = np.tensordot(dots, _BRAILLE, ((0, 2), (0, 1)))
-        curve = [(chr(0x2800 + pattern) if unicode else ".") if pattern else " " for pattern in patterns.tolist()]
-        circle = "●" if unicode else "o"
-        cells = [circle if circled else letter for circled, letter in zip(self.circles[row].tolist(), curve)]
-        if not colour:
-            return "".join(cells)
-        styles = {" ": Style(), circle: _CIRCLE}
-        parts = groupby(cells, lambda letter: styles.get(letter, _CURVE))
-        return "".join(style.render("".join(part)) for style, part in parts)
-
-
-def _frequency_scale(summary: Summary, columns: int) -> _Scale:
+def _frequency_scale(summary: Summary, columns: int) -> Scale:
     low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
-    return _Scale(float(np.log10(low_hz)), float(np.log10(high_hz)), columns)
+    return Scale(float(np.log10(low_hz)), float(np.log10(high_hz)), columns)
 
 
-def _frequency_axis(summary: Summary, scale: _Scale, margin: int) -> list[str]:
+def _frequency_axis(summary: Summary, scale: Scale, margin: int) -> list[str]:
     """The lower edge of a panel with ticks at round frequencies, and their numbers as far as there is room."""
     edge, numbers = ["─"] * scale.cells, ""
     low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
@@ -147,7 +94,7 @@ def _frequency_axis(summary: Summary, scale: _Scale, margin: int) -> list[str]:
     return [" " * margin + f"└{''.join(edge)}┘", " " * (margin + 1) + numbers]
 
 
-def _curve(canvas: _Canvas, frequency: _Scale, level: _Scale, frequency_hz: Floats, values: Floats) -> None:
+def _curve(canvas: Canvas, frequency: Scale, level: Scale, frequency_hz: Floats, values: Floats) -> None:
     """Draw the curve, interrupted at lines without a value, and a circle at each line if they are few."""
     known = np.isfinite(values)
     across = frequency.dot(np.log10(frequency_hz), 2)
@@ -166,12 +113,3 @@ def _range(values: Floats, least: float) -> tuple[float, float]:
     low, high = float(known.min()), float(known.max())
     margin = max(0.06 * (high - low), least)
     return low - margin, high + margin
-
-
-def _written(text: str, width: int | None = None, unicode: bool = False) -> str:
-    """Text in at most `width` columns; without Unicode, characters outside ASCII become question marks."""
-    if not unicode:
-        text = text.translate(_PLAIN).encode("ascii", "replace").decode()
-    if width is not None:
-        text = shortened(text, width)
-    return text if unicode else text.translate(_PLAIN)

@@ -2,6 +2,7 @@
 
 from livebode.runtime.destination import Destination, Draw
 from livebode.runtime.documents import Document, Subscriber
+from livebode.runtime.output_only import OutputOnlyOutcome, run_output_only
 from livebode.runtime.run import run
 from livebode.runtime.run_control import RunControl, StoppedError
 from livebode.runtime.run_loop import Outcome, RunLoop
@@ -12,10 +13,12 @@ __all__ = [
     "Document",
     "Draw",
     "Outcome",
+    "OutputOnlyOutcome",
     "RunControl",
     "RunLoop",
     "Session",
     "StoppedError",
     "Subscriber",
     "run",
+    "run_output_only",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from livebode.configuration.axis import Axis
+from livebode.core import ConfigError
 from livebode.runtime.destination import Destination
 from livebode.runtime.live import run_live
 from livebode.runtime.recording import run_recording
@@ -29,6 +30,13 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
     StoppedError
         If `control` ends a recording before its end; the directory is as for an error.
     """
+    if axis.output_only is not None:
+        raise ConfigError(
+            "key-conflict",
+            "an axis with [output_only] cannot run together with others",
+            "run its recording alone",
+            key="output_only",
+        )
     recording = run_recordings if len(axis.source.logs) > 1 else run_recording
     job = run_live if axis.source.live else recording
     return job(axis, to, control or RunControl())

@@ -25,13 +25,17 @@ from livebode.sources.live import LiveSource
 def begun(about: Mapping[str, Any], tracker: Follower, unit: str, kinds: PlantKinds) -> dict[str, Any]:
     """Entries at the beginning: configuration, findings, versions."""
     found = tracker.found() | {"quantity": tracker.settings.quantity, "unit": unit, "kinds": asdict(kinds)}
-    versions = {
+    return dict(about) | {"found": about.get("found", {}) | found, "versions": versions()}
+
+
+def versions() -> dict[str, str]:
+    """Versions of livebode and of what its results depend on."""
+    return {
         "livebode": version("livebode"),
         "numpy": np.__version__,
         "python": platform.python_version(),
         "instruction_set": instruction_set(),
     }
-    return dict(about) | {"found": about.get("found", {}) | found, "versions": versions}
 
 
 def done(tracker: Follower, run: RunCounts) -> dict[str, Any]:

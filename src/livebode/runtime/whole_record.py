@@ -21,9 +21,9 @@ class WholeRecord:
     continues = False
     clock = ()
 
-    def __init__(self, path: Path, *, force: bool) -> None:
+    def __init__(self, path: Path, *, force: bool, responses: bool = True) -> None:
         self.path = path
-        self._directory = RunDirectory(path, force=force)
+        self._directory = RunDirectory(path, force=force, responses=responses)
 
     def __enter__(self) -> Self:
         self._directory.__enter__()
