@@ -43,7 +43,7 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
     """The same for a live source: samples, whose lines and window must be given, or spectra of a layout."""
     if layout is not None:
         lines = check_spectra(axis, layout, rate_hz)
-        return SpectraTracker(_settings(axis, rate_hz, lines, layout.hop), layout)
+        return SpectraTracker(settings_of(axis, rate_hz, lines, layout.hop), layout)
     frequencies, window = axis.lines.frequencies, axis.lines.window
     if frequencies == "auto" or window == "auto":
         raise ConfigError(
@@ -54,7 +54,7 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
         )
     lines = Lines.parse(frequencies, rate_hz, window)
     hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
-    return _follower(axis, _settings(axis, rate_hz, lines, hop))
+    return _follower(axis, settings_of(axis, rate_hz, lines, hop))
 
 
 def _follower(axis: Axis, settings: Settings) -> Follower:
@@ -81,7 +81,7 @@ def _follower(axis: Axis, settings: Settings) -> Follower:
 
 def make_settings(axis: Axis, log: Log) -> Settings:
     """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
-    return _settings(axis, log.rate_hz, make_lines(axis, log))
+    return settings_of(axis, log.rate_hz, make_lines(axis, log))
 
 
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
@@ -94,7 +94,8 @@ def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
     return window_doubt(samples, settings)
 
 
-def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) -> Settings:
+def settings_of(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) -> Settings:
+    """The tracker's settings with these lines and hop; LivebodeError if they do not fit each other."""
     signals, tracking = axis.signals, axis.tracking
     settings = Settings(
         lines=lines,

@@ -1,0 +1,180 @@
+"""The common grid and the lines of a recording whose channels have clocks of their own."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.configuration.axis import Axis
+from livebode.core import ConfigError, Lines
+from livebode.core.lines import spacing_hz
+from livebode.estimation.settings import nearest_hop
+from livebode.preparation.part import chosen_part
+from livebode.preparation.plan import SEARCHED, beginning, reference_of
+from livebode.sources.part_limit import part_limit
+from livebode.sources.rounding import exact_rate_hz
+from livebode.sources.uneven import UnevenLog
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_PIECE = 1 << 20  # complex numbers at a time
+_PERIODS_MAX = 256  # for a measured period
+_NEAR = 0.1  # relative difference of the rate of the grid and the median one
+PLACES = 20  # windows in a period that a default hop should allow
+_BINS_MAX = 4096
+_STRONG = 0.1  # of the power that repeats at the strongest bin
+_REPEATING = 0.5
+_SNAPPED = 1e-3
+"""Relative difference of a measured period and of that of the specified lines, at which these are meant."""
+
+
+def uneven_grid(axis: Axis, log: UnevenLog) -> tuple[UnevenLog, Lines]:
+    """The recording on a grid in which the period of the excitation has a whole number of samples, and the lines.
+
+    The rate of the grid is the given one; else one with which the specified lines are on the grid of the window; else
+    the one that the measured period of the excitation needs, near the median rate of the reference.
+
+    Raises
+    ------
+    LivebodeError
+        If there is no such grid, or nothing repeats.
+    """
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    part, given = _fixed_part(axis, log), axis.source.rate_hz is not None
+    spacing = None if frequencies == "auto" else spacing_hz(frequencies)
+    if window == "auto":
+        window, rate_hz = _measured(axis, part, spacing)
+    elif spacing is not None:
+        rate_hz = log.rate_hz if given else _rate_of(spacing, log.rate_hz, window)
+    else:
+        rate_hz = log.rate_hz if given else window / refined_period(axis, part, window / log.rate_hz)[0]
+    grid = log.at_rate(rate_hz)
+    if frequencies != "auto":
+        return grid, Lines.parse(frequencies, rate_hz, window)
+    from livebode.excitation import lines_of_window, recognise  # slow to import
+
+    samples = beginning(_fixed_part(axis, grid), _reference(axis))
+    if axis.lines.window == "auto":
+        return grid, recognise(samples, rate_hz).lines
+    return grid, lines_of_window(samples, window, rate_hz)
+
+
+def _reference(axis: Axis) -> str:
+    name = reference_of(axis)
+    if name is None:
+        raise ConfigError(
+            "auto-needs-recording",
+            "lines or window are 'auto', but signals.excitation is missing",
+            "name its channel",
+            key="signals.input" if axis.tracking.estimator == "direct" else "signals.excitation",
+        )
+    return name
+
+
+def _fixed_part(axis: Axis, log: UnevenLog) -> UnevenLog:
+    """The part in [source] as far as its limits do not count periods."""
+    limits = [axis.source.from_, axis.source.to]
+    begin, end = (None if one is None or part_limit(one).unit == "periods" else one for one in limits)
+    part = chosen_part(log, begin, end, 0, lambda part: (part.first, 1))
+    assert isinstance(part, UnevenLog)
+    return part
+
+
+def _measured(axis: Axis, log: UnevenLog, spacing: Fraction | None) -> tuple[int, float]:
+    """Window and rate of a grid for the measured period of the excitation."""
+    from livebode.excitation.period import find_period
+    from livebode.excitation.prepare import checked, filled
+
+    name = _reference(axis)
+    samples = filled(checked(beginning(log, name), repr(name)))
+    period_s, sigma_s = refined_period(axis, log, find_period(samples, log.rate_hz, 0.0)[0] / log.rate_hz)
+    period_s = exact_rate_hz(1 / exact_rate_hz(period_s, 3 * sigma_s / period_s), 0.0)
+    if spacing is not None and (many := round(period_s * spacing)):
+        meant_s = float(many / spacing)
+        period_s = meant_s if abs(period_s / meant_s - 1) < _SNAPPED else period_s
+    if axis.source.rate_hz is not None:
+        return round(period_s * log.rate_hz), log.rate_hz
+    window = _divisible(max(4, round(period_s * log.rate_hz)))
+    return window, exact_rate_hz(period_s / window, 1e-12)
+
+
+def _divisible(window: int) -> int:
+    """The nearest number of samples that a default hop divides."""
+    for away in range(window):
+        for tried in (window + away, window - away):
+            hop = nearest_hop(tried, tried / PLACES)
+            if tried >= 3 and tried % hop == 0 and hop <= 2 * max(1, tried // PLACES):
+                return tried
+    return window
+
+
+def _rate_of(spacing: Fraction, near_hz: float, window: int) -> float:
+    """The rate near the median one at which multiples of a frequency are lines of the window; else the median one."""
+    many = round(window * spacing / Fraction(near_hz))
+    if not many:
+        return near_hz
+    rate_hz = float(window * spacing / many)
+    return rate_hz if abs(rate_hz / near_hz - 1) < _NEAR else near_hz
+
+
+def refined_period(axis: Axis, log: UnevenLog, period_s: float) -> tuple[float, float]:
+    """The period of the reference near this one and its standard deviation, seconds, at the times of its samples.
+
+    The phases of the strong bins advance from window to window by 2πk times the relative error of the period; windows
+    further and further apart make this more precise.
+    """
+    spectra = _plain_spectra(log, _reference(axis), period_s)
+    k = np.arange(1, spectra.shape[1] + 1)
+    error, sigma, apart = 0.0, 1.0, 1
+    while apart < len(spectra):
+        turned = np.exp(2j * np.pi * k * apart * error)
+        pairs = spectra[:-apart].conj() * spectra[apart:]
+        repeats = pairs.sum(axis=0) * turned
+        power = (np.abs(spectra) ** 2).mean(axis=0) * len(pairs)
+        strong = (np.abs(repeats) > _REPEATING * power) & (np.abs(repeats) > _STRONG * np.abs(repeats).max())
+        if not strong.any():
+            break
+        weight, order = np.abs(repeats[strong]), k[strong]
+        advance = np.angle(repeats[strong])
+        total = 2 * np.pi * apart * np.sum(weight * order**2)
+        error -= float(np.sum(weight * order * advance) / total)
+        each = np.angle(pairs[:, strong] * turned[strong]) - advance
+        sigma = float(np.sqrt(np.sum(weight**2 * order**2 * (each**2).mean(axis=0) / len(pairs))) / total)
+        apart *= 2
+    return period_s * (1 + error), period_s * sigma
+
+
+def _plain_spectra(log: UnevenLog, name: str, period_s: float) -> Complex:
+    """Means of x·e^(−j2πkt/T) over each of the first periods, shape (periods, bins)."""
+    clock = log.clocks([name])[0].stamps
+    bins = min(_BINS_MAX, max(1, int(period_s / clock.step_s / 2)))
+    begin_s, held = log.first / log.rate_hz, (np.zeros(0), np.zeros(0))
+    periods: list[Complex] = []
+    most = max(2, min(_PERIODS_MAX, int(SEARCHED * clock.step_s / period_s)))
+    stop_s = min(log.stop / log.rate_hz, begin_s + most * period_s)
+    for time_s, data in log.pieces([name]):
+        use = np.isfinite(data[0]) & (time_s >= begin_s) & (time_s < stop_s)
+        held = np.concatenate([held[0], time_s[use]]), np.concatenate([held[1], data[0][use]])
+        whole = int((time_s[-1] - begin_s) / period_s)
+        while len(periods) < min(whole, most):
+            end_s = begin_s + (len(periods) + 1) * period_s
+            count = int(np.searchsorted(held[0], end_s))
+            turns, x = (held[0][:count] - begin_s) / period_s, held[1][:count]
+            periods.append(_means(turns, x, bins))
+            held = held[0][count:], held[1][count:]
+        if time_s[-1] >= stop_s:
+            break
+    return np.array(periods) if periods else np.zeros((0, bins), dtype=np.complex128)
+
+
+def _means(turns: Floats, x: Floats, bins: int) -> Complex:
+    found = np.zeros(bins, dtype=np.complex128)
+    x = x - x.mean() if x.size else x
+    size = max(1, _PIECE // bins)
+    for i in range(0, x.size, size):
+        powers = np.exp(-2j * np.pi * np.outer(turns[i : i + size] % 1.0, np.arange(1, bins + 1)))
+        found += x[i : i + size] @ powers
+    return found / max(x.size, 1)
