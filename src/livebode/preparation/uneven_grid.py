@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ Complex = NDArray[np.complex128]
 
 _PIECE = 1 << 20  # complex numbers at a time
 _PERIODS_MAX = 256  # for a measured period
+_SAMPLES_PER_UNKNOWN = 3  # of a channel in a window, for each amplitude: their variance is then that of even samples
+_WINDOWS_MIN = 8  # that a recording should have
 _NEAR = 0.1  # relative difference of the rate of the grid and the median one
 PLACES = 20  # windows in a period that a default hop should allow
 _BINS_MAX = 4096
@@ -52,14 +55,33 @@ def uneven_grid(axis: Axis, log: UnevenLog) -> tuple[UnevenLog, Lines]:
     else:
         rate_hz = log.rate_hz if given else window / refined_period(axis, part, window / log.rate_hz)[0]
     grid = log.at_rate(rate_hz)
-    if frequencies != "auto":
-        return grid, Lines.parse(frequencies, rate_hz, window)
+    lines = _lines(axis, grid, window)
+    return grid, lines if axis.lines.window != "auto" else _longer(axis, grid, lines)
+
+
+def _lines(axis: Axis, grid: UnevenLog, window: int) -> Lines:
+    if axis.lines.frequencies != "auto":
+        return Lines.parse(axis.lines.frequencies, grid.rate_hz, window)
     from livebode.excitation import lines_of_window, recognise  # slow to import
 
     samples = beginning(_fixed_part(axis, grid), _reference(axis))
     if axis.lines.window == "auto":
-        return grid, recognise(samples, rate_hz).lines
-    return grid, lines_of_window(samples, window, rate_hz)
+        return recognise(samples, grid.rate_hz).lines
+    return lines_of_window(samples, window, grid.rate_hz)
+
+
+def _longer(axis: Axis, grid: UnevenLog, lines: Lines) -> Lines:
+    """The lines in a window of several periods, if the slowest channel has too few samples in one."""
+    signals = axis.signals
+    names = [name for name in (signals.output, signals.input, signals.excitation) if name]
+    slowest_hz = min(clock.stamps.rate_hz for clock in grid.clocks(names))
+    needed = _SAMPLES_PER_UNKNOWN * (2 * len(lines) + 1)
+    many = ceil(needed * grid.rate_hz / (slowest_hz * lines.window) - 1e-9)
+    most = grid.samples // (_WINDOWS_MIN * lines.window)
+    if many < 2 or most < 2:
+        return lines
+    many = min(many, most)
+    return Lines.of_bins([many * k for k in lines.bins], many * lines.window, lines.rate_hz)
 
 
 def _reference(axis: Axis) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.core import LEFT_OUT, NOT_WHOLE, Channel, SignalError, Spectra, SpectraLayout, rms
 from livebode.estimation import Settings
+from livebode.estimation.line_stage import LineStage
 from livebode.estimation.uneven import UnevenSpectra, UnevenWindow
 from livebode.sources.resample import Resampler
 from livebode.sources.uneven import ClockGroup, UnevenLog
@@ -67,7 +68,7 @@ class UnevenSource:
             lines.window,
             settings.step,
             lines.bins,
-            lines.quiet if settings.uses_detection_lines else (),
+            tuple(sorted({int(k) for k in LineStage(settings).bins} - set(lines.bins))),
         )
         self._step = min(settings.step, lines.window)
         self.first, self.left_out = log.first, np.zeros(0, dtype=np.int64)

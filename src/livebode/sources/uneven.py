@@ -68,7 +68,7 @@ class UnevenLog(Log):
         # A rate of few digits is meant where the median of so many jittering steps allows it.
         uncertainty = 3 * self._reference.jitter / np.sqrt(self._reference.samples)
         nominal_hz = rate_hz or exact_rate_hz(step_s, float(uncertainty))
-        origin = "given" if rate_hz else f"median step of {self._reference.column!r}"
+        origin = "given" if rate_hz else f"near the median step of {self._reference.column!r}"
         self._clock = Clock(nominal_hz, origin, None, self._reference.first_s, kind)
         self._span_s = self._common(chosen)
         self.first, self._end = self._limits()
