@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -42,7 +44,7 @@ def test_a_window_is_the_least_squares_solution_for_any_times(seed, places, samp
     x[1, rng.integers(0, samples, missing)] = np.nan
     fit = UnevenSpectra(tuple(k), tuple(quiet), WINDOW, places, samples, [trend, trend])
     cuts = np.searchsorted(time, (np.arange(places + 1) * WINDOW / places - 0.5) / WINDOW)
-    window = fit.window(np.array([fit.segment(time[a:b], x[:, a:b]) for a, b in zip(cuts, cuts[1:])]))
+    window = fit.window(np.array([fit.segment(time[a:b], x[:, a:b]) for a, b in pairwise(cuts)]))
     for row, values in enumerate(x):
         known = np.isfinite(values)
         t = time[known]

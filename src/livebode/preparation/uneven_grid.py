@@ -49,11 +49,11 @@ def uneven_grid(axis: Axis, log: UnevenLog) -> tuple[UnevenLog, Lines]:
     part, given = _fixed_part(axis, log), axis.source.rate_hz is not None
     spacing = None if frequencies == "auto" else spacing_hz(frequencies)
     if window == "auto":
-        window, rate_hz = _measured(axis, part, spacing)
+        window, rate_hz = measured_grid(part, _reference(axis), spacing, given=given)
     elif spacing is not None:
         rate_hz = log.rate_hz if given else _rate_of(spacing, log.rate_hz, window)
     else:
-        rate_hz = log.rate_hz if given else window / refined_period(axis, part, window / log.rate_hz)[0]
+        rate_hz = log.rate_hz if given else window / refined_period(part, _reference(axis), window / log.rate_hz)[0]
     grid = log.at_rate(rate_hz)
     lines = _lines(axis, grid, window)
     return grid, lines if axis.lines.window != "auto" else _longer(axis, grid, lines)
@@ -105,19 +105,30 @@ def _fixed_part(axis: Axis, log: UnevenLog) -> UnevenLog:
     return part
 
 
-def _measured(axis: Axis, log: UnevenLog, spacing: Fraction | None) -> tuple[int, float]:
-    """Window and rate of a grid for the measured period of the excitation."""
+def measured_grid(
+    log: UnevenLog, name: str, spacing: Fraction | None = None, *, given: bool = False
+) -> tuple[int, float]:
+    """Window and rate of a grid for the measured period of a channel.
+
+    Parameters
+    ----------
+    log, name
+        The recording and the channel.
+    spacing
+        Frequency of which all specified lines are multiples, Hz.
+    given
+        Whether the rate of the log is given, so that it must remain.
+    """
     from livebode.excitation.period import find_period
     from livebode.excitation.prepare import checked, filled
 
-    name = _reference(axis)
     samples = filled(checked(beginning(log, name), repr(name)))
-    period_s, sigma_s = refined_period(axis, log, find_period(samples, log.rate_hz, 0.0)[0] / log.rate_hz)
+    period_s, sigma_s = refined_period(log, name, find_period(samples, log.rate_hz, 0.0)[0] / log.rate_hz)
     period_s = exact_rate_hz(1 / exact_rate_hz(period_s, 3 * sigma_s / period_s), 0.0)
     if spacing is not None and (many := round(period_s * spacing)):
         meant_s = float(many / spacing)
         period_s = meant_s if abs(period_s / meant_s - 1) < _SNAPPED else period_s
-    if axis.source.rate_hz is not None:
+    if given:
         return round(period_s * log.rate_hz), log.rate_hz
     window = _divisible(max(4, round(period_s * log.rate_hz)))
     return window, exact_rate_hz(period_s / window, 1e-12)
@@ -142,13 +153,13 @@ def _rate_of(spacing: Fraction, near_hz: float, window: int) -> float:
     return rate_hz if abs(rate_hz / near_hz - 1) < _NEAR else near_hz
 
 
-def refined_period(axis: Axis, log: UnevenLog, period_s: float) -> tuple[float, float]:
-    """The period of the reference near this one and its standard deviation, seconds, at the times of its samples.
+def refined_period(log: UnevenLog, name: str, period_s: float) -> tuple[float, float]:
+    """The period of a channel near this one and its standard deviation, seconds, at the times of its samples.
 
     The phases of the strong bins advance from window to window by 2πk times the relative error of the period; windows
     further and further apart make this more precise.
     """
-    spectra = _plain_spectra(log, _reference(axis), period_s)
+    spectra = _plain_spectra(log, name, period_s)
     k = np.arange(1, spectra.shape[1] + 1)
     error, sigma, apart = 0.0, 1.0, 1
     while apart < len(spectra):

@@ -66,12 +66,9 @@ def _default_hop(lines: Lines) -> int:
 def uneven_event(log: UnevenLog, channels: Sequence[str], lines: Lines) -> Event:
     """An Event that describes the clocks, and how the spectra are computed."""
     clocks = log.clocks(channels)
-    listed = [
-        f"{' '.join(map(repr, one.channels))} at {one.stamps.rate_hz:.6g} Hz, steps ± {100 * one.stamps.jitter:.2g} %"
-        for one in clocks
-    ]
+    listed = ", ".join(one.described for one in clocks)
     message = (
-        f"the channels are sampled at times of their own ({', '.join(listed)}), so that spectra are fitted to the "
+        f"the channels are sampled at times of their own ({listed}), so that spectra are fitted to the "
         f"samples at these times; window and hop count samples of a grid of {lines.rate_hz:.9g} Hz"
     )
     slow = [one for one in clocks if one.stamps.rate_hz / 2 <= lines.frequency_hz[-1]]

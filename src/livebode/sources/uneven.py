@@ -18,6 +18,7 @@ from livebode.sources.expressions import Expression
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log
 from livebode.sources.naming import found_channel, resolve
+from livebode.sources.opening import together
 from livebode.sources.recording import Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.resample import Resampler
 from livebode.sources.rounding import exact_rate_hz
@@ -38,6 +39,12 @@ class ClockGroup:
 
     stamps: Stamps
     channels: tuple[str, ...]
+
+    @property
+    def described(self) -> str:
+        """The channels, their mean rate and their jitter, for a person."""
+        jitter = f"steps ± {100 * self.stamps.jitter:.2g} %"
+        return f"{' '.join(map(repr, self.channels))} at {self.stamps.rate_hz:.6g} Hz, {jitter}"
 
 
 class UnevenLog(Log):
@@ -62,7 +69,9 @@ class UnevenLog(Log):
         self._stamps: dict[str, Stamps] = {}
         self._clocks: dict[str, tuple[Column, str]] = {}
         super().__init__(recording, self._with_clock(recording), chosen, Clock(1.0, ""), block_samples, kinds)
-        self._reference = self._stamps_of(self._group_of(chosen[0]))
+        groups = [self._group_of(name) for name in chosen]
+        self._groups = frozenset(groups)
+        self._reference = self._stamps_of(groups[0])
         kind = clock_kind or clock_kind_of(self._reference.first_s)
         step_s = self._reference.step_s
         # A rate of few digits is meant where the median of so many jittering steps allows it.
@@ -137,6 +146,13 @@ class UnevenLog(Log):
         return max(0, int(np.ceil(first - 1e-6))), int(np.floor(last + 1e-6)) + 1
 
     @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels of the clocks in use, in the order of the file; then the names of `naming`."""
+        clocks = [column for column, _ in self._clocks.values()]
+        own = [one for one in self._columns if one.group in self._groups and one not in clocks and not one.temporal]
+        return (*(self._label(column, column.name) for column in own), *self._named)
+
+    @property
     def skipped(self) -> tuple[Skipped, ...]:
         """What else is in the file, and why it is not a channel."""
         listed = {column.name for column in self._columns}
@@ -145,8 +161,12 @@ class UnevenLog(Log):
 
     @property
     def other_clocks(self) -> Mapping[str, tuple[str, ...]]:
-        """None: the channels of all clocks are listed."""
-        return {}
+        """Channels of the file that are sampled by clocks that are not in use, by their time column."""
+        return {
+            clock.name: tuple(one.name for one in self._columns if one.group == group and one is not clock)
+            for group, (clock, _) in self._clocks.items()
+            if group not in self._groups
+        }
 
     @property
     def samples(self) -> int:
@@ -209,6 +229,13 @@ class UnevenLog(Log):
             yield Block(data, labels, self.rate_hz, start=first, origin_s=self.origin_s)
 
 
+def _most(recording: Recording, time: str | None) -> list[str]:
+    """The channels of the clock that has the most values, or of this one."""
+    columns = together(recording, None, time)
+    clock, _ = find_time(columns, time)
+    return [column.name for column in columns if column is not clock and not column.temporal]
+
+
 def _exact(time: NDArray[Any]) -> NDArray[Any]:
     return time.astype(np.int64, copy=False) if time.dtype.kind in "iub" else time
 
@@ -231,7 +258,8 @@ def open_uneven(
     path, time, dbc, block_samples, kinds, clock
         As for `open_log`.
     channels
-        Channels in use, the reference first; their common time is what is read.
+        Channels in use, the reference first; their common time is what is read. If none is named, those that `open_log`
+        chooses.
     rate_hz
         Rate of the common grid. Default: that of the median step of the reference's clock.
 
@@ -247,4 +275,5 @@ def open_uneven(
         for name in channels:
             found_channel(name, everything, everything)
         declared = {resolve(name, everything, everything).name: kind for name, kind in (kinds or {}).items()}
-        return UnevenLog(recording, list(channels), rate_hz, time, block_samples, declared, clock)
+        chosen = list(channels) or _most(recording, time)
+        return UnevenLog(recording, chosen, rate_hz, time, block_samples, declared, clock)
