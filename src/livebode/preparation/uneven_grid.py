@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.configuration.axis import Axis
-from livebode.core import ConfigError, Lines
+from livebode.core import ConfigError, Lines, SignalError
 from livebode.core.lines import spacing_hz
 from livebode.estimation.settings import nearest_hop
 from livebode.preparation.part import chosen_part
 from livebode.preparation.plan import SEARCHED, beginning, reference_of
+from livebode.preparation.uneven_lines import excited_lines
 from livebode.sources.part_limit import part_limit
 from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.uneven import UnevenLog
@@ -62,19 +63,17 @@ def uneven_grid(axis: Axis, log: UnevenLog) -> tuple[UnevenLog, Lines]:
 def _lines(axis: Axis, grid: UnevenLog, window: int) -> Lines:
     if axis.lines.frequencies != "auto":
         return Lines.parse(axis.lines.frequencies, grid.rate_hz, window)
-    from livebode.excitation import lines_of_window, recognise  # slow to import
-
-    samples = beginning(_fixed_part(axis, grid), _reference(axis))
-    if axis.lines.window == "auto":
-        return recognise(samples, grid.rate_hz).lines
-    return lines_of_window(samples, window, grid.rate_hz)
+    lines = excited_lines(_fixed_part(axis, grid), _reference(axis), window)
+    many = 1 if axis.lines.window == "auto" else window // lines.window
+    return Lines.of_bins([many * k for k in lines.bins], many * lines.window, grid.rate_hz)
 
 
 def _longer(axis: Axis, grid: UnevenLog, lines: Lines) -> Lines:
     """The lines in a window of several periods, if the slowest channel has too few samples in one."""
     signals = axis.signals
     names = [name for name in (signals.output, signals.input, signals.excitation) if name]
-    slowest_hz = min(clock.stamps.rate_hz for clock in grid.clocks(names))
+    # Steps that vary cluster the samples, of which windows then have more or fewer.
+    slowest_hz = min(one.stamps.rate_hz / (1 + one.stamps.jitter**2) for one in grid.clocks(names))
     needed = _SAMPLES_PER_UNKNOWN * (2 * len(lines) + 1)
     many = ceil(needed * grid.rate_hz / (slowest_hz * lines.window) - 1e-9)
     most = grid.samples // (_WINDOWS_MIN * lines.window)
@@ -119,12 +118,8 @@ def measured_grid(
     given
         Whether the rate of the log is given, so that it must remain.
     """
-    from livebode.excitation.period import find_period
-    from livebode.excitation.prepare import checked, filled
-
-    samples = filled(checked(beginning(log, name), repr(name)))
-    period_s, sigma_s = refined_period(log, name, find_period(samples, log.rate_hz, 0.0)[0] / log.rate_hz)
-    period_s = exact_rate_hz(1 / exact_rate_hz(period_s, 3 * sigma_s / period_s), 0.0)
+    period_s, sigma_s = refined_period(log, name, _rough_period(log, name))
+    period_s = 1 / exact_rate_hz(period_s, 3 * sigma_s / period_s)
     if spacing is not None and (many := round(period_s * spacing)):
         meant_s = float(many / spacing)
         period_s = meant_s if abs(period_s / meant_s - 1) < _SNAPPED else period_s
@@ -132,6 +127,26 @@ def measured_grid(
         return round(period_s * log.rate_hz), log.rate_hz
     window = _divisible(max(4, round(period_s * log.rate_hz)))
     return window, exact_rate_hz(period_s / window, 1e-12)
+
+
+def _rough_period(log: UnevenLog, name: str) -> float:
+    """The period of a channel in seconds, to about a sample, from interpolated samples.
+
+    Interpolation loses the highest lines where steps are long; means of two or four samples show the others better.
+    """
+    from livebode.excitation.period import find_period  # slow to import
+    from livebode.excitation.prepare import checked, filled
+
+    samples = filled(checked(beginning(log, name), repr(name)))
+    failed: SignalError | None = None
+    for many in (1, 2, 4):
+        means = samples[: samples.size // many * many].reshape(-1, many).mean(axis=1)
+        try:
+            return find_period(means, log.rate_hz / many, 0.0)[0] * many / log.rate_hz
+        except SignalError as error:
+            failed = failed or error
+    assert failed is not None
+    raise failed
 
 
 def _divisible(window: int) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from livebode.core import LEFT_OUT, NOT_WHOLE, Channel, SignalError, Spectra, Sp
 from livebode.estimation import Settings
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.uneven import UnevenSpectra, UnevenWindow
+from livebode.preparation.uneven_segments import segments
 from livebode.sources.resample import Resampler
 from livebode.sources.uneven import ClockGroup, UnevenLog
 
@@ -93,8 +93,8 @@ class UnevenSource:
         expected = group.stamps.rate_hz * lines.window / lines.rate_hz
         whole = UnevenSpectra(lines.bins, (), lines.window, 1, expected, trend)
         first = -(-log.first // lines.window)
-        segments = self._segments(group, whole, first, min(log.stop // lines.window, first + _TYPICAL), lines.window)
-        found = [window.inflation for window in whole.windows(segments, first, 1)]
+        parts = self._segments(group, whole, first, min(log.stop // lines.window, first + _TYPICAL), lines.window)
+        found = [window.inflation for window in whole.windows(parts, first, 1)]
         if not found:
             raise SignalError(
                 "too-short",
@@ -111,25 +111,8 @@ class UnevenSource:
 
     def _segments(self, group: ClockGroup, fit: UnevenSpectra, first: int, stop: int, step: int) -> Iterator[Complex]:
         """Sums of segments `first` … `stop` − 1, each of `step` samples of the grid."""
-        lines = self._settings.lines
-        number, turns = first, np.zeros(0)
-        data = np.zeros((len(group.channels), 0))
-        pieces = self._log.pieces(group.channels)
-        while number < stop:
-            piece = next(pieces, None)
-            if piece is not None:
-                turns = np.concatenate([turns, piece[0] * (lines.rate_hz / lines.window)])
-                data = np.concatenate([data, piece[1]], axis=1)
-            # A segment ends half a sample behind its last one on the grid.
-            ends = (np.arange(number, stop + 1) * step - 0.5) / lines.window
-            if piece is not None and turns.size:
-                ends = ends[: int(np.searchsorted(ends, turns[-1]))]
-            cuts = np.searchsorted(turns, ends)
-            for begin, end in pairwise(cuts):
-                yield fit.segment(turns[begin:end], data[:, begin:end])
-                number += 1
-            done = int(cuts[-1]) if cuts.size else 0
-            turns, data = turns[done:], data[:, done:]
+        for at, data in segments(self._log, group.channels, first, stop, step):
+            yield fit.segment(at / self._settings.lines.window, data)
 
     def blocks(self, _channels: Sequence[str] | None = None) -> Iterator[Spectra]:
         """The spectra of all windows in the recording from its first sample on."""
