@@ -11,7 +11,9 @@ import pytest
 from livebode.configuration import Axis
 from livebode.core import ConfigError, LivebodeError, RecordingError
 from livebode.records import RunRecord
-from livebode.runtime import Destination, run
+from livebode.runtime import Destination, StoppedError, run
+from livebode.runtime.documents import TrackerResults
+from livebode.runtime.run_control import RunControl
 from livebode.simulation.two_mass_loop import TwoMassPlant
 from tests.support.command import livebode
 from tests.support.errors import refused
@@ -94,6 +96,26 @@ def test_a_run_that_was_recorded_in_segments_is_the_same(tmp_path):
     log = write_csv(tmp_path / "log.csv", stamped(same=True))
     one, two = ran(log), ran(log, record={})
     np.testing.assert_array_equal(one.responses().value, two.responses().value)
+
+
+def test_a_run_that_was_stopped_continues_with_the_same_responses(tmp_path):
+    log = write_csv(tmp_path / "log.csv", stamped(same=True))
+    control, seen = RunControl(), []
+
+    def stop(document: object) -> None:
+        seen.append(isinstance(document, TrackerResults))
+        if sum(seen) == 2:
+            control.end()
+
+    axis = Axis.of({"source": {"log": log}, "signals": NAMES, "record": {"segment_s": 0.5}}, "the test")
+    with pytest.raises(StoppedError):
+        run(axis, Destination(tmp_path / "stopped", lambda *_: None, subscribers=(stop,)), control)
+    begun = RunRecord.open(tmp_path / "stopped").responses()
+    assert 0 < len(begun) < 300
+    run(axis, Destination(tmp_path / "stopped", lambda *_: None))
+    found, whole = RunRecord.open(tmp_path / "stopped").responses(), ran(log).responses()
+    np.testing.assert_array_equal(found.sample, whole.sample)
+    np.testing.assert_array_equal(found.sigma, whole.sigma)
 
 
 def test_regular_clocks_of_different_rates_are_read_together(tmp_path):

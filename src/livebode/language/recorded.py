@@ -100,6 +100,7 @@ SENTENCES = (
     "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs",
     "The baseline's fitted parameters are not judged: the run has no [fit]",
     "The baseline's model of the machine is not used: it needs samples, but the drive sends spectra",
+    "The baseline's model of the machine is not used: it needs samples at regular times",
     "false_alarm_interval_days = {days} has no effect without one",
     "one in {count} days of motion",
     "{count} samples were lost",

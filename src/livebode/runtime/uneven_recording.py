@@ -30,9 +30,8 @@ def run_uneven(axis: Axis, log: UnevenLog, to: Destination, control: RunControl,
     settings = uneven_settings(axis, lines)
     part = configured_part(axis, grid)
     assert isinstance(part, UnevenLog)
-    covariates = axis.monitoring.covariates
-    values = dict.fromkeys([*([settings.schedule] if settings.schedule else []), *covariates])
-    source = UnevenSource(part, settings, list(values), axis.tracking.differenced)
+    values = list(dict.fromkeys([*([settings.schedule] if settings.schedule else []), *_covariates(axis)]))
+    source = UnevenSource(part, settings, values, axis.tracking.differenced)
     follower = UnevenTracker(settings, source.layout)
     pipeline = Pipeline.of(axis, follower, source.channels, samples=False)
     signals = [channel.name for channel in source.layout.signals]
@@ -52,6 +51,15 @@ def run_uneven(axis: Axis, log: UnevenLog, to: Destination, control: RunControl,
     )
     with moments_by(RunClock.of_kind(part.clock_kind)):
         return loop.run()
+
+
+def _covariates(axis: Axis) -> tuple[str, ...]:
+    """Channels that the baseline depends on, or a later one may."""
+    if axis.monitoring.baseline is None:
+        return tuple(axis.monitoring.covariates)
+    from livebode.monitoring import Baseline  # with the simulation
+
+    return tuple(Baseline.load(axis.monitoring.baseline).covariates)
 
 
 def _leave_out(source: UnevenSource, part: UnevenLog, follower: UnevenTracker, noticed: list[Event]) -> None:
