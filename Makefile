@@ -85,7 +85,7 @@ repeating: $(BUILT) ## coverage of the bounds under friction, backlash, encoder 
 recognition: $(BUILT) ## share of 1,000 generated excitations whose period and lines are found exactly
 	$(BIN)/python -m studies.recognition
 
-uneven: $(BUILT) ## coverage of the bounds where every channel has a jittering clock of its own (10 min)
+uneven: $(BUILT) ## coverage of the bounds where every channel has a jittering clock of its own (3 min)
 	$(BIN)/python -m studies.uneven
 
 fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lacks something (docs/explanation/fits.md)
