@@ -159,6 +159,7 @@ def test_times_that_are_no_clock_are_refused(tmp_path, spoil, code):
     ("sections", "key"),
     [
         ({"tracking": {"hann": True}}, "tracking.hann"),
+        ({"tracking": {"estimator": "lpm"}}, "tracking.estimator"),
         ({"tracking": {"spikes": ["y"]}}, "tracking.spikes"),
         ({"tracking": {"dtype": "float32"}}, "tracking.dtype"),
         ({"record": {"samples": True}}, "record.samples"),

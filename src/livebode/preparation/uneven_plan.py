@@ -16,13 +16,11 @@ _UNKNOWNS = 300
 """Amplitudes of a window up to which the default hop is that of even samples; the cost of a fit is their cube."""
 
 
-def uneven_settings(axis: Axis, lines: Lines) -> Settings:
-    """The settings of the tracker; ConfigError for one that needs samples at regular times.
-
-    A differenced channel is fitted with a linear trend instead, which its spectra no longer contain.
-    """
+def check_uneven(axis: Axis) -> None:
+    """ConfigError for a setting that needs samples at regular times."""
     tracking = axis.tracking
     for key, used, why in (
+        ("tracking.estimator", not tracking.periodic, f"{tracking.estimator} needs samples at regular times"),
         ("motion", axis.motion is not None, "its model needs samples at regular times"),
         (
             "record.samples",
@@ -40,7 +38,14 @@ def uneven_settings(axis: Axis, lines: Lines) -> Settings:
                 "remove it, or resample the recording",
                 key=key,
             )
-    hop = tracking.hop or _default_hop(lines)
+
+
+def uneven_settings(axis: Axis, lines: Lines) -> Settings:
+    """The settings of the tracker; ConfigError if the hop does not divide the window.
+
+    A differenced channel is fitted with a linear trend instead, which its spectra no longer contain.
+    """
+    hop = axis.tracking.hop or _default_hop(lines)
     settings = settings_of(axis, lines.rate_hz, lines, hop)
     if settings.step < lines.window and lines.window % settings.step:
         raise ConfigError(

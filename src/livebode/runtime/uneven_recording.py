@@ -15,7 +15,7 @@ from livebode.preparation.part import configured_part
 from livebode.preparation.plan import roles_in_doubt
 from livebode.preparation.transients import leading_transient, transient_event
 from livebode.preparation.uneven_grid import uneven_grid
-from livebode.preparation.uneven_plan import clock_facts, uneven_event, uneven_settings
+from livebode.preparation.uneven_plan import check_uneven, clock_facts, uneven_event, uneven_settings
 from livebode.preparation.uneven_spectra import UnevenSource
 from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
@@ -26,6 +26,7 @@ from livebode.sources.uneven import UnevenLog
 
 def run_uneven(axis: Axis, log: UnevenLog, to: Destination, control: RunControl, started: float) -> Outcome:
     """Examine the recording, interpolated on a common grid, then track spectra that are fitted at its own times."""
+    check_uneven(axis)
     grid, lines = uneven_grid(axis, log)
     settings = uneven_settings(axis, lines)
     part = configured_part(axis, grid)
