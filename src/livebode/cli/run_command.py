@@ -22,7 +22,10 @@ from livebode.runtime.documents import TrackerResults
 
 
 def run_command(
-    target: Annotated[Path, typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or a configuration.")],
+    targets: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or several that are averaged, or a configuration."),
+    ],
     excitation: Excitation = None,
     output: Output = None,
     input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
@@ -136,8 +139,16 @@ def run_command(
     }
     specified = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
     over = {section: values for section, values in specified.items() if values} | ({"record": {}} if go_on else {})
+    target = targets[0]
+    if len(targets) > 1 and any(path.suffix.lower() == ".toml" for path in targets):
+        raise UsageError(
+            "conflict",
+            "a configuration cannot be combined with other arguments",
+            "list the recordings in its source.log",
+            argument="log",
+        )
     file = ConfigurationFile(target, over) if target.suffix.lower() == ".toml" else None
-    axes = {"": _axis(target, over)} if file is None else file.read()
+    axes = {"": _axis(targets, over)} if file is None else file.read()
     directory = out or Path("runs") / target.stem
     live = any(axis.source.live for axis in axes.values())
     with served(serve, _serving(axes), port, [name or target.stem for name in axes], stays=not live) as subscribers_of:
@@ -162,8 +173,8 @@ def _serving(axes: Axes) -> ServeSection:
     return first.serve
 
 
-def _axis(target: Path, specified: dict[str, dict[str, Any]]) -> Axis:
-    """The configuration of a recording from the options."""
+def _axis(recordings: list[Path], specified: dict[str, dict[str, Any]]) -> Axis:
+    """The configuration of recordings from the options."""
     if "output" not in specified.get("signals", {}):
         raise UsageError(
             "missing",
@@ -171,7 +182,8 @@ def _axis(target: Path, specified: dict[str, dict[str, Any]]) -> Axis:
             "give --output CHANNEL (livebode inspect lists the channels)",
             argument="output",
         )
-    return Axis.of(specified | {"source": specified.get("source", {}) | {"log": target}}, "the options")
+    log = recordings if len(recordings) > 1 else recordings[0]
+    return Axis.of(specified | {"source": specified.get("source", {}) | {"log": log}}, "the options")
 
 
 def _window(text: str | None) -> int | str | None:

@@ -9,11 +9,11 @@ from livebode.sources.uneven import UNEVEN, UnevenLog, open_uneven
 
 
 def open_recording(axis: Axis) -> Log:
-    """Open `source.log` as [source] describes it, at the clock of the output; LivebodeError if it cannot be read."""
+    """Open the one recording in [source] at the clock of the output; LivebodeError if it cannot be read."""
     source = axis.source
-    assert source.log is not None
+    (path,) = source.logs
     return open_log(
-        source.log,
+        path,
         rate_hz=source.rate_hz,
         time=source.time,
         kinds=source.kinds,
@@ -26,7 +26,7 @@ def open_recording(axis: Axis) -> Log:
 def open_even_or_uneven(axis: Axis) -> Log | UnevenLog:
     """The same; an UnevenLog if the clock of the output jitters, or if the other channels have other clocks."""
     source, signals = axis.source, axis.signals
-    assert source.log is not None
+    (path,) = source.logs
     named = [signals.excitation, signals.input, signals.output, signals.schedule, *axis.monitoring.covariates]
     if axis.tracking.estimator == "direct":
         named = [signals.input, *named]
@@ -40,7 +40,7 @@ def open_even_or_uneven(axis: Axis) -> Log | UnevenLog:
         if error.code not in UNEVEN or source.time == "none":
             raise
     return open_uneven(
-        source.log,
+        path,
         names,
         rate_hz=source.rate_hz,
         time=source.time,

@@ -8,17 +8,20 @@ from livebode.fitting.once import Fit, best_of, fit, fit_of
 from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel
 from livebode.fitting.rational import fit_rational
 from livebode.fitting.rational_model import Rational, rational_of
+from livebode.fitting.recordings import Between, RecordingsMean
 from livebode.fitting.three_mass import ThreeMass
 from livebode.fitting.unknown_gain import TwoMassGain
 
 __all__ = [
     "MODELS",
+    "Between",
     "EvaluationGrid",
     "Fit",
     "Fitter",
     "Parameter",
     "PhysicalModel",
     "Rational",
+    "RecordingsMean",
     "Rigid",
     "RunningMean",
     "ThreeMass",
