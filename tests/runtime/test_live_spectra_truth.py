@@ -249,7 +249,7 @@ def test_the_model_of_the_machine_is_left_out_and_this_is_reported(tmp_path: Pat
     tracker_settings = settings()
     summary = change_detection(axis, tracker_settings, samples=False).summary()
     assert summary["judged_by"] == "tables"
-    assert "model of the machine is not used: it needs samples, but the drive sends spectra" in summary["message"]
+    assert "model of the machine is not used: it needs samples at regular times" in summary["message"]
     assert change_detection(axis, tracker_settings).summary()["judged_by"] == "model"
 
 

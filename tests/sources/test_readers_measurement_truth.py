@@ -79,7 +79,8 @@ def test_mdf_groups_of_two_rates_are_separated(tmp_path):
     log = open_log(path)
     assert (log.rate_hz, log.samples) == (RATE_HZ, 500)
     assert "0/y" in [c.name for c in log.channels]
-    assert "1/y" in [skipped.name for skipped in log.skipped]
+    assert log.other_clocks == {"1/time": ("1/y",)}
+    assert open_log(path, time="1/time").rate_hz == 400
 
 
 def test_samples_that_mdf_marks_as_invalid_are_nan(tmp_path):

@@ -127,6 +127,7 @@ def _show_recording(found: Inspection, console: Console) -> None:
     rate = "at an unknown rate" if found.without_rate else f"at {log.rate_hz:.9g} Hz ({log.rate_origin})"
     console.print(f"{log.path}: {log.format}, {contents.samples} samples {rate}", soft_wrap=True)
     gaps = f"{counted(contents.gaps, 'gap')} ({contents.missing} samples missing)" if contents.gaps else "no gaps"
+    gaps = "interpolated" if found.clocks else gaps
     jitter = ""
     if log.timing is not None:
         jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"
@@ -134,6 +135,7 @@ def _show_recording(found: Inspection, console: Console) -> None:
         console.print(f"no rate: {found.without_rate} (options --rate and --time)", soft_wrap=True)
     else:
         console.print(f"{contents.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
+    _show_clocks(found, console)
     if log.is_part:
         stop = log.first + contents.samples + contents.missing
         span = " … ".join(f"{log.origin_s + sample / log.rate_hz:.6g}" for sample in (log.first, stop))
@@ -157,6 +159,18 @@ def _show_recording(found: Inspection, console: Console) -> None:
         console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")
     for clock, names in log.other_clocks.items():
         console.print(f"  on the clock --time '{clock}': {', '.join(names)}", style="dim", soft_wrap=True)
+
+
+def _show_clocks(found: Inspection, console: Console) -> None:
+    """Clocks that are not those of the common grid."""
+    for clock in found.clocks:
+        step = f"longest step {clock.stamps.longest_s * 1e3:.4g} ms"
+        console.print(f"at times of their own: {clock.described}, {step}", soft_wrap=True)
+    if found.clocks:
+        console.print(
+            "a run fits spectra to the samples at these times; the excitation is examined in interpolated samples",
+            soft_wrap=True,
+        )
 
 
 def _show_hum(quiet: Quiet, console: Console) -> None:

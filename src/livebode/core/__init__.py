@@ -8,7 +8,7 @@ from livebode.core._loop import Loop
 from livebode.core._plant_kinds import PlantKinds
 from livebode.core._plotting import plot_responses
 from livebode.core._response import PER_RESPONSE, Response, Responses, widened
-from livebode.core._spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
+from livebode.core._spectra import LEFT_OUT, NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
 from livebode.core._unit_reading import QuantityKind, UnitReading, read_unit, split_plant_unit
 from livebode.core._wording import counted, plural, rounded_down
 from livebode.core.controllers import PID, Cascade, PositionPD
@@ -38,6 +38,7 @@ from livebode.core.rows import RowArrays
 from livebode.core.state import Stage, Stateful, StatefulBase
 
 __all__ = [
+    "LEFT_OUT",
     "NOT_WHOLE",
     "PER_LINE",
     "PER_RESPONSE",

@@ -13,8 +13,10 @@ from livebode.core._block import Block, Channel
 from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import WINDOW_MAX, Lines
 
-NOT_WHOLE, SPIKE = 1, 2
-"""Bits of a window's state: it contains a start, a gap or a non-finite sample; it contains a spike."""
+NOT_WHOLE, SPIKE, LEFT_OUT = 1, 2, 4
+"""Bits of a window's state: it contains a start, a gap or a non-finite sample; a spike; samples that a run leaves out.
+
+A drive sends the first two."""
 
 
 @dataclass(frozen=True)

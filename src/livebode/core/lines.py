@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil, floor, lcm
+from math import ceil, floor, gcd, lcm
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,6 +183,19 @@ def check_window(window: int, rate_hz: float) -> None:
             argument="rate_hz",
             value=rate_hz,
         )
+
+
+def spacing_hz(text: str) -> Fraction | None:
+    """The largest frequency of which all lines in a text are multiples; None if it counts in bins.
+
+    >>> spacing_hz("20:140:40, 50")
+    Fraction(10, 1)
+    """
+    if "k=" in text:
+        return None
+    required = [f for item in text.split(",") for f in _frequencies(item.strip(), text, 1.0, 1)]
+    unit = lcm(*(f.denominator for f in required))
+    return Fraction(gcd(*(int(f * unit) for f in required)), unit) or None
 
 
 def _number(text: str) -> Fraction:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import (
+    LEFT_OUT,
     NOT_WHOLE,
     SPIKE,
     Block,
@@ -28,7 +30,7 @@ from livebode.estimation.line_stage import LineStage
 from livebode.estimation.ripple import HopSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows, after
-from livebode.estimation.spectra_watch import SpectraInputStatistics
+from livebode.estimation.spectra_watch import DRIVE, SpectraInputStatistics
 from livebode.estimation.stream_estimator import StreamEstimator
 
 Floats = NDArray[np.float64]
@@ -62,6 +64,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
     """
 
     _stage = Stage("spectra-tracker", 1)
+    _sentences: Mapping[str, str] = DRIVE
     _lines: LineStage
 
     def __init__(self, settings: Settings, layout: SpectraLayout) -> None:
@@ -79,7 +82,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
         advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
         differenced = np.array(layout.differenced)[self._signals]
         self._after = after(bins, layout.window, differenced, advanced)[:, np.newaxis]
-        self._watch = SpectraInputStatistics(self._events, layout.window)
+        self._watch = SpectraInputStatistics(self._events, layout.window, self._sentences)
         self._range = PlausibleRange(len(self._signals), max(1, layout.window // layout.hop))
         self._speed = HopSpeed(settings.lines.rate_hz) if settings.ripple else None
         self._parts = {
@@ -118,9 +121,10 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
         implausible = np.zeros(len(block), dtype=np.bool_)
         implausible[self._range.process(size)] = True
         not_whole, spike = (block.state & NOT_WHOLE != 0) | ~finite, block.state & SPIKE != 0
+        left_out = block.state & LEFT_OUT != 0
         self._watch.take(block, {"not-whole": not_whole, "implausible": implausible, "spike": spike})
         whole = ~(not_whole | implausible)
-        rows = SpectraRows(spectrum, block.sample, whole, whole & ~spike, _NONE, _NONE, _NONE)
+        rows = SpectraRows(spectrum, block.sample, whole, whole & ~(spike | left_out), _NONE, _NONE, _NONE)
         place = (block.place + hop * np.arange(len(block))) % window
         time_s = block.origin_s + (block.sample - (window - 1) / 2) / block.rate_hz
         schedule = block[self.settings.schedule] if self.settings.schedule else np.full(len(block), np.nan)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Event, SignalError, Spectra, Stage
 from livebode.estimation.stream_counters import StreamCounters
 
-_KINDS = {
+DRIVE = {
     "not-whole": "a window is incomplete (marked by the drive, or its sums are not finite)",
     "implausible": "a spectrum is more than 1e8 times larger than all in the period before",
     "spike": "the drive marks a window with a spike",
@@ -20,9 +22,9 @@ class SpectraInputStatistics(StreamCounters):
 
     _stage = Stage("spectra-counts", 1)
 
-    def __init__(self, events: list[Event], window: int) -> None:
-        super().__init__(events, _KINDS, -(1 << 62), also=("spectra",))
-        self._window = window
+    def __init__(self, events: list[Event], window: int, sentences: Mapping[str, str] = DRIVE) -> None:
+        super().__init__(events, sentences, -(1 << 62), also=("spectra",))
+        self._window, self._sentences = window, sentences
 
     def take(self, block: Spectra, marked: dict[str, NDArray[np.bool_]]) -> None:
         """Count these, of each kind those that are `marked`; SignalError where they overlap the previous ones."""
@@ -56,7 +58,7 @@ class SpectraInputStatistics(StreamCounters):
             self.counts[kind] += sample.size
             self._last[kind] = int(sample[-1]) if sample.size else self._last[kind]
         for number, kind in sorted(begins):
-            self._report(kind, block, number, f"{_KINDS[kind]}; its response is not valid")
+            self._report(kind, block, number, f"{self._sentences[kind]}; its response is not valid")
 
     def _count(self, block: Spectra, not_whole: NDArray[np.bool_], new: int) -> None:
         """Samples of these windows that previous ones did not contain; `new` since the previous window."""

@@ -35,6 +35,10 @@ SENTENCES = (
     "with the samples before them, {samples} samples ({duration} s) are excluded",
     "{samples} samples ({duration} s) are excluded",
     "--all-periods includes them",
+    "the channels are sampled at times of their own ({clocks}), so that spectra are fitted to the samples at these "
+    "times",
+    "window and hop count samples of a grid of {rate} Hz",
+    "lines above {nyquist} Hz contain what a channel has at their image frequencies",
     "the schedule moves: the noise is taken from detection lines (non-excited bins), because the scatter between "
     "periods contains the motion",
     "mains hum at {line} Hz is no longer detected without excitation",
@@ -108,6 +112,7 @@ SENTENCES = (
     "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs",
     "The baseline's fitted parameters are not judged: the run has no [fit]",
     "The baseline's model of the machine is not used: it needs samples, but the drive sends spectra",
+    "The baseline's model of the machine is not used: it needs samples at regular times",
     "false_alarm_interval_days = {days} has no effect without one",
     "one in {count} days of motion",
     "{count} samples were lost",
@@ -324,8 +329,8 @@ NAMES = (
     "record-damaged", "record-paused",
     "record-removed", "record-resumed", "record-stopped", "record-unclosed", "record-unfinished", "reordered",
     "repeat", "replaced", "restart", "resumed", "roles-doubtful", "spike", "steps", "thinned", "transient",
-    "unit-changed", "waiting", "window-doubtful", "wrong-rate", "a delay", "viscous friction at the motor (B)",
-    "viscous friction at the load (BL)", "a lag",
+    "uneven-clock", "unit-changed", "waiting", "window-doubtful", "wrong-rate", "a delay",
+    "viscous friction at the motor (B)", "viscous friction at the load (BL)", "a lag",
     "the compliance of modes above the band", "a further mode", "output", "plant input",
 )  # fmt: skip
 """Names and phrases without values."""

@@ -10,6 +10,7 @@ import numpy as np
 from livebode.core import Block, QuantityKind, RecordingError
 from livebode.sources import Log
 from livebode.sources.recording import Skipped
+from livebode.sources.uneven import UnevenLog
 
 _UNREADABLE_MAX = 16
 """Channels with text further down that are left out, each after another reading of the file."""
@@ -64,6 +65,8 @@ def read_contents(log: Log, names: Sequence[str], required: Sequence[str]) -> Co
 
 
 def contents_of(log: Log, names: Sequence[str]) -> Contents:
+    if isinstance(log, UnevenLog):
+        return _uneven_contents(log, names)
     summaries: dict[str, ChannelSummary] = {}
     samples, gaps, missing, stop = 0, 0, 0, None
     for block in log.blocks(names):
@@ -74,3 +77,17 @@ def contents_of(log: Log, names: Sequence[str]) -> Contents:
             gaps, missing = gaps + 1, missing + block.start - stop
         stop = block.stop
     return Contents(samples, list(summaries.values()), gaps, missing)
+
+
+def _uneven_contents(log: UnevenLog, names: Sequence[str]) -> Contents:
+    """The same of the samples at their own times, in the common time of the channels."""
+    labels = {channel.name: channel for channel in log.naming(names).channels}
+    found = {name: ChannelSummary(name, labels[name].unit, labels[name].kind) for name in names}
+    begin_s, end_s = log.first / log.rate_hz, log.stop / log.rate_hz
+    for clock in log.clocks(names):
+        channels = tuple(labels[name] for name in clock.channels)
+        for time_s, data in log.pieces(clock.channels):
+            inside = (time_s >= begin_s) & (time_s < end_s)
+            for name in clock.channels:
+                found[name].take(Block(data[:, inside], channels, log.rate_hz))
+    return Contents(log.samples, list(found.values()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypedDict
@@ -14,8 +15,11 @@ from livebode.preparation.part import chosen_part
 from livebode.preparation.plan import LIVE_RESPONSES_PER_S, SEARCHED, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
 from livebode.preparation.stretches import Stretch, stretches
+from livebode.preparation.uneven_grid import measured_grid
+from livebode.preparation.uneven_plan import clock_facts
 from livebode.sources import Log, open_log
 from livebode.sources.recording import Skipped
+from livebode.sources.uneven import UNEVEN, ClockGroup, UnevenLog, open_uneven
 
 _WITHOUT_RATE = tuple(
     f"recording.{code}"
@@ -64,6 +68,15 @@ class Inspection:
         return (*self.log.skipped, *self.contents.unreadable)
 
     @property
+    def clocks(self) -> list[ClockGroup]:
+        """The clocks of the channels, if they have clocks of their own."""
+        return self.log.clocks(self._listed) if isinstance(self.log, UnevenLog) else []
+
+    @property
+    def _listed(self) -> list[str]:
+        return [channel.name for channel in self.contents.channels]
+
+    @property
     def live_hop(self) -> int:
         """Default hop of a live run whose window is the excitation's period, in samples."""
         assert self.excitation is not None
@@ -92,6 +105,7 @@ class Inspection:
             "timing": asdict(log.timing) if log.timing else None,
             "channels": [asdict(channel) for channel in contents.channels],
             "skipped": [asdict(skipped) for skipped in self.skipped],
+            **({"clocks": clock_facts(log, self._listed)} if isinstance(log, UnevenLog) else {}),
             "other_clocks": {clock: list(names) for clock, names in log.other_clocks.items()},
         }
         if self.without_rate:
@@ -149,7 +163,9 @@ def inspect(
     required = [name for name in (excitation, output, input) if name is not None]
     given: _Given = {"time": time, "dbc": dbc, "channels": required[:1] or None}
     needs_rate = bool(excitation or lines or begin is not None or end is not None or skip_periods)
-    log, without_rate = open_with_or_without_rate(path, rate_hz, given, needs_rate=needs_rate)
+    log, without_rate = open_with_or_without_rate(path, rate_hz, given, required, needs_rate=needs_rate)
+    if isinstance(log, UnevenLog) and excitation is not None:
+        log = log.at_rate(measured_grid(log, excitation, given=rate_hz is not None)[1])
     log = chosen_part(log, begin, end, skip_periods, lambda part: _periods_in(part, excitation))
     known = {channel.name for channel in log.channels}
     # A channel given by a path or an alias is listed by that name.
@@ -172,11 +188,20 @@ def inspect(
     return Inspection(log, contents, found, quiet, unrecognised, without_rate, repeats)
 
 
-def open_with_or_without_rate(path: Path, rate_hz: float | None, given: _Given, *, needs_rate: bool) -> tuple[Log, str]:
-    """The log, and why it has no rate (empty if it has one); the channels can be listed without."""
+def open_with_or_without_rate(
+    path: Path, rate_hz: float | None, given: _Given, required: Sequence[str], *, needs_rate: bool
+) -> tuple[Log, str]:
+    """The log, and why it has no rate (empty if it has one); the channels can be listed without.
+
+    An UnevenLog if its clock jitters, or if the `required` channels have several clocks.
+    """
     try:
-        return open_log(path, rate_hz=rate_hz, **given), ""
+        log = open_log(path, rate_hz=rate_hz, **given)
+        log.naming(required)
+        return log, ""
     except RecordingError as error:
+        if error.code in UNEVEN and given["time"] != "none":
+            return open_uneven(path, required, rate_hz=rate_hz, time=given["time"], dbc=given["dbc"]), ""
         if needs_rate or rate_hz is not None or error.code not in _WITHOUT_RATE:
             raise
         return open_log(path, rate_hz=1.0, **(given | {"time": "none"})), str(error)

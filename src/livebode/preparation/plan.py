@@ -46,7 +46,7 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
     """The same for a live source: samples, whose lines and window must be given, or spectra of a layout."""
     if layout is not None:
         lines = check_spectra(axis, layout, rate_hz)
-        return SpectraTracker(_settings(axis, rate_hz, lines, layout.hop), layout)
+        return SpectraTracker(settings_of(axis, rate_hz, lines, layout.hop), layout)
     frequencies, window = axis.lines.frequencies, axis.lines.window
     if frequencies == "auto" or window == "auto":
         raise ConfigError(
@@ -57,7 +57,7 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
         )
     lines = Lines.parse(frequencies, rate_hz, window, rounded=not axis.tracking.periodic)
     hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
-    return _follower(axis, _settings(axis, rate_hz, lines, hop))
+    return _follower(axis, settings_of(axis, rate_hz, lines, hop))
 
 
 def _follower(axis: Axis, settings: Settings) -> Follower:
@@ -95,7 +95,7 @@ def make_settings(axis: Axis, log: Log) -> Settings:
     """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
     if not axis.tracking.periodic:
         return _nonperiodic_settings(axis, log)
-    return _settings(axis, log.rate_hz, make_lines(axis, log))
+    return settings_of(axis, log.rate_hz, make_lines(axis, log))
 
 
 def _nonperiodic_settings(axis: Axis, log: Log) -> Settings:
@@ -106,7 +106,7 @@ def _nonperiodic_settings(axis: Axis, log: Log) -> Settings:
     if window != "auto":
         check_length(log.samples, windows * window)
     if frequencies != "auto" and window != "auto":
-        return _settings(axis, log.rate_hz, Lines.parse(frequencies, log.rate_hz, window, rounded=True))
+        return settings_of(axis, log.rate_hz, Lines.parse(frequencies, log.rate_hz, window, rounded=True))
     signals = axis.signals
     reference = signals.input if signals.excitation is None else signals.excitation
     if reference is None:
@@ -126,7 +126,7 @@ def _nonperiodic_settings(axis: Axis, log: Log) -> Settings:
         lines = Lines.parse(frequencies, log.rate_hz, window, rounded=True)
     else:
         lines = excited_lines(samples[0, stretch], window, log.rate_hz, hann=windows > 1)
-    return _settings(axis, log.rate_hz, lines, hop)
+    return settings_of(axis, log.rate_hz, lines, hop)
 
 
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
@@ -141,7 +141,8 @@ def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
     return window_doubt(samples, settings)
 
 
-def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) -> Settings:
+def settings_of(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) -> Settings:
+    """The tracker's settings with these lines and hop; LivebodeError if they do not fit each other."""
     signals, tracking = axis.signals, axis.tracking
     settings = Settings(
         lines=lines,

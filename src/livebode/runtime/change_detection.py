@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _NO_BASELINE = "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs."
 _NOT_FITTED = " The baseline's fitted parameters are not judged: the run has no [fit]."
-_NO_SAMPLES = " The baseline's model of the machine is not used: it needs samples, but the drive sends spectra."
+_NO_SAMPLES = " The baseline's model of the machine is not used: it needs samples at regular times."
 _ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
 _ALARMS_MAX = 100  # sentences in run.json; events.jsonl has all
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from livebode.configuration.axis import Axis
-from livebode.configuration.recording import open_recording
+from livebode.configuration.recording import open_even_or_uneven
 from livebode.core import Event
 from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
@@ -23,13 +23,18 @@ from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
+from livebode.runtime.uneven_recording import run_uneven
 from livebode.sources import Log
+from livebode.sources.uneven import UnevenLog
 
 
 def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
-    log = configured_part(axis, open_recording(axis))
+    opened = open_even_or_uneven(axis)
+    if isinstance(opened, UnevenLog):
+        return run_uneven(axis, opened, to, control, started)
+    log = configured_part(axis, opened)
     follower = make_follower(axis, log)
     log = log.naming([name for name in axis.signals.model_dump().values() if name])
     pipeline = Pipeline.of(axis, follower, log.channels)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from livebode.configuration.axis import RecordSection
-from livebode.core import Block, Channel, Event, RecordError, Responses, Stateful
+from livebode.core import Block, Channel, Event, RecordError, Responses, Spectra, Stateful
 from livebode.core.clock import RunClock
 from livebode.core.files import whole_files
 from livebode.core.writing import why, writing
@@ -176,7 +176,9 @@ class SegmentedRecord:
 
     def pieces(self, block: Block) -> Iterator[Block]:
         """The samples of a Block that are not in the record yet, in pieces whose loss by a kill is short."""
-        for first in range(max(0, self._due_from - block.start), len(block), self._piece):
+        each = block.layout.hop if isinstance(block, Spectra) else 1
+        known = -(-max(0, self._due_from - block.start) // each)
+        for first in range(known, len(block), self._piece):
             yield block.cut(first, first + self._piece)
 
     def write_samples(self, block: Block) -> None:

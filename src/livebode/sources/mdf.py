@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,14 +16,16 @@ from livebode.sources.mdfcan import MdfCanRecording
 from livebode.sources.mdffile import opened
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 
+TIME_MASTER = 1
+_COMPARED = 64  # samples of a time
 FRAMES = "CAN_DataFrame", "CAN_ErrorFrame", "CAN_RemoteFrame"
 
 
 class MdfRecording(Recording):
     """An MDF file. A channel goes by its name, or by group/name (groups from 0) if several groups have the name.
 
-    Each group has its own time: groups of equal length belong together, like series in other formats. Values are
-    physical; a sample that the file marks as invalid is NaN.
+    Each group has its own time: groups with the same times belong together, others have clocks of their own. Values
+    are physical; a sample that the file marks as invalid is NaN.
     """
 
     format: ClassVar[str] = "mdf"
@@ -33,6 +35,7 @@ class MdfRecording(Recording):
         self.has_frames = False
         columns: list[Column] = []
         skipped: list[Skipped] = []
+        clocks: dict[int, bytes] = {}
         with opened(path) as file:
             for at, group in enumerate(file.groups):
                 if len(columns) + len(group.channels) > COLUMNS_MAX:
@@ -52,12 +55,13 @@ class MdfRecording(Recording):
                         columns.append(replace(column, unit=str(first.unit or column.unit)))
                     else:
                         skipped.append(Skipped(channel.name, "its values are not single numbers"))
+                clocks[at] = clock_of(file, at, samples)
         count = Counter(column.name for column in columns)
-        self.columns = tuple(
+        named = [
             replace(column, name=f"{column.key[0]}/{column.name}") if count[column.name] > 1 else column
             for column in columns
-        )
-        self.skipped = tuple(skipped)
+        ]
+        self.columns, self.skipped = grouped(named, clocks), tuple(skipped)
 
     def _check_size(self, file: Any, at: int, samples: int) -> None:
         """RecordingError if a group declares more than the file can contain, even compressed by 1000."""
@@ -103,6 +107,36 @@ class MdfRecording(Recording):
         if invalid is not None and np.any(invalid):
             found = np.where(invalid, np.nan, found)
         return found
+
+
+def clock_of(file: Any, at: int, samples: int) -> bytes:
+    """The times of a group at its beginning, middle and end; empty if it has no time."""
+    index = file.masters_db.get(at)
+    if index is None or not is_time(file.groups[at].channels[index]):
+        return b""
+    ends = [max(0, min(first, samples - _COMPARED)) for first in (0, samples // 2, samples - _COMPARED)]
+    times = [file.get_master(at, record_offset=first, record_count=_COMPARED) for first in ends]
+    return bytes(index.to_bytes(4, "little") + samples.to_bytes(8, "little") + np.concatenate(times).tobytes())
+
+
+def is_time(channel: Any) -> bool:
+    """Whether a master channel is a time, not an angle, a distance or an index."""
+    return int(getattr(channel, "sync_type", TIME_MASTER)) == TIME_MASTER
+
+
+def grouped(columns: Sequence[Column], clocks: Mapping[int, bytes]) -> tuple[Column, ...]:
+    """The columns; if the file has several clocks, each group of columns is named after its time."""
+    first = {times: at for at, times in reversed(list(clocks.items())) if times}
+    if len(first) < 2:
+        return tuple(columns)
+    masters = {at: int.from_bytes(times[:4], "little") for times, at in first.items()}
+    names = {c.key[0]: c.name for c in columns if masters.get(c.key[0]) == c.key[1]}
+    found = []
+    for column in columns:
+        at, index = column.key
+        of = first.get(clocks[at], at)
+        found.append(replace(column, group=names.get(of, ""), clock=of in names and (at, index) == (of, masters[of])))
+    return tuple(found)
 
 
 def unit_of(channel: Any) -> str:

@@ -263,7 +263,9 @@ def stated_unit(column: Column, given: str) -> str:
     return unit
 
 
-def guess_unit(column: Column, mean: float, known_rate: tuple[float, str] | None) -> tuple[str, float, str]:
+def guess_unit(
+    column: Column, mean: float, known_rate: tuple[float, str] | None, tolerance: float = RATE_TOLERANCE
+) -> tuple[str, float, str]:
     """Unit of a time column that states none, its length in seconds, and its origin (empty for seconds).
 
     The unit is seconds, except if a rate from elsewhere differs by a power of 1000. Seconds that give 1 Hz or less
@@ -281,7 +283,7 @@ def guess_unit(column: Column, mean: float, known_rate: tuple[float, str] | None
         )
     rate_hz, where = known_rate
     for unit in ("s", "ms", "us", "ns"):
-        if abs(mean * SECONDS[unit] * rate_hz - 1.0) <= RATE_TOLERANCE:
+        if abs(mean * SECONDS[unit] * rate_hz - 1.0) <= tolerance:
             return unit, SECONDS[unit], "" if unit == "s" else f" (unit from {where})"
     raise RecordingError(
         "rate-conflict",

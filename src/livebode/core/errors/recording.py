@@ -28,6 +28,7 @@ class RecordingError(LivebodeError):
         "channel-duplicated": "Two columns of the file have the same name.",
         "channel-missing": "The file has no channel with samples.",
         "channel-unknown": "The file has no channel of this name.",
+        "clocks-apart": "Channels that are read together were recorded at different times.",
         "clocks-differ": "Channels that are read together are sampled by different clocks.",
         "damaged": "The content of the file contradicts its format.",
         "dbc-missing": "The file contains CAN frames, and no DBC file defines their signals.",
