@@ -54,6 +54,8 @@ class CommonPoles:
         of neighbouring lines.
     patterned
         Outputs whose residuals follow a pattern over the lines.
+    specified
+        Whether the order was specified.
     """
 
     model: Kind
@@ -68,6 +70,7 @@ class CommonPoles:
     chi2: Floats
     correlation: Floats
     patterned: tuple[str, ...]
+    specified: bool
 
     @property
     def status(self) -> str:
@@ -95,10 +98,10 @@ class CommonPoles:
     def about_order(self) -> str:
         """How the order was chosen, as text."""
         what = counted(self.order, "mode" if self.model == "modal" else "pole")
-        if len(self.tried) < 2:
-            return what
-        rest = ", ".join(f"{order}: +{cost - self.tried[0][1]:.0f}" for order, cost in self.tried[1:])
-        return f"{what}: the smallest −2·ln(likelihood) + ln(values) for each parameter (BIC); order {rest}"
+        if self.specified:
+            return f"{what}, as specified"
+        rest = "".join(f"; {order} costs {cost - self.tried[0][1]:.0f} more" for order, cost in self.tried[1:4])
+        return f"{what}, by −2·ln(likelihood) + ln(values) for each parameter (BIC){rest}"
 
     @property
     def about_bounds(self) -> str:
@@ -106,8 +109,8 @@ class CommonPoles:
         if self.complete:
             return "the residuals are white over the lines; ± covers 95 %"
         return (
-            f"the residuals of {', '.join(self.patterned)} follow a pattern over the lines, which no further pole "
-            "explains; ± is not a 95 % bound"
+            f"the residuals of {', '.join(self.patterned)} follow a pattern over the lines, which further poles do "
+            "not explain; ± is not a 95 % bound"
         )
 
     def __getitem__(self, name: str) -> float:
@@ -217,7 +220,7 @@ def fit_common_poles(
     return CommonPoles(
         model, names, blank.units, found, outs.grid, outs.unit, tuple((_order(one, model), one.cost) for one in best),
         parameters, found.epsilon, _reduced_chi2(outs, found), correlated,
-        tuple(name for name, one in zip(names, correlated > limit) if one),
+        tuple(name for name, one in zip(names, correlated > limit) if one), order is not None,
     )  # fmt: skip
 
 
@@ -280,7 +283,7 @@ class _Blank:
         nan = np.full(len(self._names), np.nan)
         parameters = self._row((), (), np.empty(0), np.empty((0, 0)), NO_RESPONSE, outs, nan, nan, np.nan)
         return CommonPoles(
-            self._model, self._names, self.units, None, outs.grid, outs.unit, (), parameters, nan, nan, nan, ()
+            self._model, self._names, self.units, None, outs.grid, outs.unit, (), parameters, nan, nan, nan, (), False
         )
 
     def parameters(self, quantities: PoleQuantities, outs: Outputs, found: Separated) -> Parameters:

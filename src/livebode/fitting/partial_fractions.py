@@ -99,24 +99,27 @@ class PartialFractions:
             parts.append((self._direct(order) * np.exp(-self._s * delay_s))[np.newaxis])
         return np.concatenate(parts).T
 
-    def slopes(self, theta: Floats, delay_s: float, weights: Floats) -> Complex:
-        """Derivative of the response with these weights by each nonlinear parameter but delays, (lines, poles)."""
+    def moves(self, theta: Floats, delay_s: float) -> tuple[Complex, Complex]:
+        """Derivatives of the columns by the parameters of their own poles, by central differences.
+
+        Of a pair's two columns by a1 and a0, (2, pairs, 2, lines), and of a real pole's, (single, lines).
+        """
         of = self.structure
         pairs, step = of.pairs_of(theta), self._steps(theta)
-        found = np.empty((self._s.size, of.poles), dtype=np.complex128)
-        moves = np.array([[way, 0.0] if i == 0 else [0.0, way] for i in range(2) for way in (1.0, -1.0)])
         by = step[: 2 * of.pairs].reshape(-1, 2)
-        moved = pairs + moves[:, np.newaxis] * by  # (4, pairs, 2)
+        moved = pairs + np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])[:, np.newaxis] * by
         columns = self.pairs(moved[..., 0], moved[..., 1], delay_s)
-        for i in range(2):
-            change = (columns[2 * i] - columns[2 * i + 1]) / (2 * by[:, i, np.newaxis, np.newaxis])
-            share = weights[: 2 * of.pairs].reshape(of.pairs, 2)
-            found[:, i : 2 * of.pairs : 2] = np.einsum("pcl,pc->lp", change, share)
-        if of.single:
-            at, by = theta[2 * of.pairs : 2 * of.pairs + 1], step[-1]
-            change = (self.real(at + by, delay_s) - self.real(at - by, delay_s))[0] / (2 * by)
-            found[:, -1] = weights[2 * of.pairs] * change
-        return found
+        change = (columns[:2] - columns[2:]) / (2 * by.T[..., np.newaxis, np.newaxis])
+        real, step = theta[2 * of.pairs : of.poles], step[2 * of.pairs :]
+        later, earlier = (self.real(real + way * step, delay_s) for way in (1, -1))
+        return change, (later - earlier) / (2 * step[:, np.newaxis])
+
+    def slopes(self, moves: tuple[Complex, Complex], weights: Floats) -> Complex:
+        """Derivative of the response with these weights by each nonlinear parameter but delays, (lines, poles)."""
+        of = self.structure
+        of_pairs = np.einsum("ipcl,pc->lpi", moves[0], weights[: 2 * of.pairs].reshape(of.pairs, 2))
+        of_real = weights[2 * of.pairs : of.poles] * moves[1].T
+        return np.concatenate([of_pairs.reshape(self._s.size, 2 * of.pairs), of_real], axis=1)
 
     def pairs(self, a1: Floats, a0: Floats, delay_s: float = 0.0) -> Complex:
         """Both columns of pairs (...), shape (..., 2, lines)."""

@@ -142,6 +142,7 @@ class _Weighted:
         self._rate_hz, value = outputs.grid.rate_hz, outputs.measured.value
         self._right = [stacked(w * np.where(w > 0, y, 0.0)) for w, y in zip(weight, value)]
         self._last: tuple[Floats, list[Any]] | None = None
+        self._moves: tuple[Floats, tuple[Complex, Complex]] | None = None
 
     def minimised(self, start: Floats, evaluations: int) -> tuple[Floats, bool]:
         from scipy.optimize import least_squares
@@ -202,7 +203,9 @@ class _Weighted:
     def _moved(self, theta: Floats, linear: Floats, k: int) -> Complex:
         """Derivative of the response of output k by the nonlinear parameters, (lines, nonlinear)."""
         of, delay_s = self.structure, float(self.structure.delays_of(theta)[k])
-        found = self._shapes.slopes(theta, delay_s, linear)
+        if of.delays or self._moves is None or not np.array_equal(self._moves[0], theta):
+            self._moves = (np.array(theta), self._shapes.moves(theta, delay_s))
+        found = self._shapes.slopes(self._moves[1], linear)
         if not of.delays:
             return found
         step = _TICK_STEP / self._rate_hz
