@@ -73,6 +73,8 @@ def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, l
                 f"the model fits with the other sign (model error {100 * other.epsilon:.2g} %): output or input is "
                 f"inverted; {'change the sign in the drive' if live else remedy}"
             )
+        else:
+            remarks.append("for a machine that is not such a drive, fit its modes: --model modal, or --model rational")
     return remarks
 
 

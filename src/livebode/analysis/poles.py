@@ -13,7 +13,7 @@ from livebode.fitting.common_poles import CommonPoles, fit_common_poles
 from livebode.fitting.pole_search import Kind
 from livebode.records import RunRecord
 
-_OF_INPUT = (("source", "log"), ("signals", "input"), ("signals", "excitation"))
+_SHARED = {"log": "source", "input": "signals", "excitation": "signals"}
 
 
 def fit_poles(
@@ -37,7 +37,9 @@ def fit_poles(
             argument="RUN",
             outputs=names,
         )
-    differing = [key for section_, key in _OF_INPUT if len({str(of.get(section_, {}).get(key)) for of in configurations}) > 1]
+    differing = [
+        key for key, table in _SHARED.items() if len({str(of.get(table, {}).get(key)) for of in configurations}) > 1
+    ]
     if "input" in differing or "excitation" in differing:
         raise UsageError(
             "conflict",

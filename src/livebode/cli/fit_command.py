@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -13,6 +13,8 @@ from livebode.configuration import Axis
 from livebode.configuration.axis import FitSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import UsageError
+from livebode.fitting import POLE_MODELS
+from livebode.fitting.pole_search import Kind
 from livebode.records import RunRecord, to_json
 
 _OPTIONS = {"radius_m": "radius", "inertia_ratio": "ratio", "fixed": "fix"}
@@ -74,8 +76,8 @@ def fit_command(
         "hold": hold,
     }
     specified = {name: value for name, value in given.items() if value is not None}
-    if model == "modal" or model == "rational":
-        _fit_poles(directories, model, specified, order, as_json)
+    if model in POLE_MODELS:
+        _fit_poles(directories, cast(Kind, model), specified, order, as_json)
     else:
         _fit_physical(directories, specified, order, as_json)
 
@@ -111,7 +113,7 @@ def _fit_physical(directories: list[Path], specified: dict[str, Any], order: int
 
 
 def _fit_poles(
-    directories: list[Path], model: Literal["modal", "rational"], specified: dict[str, Any], order: int | None,
+    directories: list[Path], model: Kind, specified: dict[str, Any], order: int | None,
     as_json: bool,
 ) -> None:  # fmt: skip
     from livebode.analysis.poles import fit_poles, plain_poles

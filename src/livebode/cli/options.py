@@ -19,6 +19,14 @@ Output = Annotated[
         metavar="CHANNEL", help="Channel of the measured output y, or an expression: -y, pos + 0.35*angle, diff(pos)."
     ),
 ]
+Outputs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--output",
+        metavar="CHANNEL",
+        help="Channel of the measured output y, or an expression: -y, pos + 0.35*angle, diff(pos); repeat for several.",
+    ),
+]
 Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Sample rate, if the recording does not contain it.")]
 Time = Annotated[
     str | None,

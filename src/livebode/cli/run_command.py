@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +11,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.notices import NoticePrinter
-from livebode.cli.options import Dbc, Excitation, From, Json, Output, Port, Rate, Serve, SkipPeriods, Time, To
+from livebode.cli.options import Dbc, Excitation, From, Json, Outputs, Port, Rate, Serve, SkipPeriods, Time, To
 from livebode.cli.pictures import drawing, show, tracked_amount
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
@@ -24,7 +25,7 @@ from livebode.runtime.documents import TrackerResults
 def run_command(
     target: Annotated[Path, typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or a configuration.")],
     excitation: Excitation = None,
-    output: Output = None,
+    output: Outputs = None,
     input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
     schedule: Annotated[
         str | None, typer.Option(metavar="CHANNEL", help="Channel that the responses depend on, such as the position.")
@@ -99,7 +100,8 @@ def run_command(
 ) -> None:
     """Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.
 
-    Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png.
+    Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png; with several
+    --output one for each in --out, which livebode fit takes together.
     """
     given: dict[str, dict[str, Any]] = {
         "source": {
@@ -110,7 +112,12 @@ def run_command(
             "skip_periods": skip_periods,
             "dbc": dbc,
         },
-        "signals": {"output": output, "input": input, "excitation": excitation, "schedule": schedule},
+        "signals": {
+            "output": output[0] if output else None,
+            "input": input,
+            "excitation": excitation,
+            "schedule": schedule,
+        },
         "lines": {"frequencies": lines, "window": _window(window)},
         "tracking": {
             "estimator": estimator,
@@ -134,7 +141,14 @@ def run_command(
     specified = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
     over = {section: values for section, values in specified.items() if values} | ({"record": {}} if go_on else {})
     file = ConfigurationFile(target, over) if target.suffix.lower() == ".toml" else None
-    axes = {"": _axis(target, over)} if file is None else file.read()
+    axes: Axes = _axes(target, over, output or []) if file is None else file.read()
+    if file is not None and len(output or []) > 1:
+        raise UsageError(
+            "conflict",
+            "several --output cannot be combined with a configuration",
+            "write an axis for each in [axes]",
+            argument="output",
+        )
     directory = out or Path("runs") / target.stem
     live = any(axis.source.live for axis in axes.values())
     with served(serve, _serving(axes), port, [name or target.stem for name in axes], stays=not live) as subscribers_of:
@@ -157,6 +171,20 @@ def _serving(axes: Axes) -> ServeSection:
                 axes=[name, other],
             )
     return first.serve
+
+
+def _axes(target: Path, specified: dict[str, dict[str, Any]], outputs: list[str]) -> Axes:
+    """The configuration of a recording; of several outputs one axis for each, with a name that a directory can have."""
+    if len(outputs) < 2:
+        return {"": _axis(target, specified)}
+    found: dict[str, Axis] = {}
+    for number, output in enumerate(outputs, 1):
+        name = re.sub(r"[^A-Za-z0-9_]+", "_", output).strip("_")[:48] or "output"
+        if name.casefold() in map(str.casefold, found):
+            name = f"{name}_{number}"
+        signals = specified.get("signals", {}) | {"output": output}
+        found[name] = _axis(target, specified | {"signals": signals})
+    return found
 
 
 def _axis(target: Path, specified: dict[str, dict[str, Any]]) -> Axis:

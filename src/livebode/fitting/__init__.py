@@ -1,7 +1,7 @@
 """From responses to models of the machine: physical parameters and rational models, with covariance."""
 
 from livebode.fitting.chains import Rigid, TwoMass
-from livebode.fitting.common_poles import CommonPoles, fit_common_poles
+from livebode.fitting.common_poles import POLE_MODELS, CommonPoles, fit_common_poles
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import RunningMean, mean_response
 from livebode.fitting.models import MODELS, model_named
@@ -14,6 +14,7 @@ from livebode.fitting.unknown_gain import TwoMassGain
 
 __all__ = [
     "MODELS",
+    "POLE_MODELS",
     "CommonPoles",
     "EvaluationGrid",
     "Fit",

@@ -17,7 +17,7 @@ from livebode.fitting.partial_fractions import PartialFractions
 from livebode.fitting.patterns import RUNS, neighbours
 from livebode.fitting.physical import EvaluationGrid, Hold
 from livebode.fitting.pole_quantities import PoleQuantities
-from livebode.fitting.pole_search import ORDER_MAX, Kind, search
+from livebode.fitting.pole_search import ORDER_MAX, Kind, possible, search
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import EPSILON_MAX, NO_FIT, NO_RESPONSE, NOT_CONVERGED, NOT_SEEN, SENTENCES
 from livebode.fitting.separable import Outputs, Separated, whole_covariance
@@ -81,7 +81,7 @@ class CommonPoles:
     def sentence(self) -> str:
         """The status for people."""
         if self.status == NOT_SEEN:
-            return "the lines do not determine a pole; choose a lower order"
+            return "the lines do not determine so many modes or poles; specify a lower order"
         return SENTENCES[self.status]
 
     @property
@@ -234,9 +234,9 @@ def _check(model: str, order: int | None) -> None:
             "not-one-of", f"{model=} is not supported", "choose 'modal' or 'rational'", argument="model", value=model,
             allowed=list(POLE_MODELS),
         )  # fmt: skip
-    if order is not None and not 0 <= order <= ORDER_MAX[model]:  # type: ignore[index]
+    if order is not None and not 0 <= order <= ORDER_MAX[model]:
         raise UsageError(
-            "out-of-range", f"{order=} is not between 0 and {ORDER_MAX[model]}", "choose one in this range",  # type: ignore[index]
+            "out-of-range", f"{order=} is not between 0 and {ORDER_MAX[model]}", "choose one in this range",
             argument="order", value=order,
         )  # fmt: skip
 
@@ -269,7 +269,7 @@ def _outputs(
 def _reduced_chi2(outs: Outputs, found: Separated) -> Floats:
     rest, noise, _ = squares(outs.measured, found.response)
     values = 2.0 * np.count_nonzero(outs.measured.use, axis=1)
-    return chi_squared(rest, noise) / np.maximum(values - found.structure.size / len(values), 1.0)
+    return np.asarray(chi_squared(rest, noise) / np.maximum(values - found.structure.size / len(values), 1.0))
 
 
 class _Blank:
@@ -281,7 +281,7 @@ class _Blank:
 
     def without_fit(self, outs: Outputs) -> CommonPoles:
         nan = np.full(len(self._names), np.nan)
-        parameters = self._row((), (), np.empty(0), np.empty((0, 0)), NO_RESPONSE, outs, nan, nan, np.nan)
+        parameters = self._row((), (), np.empty(0), np.empty((0, 0)), NO_RESPONSE, nan, nan, np.nan)
         return CommonPoles(
             self._model, self._names, self.units, None, outs.grid, outs.unit, (), parameters, nan, nan, nan, (), False
         )
@@ -291,7 +291,7 @@ class _Blank:
         raw = np.concatenate([found.theta, found.linear.ravel()])
         names = tuple(f"x{i}" for i in range(len(raw)))
         status = OK
-        if not np.isfinite(covariance).all():
+        if not np.isfinite(covariance).all() or not possible(outs, found, self._model):
             status = NOT_SEEN
         elif (found.epsilon > EPSILON_MAX).any():
             status = NO_FIT
@@ -299,18 +299,18 @@ class _Blank:
             status = NOT_CONVERGED
         rest, noise, _ = squares(outs.measured, found.response)
         chi2, dof = chi_squared(rest, noise), outs.count - found.structure.size
-        row = self._row(names, ("",) * len(raw), raw, covariance, status, outs, found.epsilon, chi2, float(dof))
+        row = self._row(names, ("",) * len(raw), raw, covariance, status, found.epsilon, chi2, float(dof))
         shown = row.derived(quantities.names, quantities.units, quantities.of)
         if status == OK and (shown.sigma[0] > _UNCERTAIN * np.abs(shown.value[0]))[quantities.certain].any():
             return self._row(
-                shown.names, shown.units, shown.value[0], shown.covariance[0], NOT_SEEN, outs, found.epsilon, chi2,
+                shown.names, shown.units, shown.value[0], shown.covariance[0], NOT_SEEN, found.epsilon, chi2,
                 float(dof),
             )  # fmt: skip
         return shown
 
     def _row(
         self, names: tuple[str, ...], units: tuple[str, ...], value: Floats, covariance: Floats, status: str,
-        outs: Outputs, epsilon: Floats, chi2: Any, dof: float,
+        epsilon: Floats, chi2: Any, dof: float,
     ) -> Parameters:  # fmt: skip
         if status != OK:
             value, covariance = np.full_like(value, np.nan), np.full_like(covariance, np.nan)

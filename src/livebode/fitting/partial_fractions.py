@@ -20,10 +20,10 @@ _STEP = 1e-6  # of a frequency, for slopes
 class Structure:
     """Number of the terms that the outputs have in common, and whether each output has a delay.
 
-    The nonlinear parameters are a1, a0 of each pair s² + a1·s + a0, then a of a real pole s + a, then the delays. A pair
-    may be complex or real, so that a search can pass from one to the other. The linear ones, for each output, are two
-    for a pair, b1·s + b0, one for a real pole and for each of the integrators 1/s and 1/s², and the direct terms: 1 and
-    one tick's delay of it behind a hold, else 1 and s. They are the effect of modes above the lines.
+    The nonlinear parameters are a1, a0 of each pair s² + a1·s + a0, a of a real pole s + a, and the delays. A pair may
+    be complex or real, so that a search can pass from one to the other. The linear ones, for each output, are two for a
+    pair, b1·s + b0, one for a real pole and for each of the integrators 1/s and 1/s², and the direct terms: 1 and one
+    tick's delay of it behind a hold, else 1 and s. They are the effect of modes above the lines.
     """
 
     outputs: int
@@ -93,10 +93,11 @@ class PartialFractions:
         parts = [self.pairs(pairs[:, 0], pairs[:, 1], delay_s).reshape(2 * of.pairs, self._s.size)]
         if of.single:
             parts.append(self.real(theta[2 * of.pairs : 2 * of.pairs + 1], delay_s))
-        for order in range(1, of.integrators + 1):
-            parts.append(self._at(Transfer.of([unit**order], [1.0] + [0.0] * order), delay_s)[np.newaxis])
-        for order in range(of.direct):
-            parts.append((self._direct(order) * np.exp(-self._s * delay_s))[np.newaxis])
+        parts += [
+            self._at(Transfer.of([unit**order], [1.0] + [0.0] * order), delay_s)[np.newaxis]
+            for order in range(1, of.integrators + 1)
+        ]
+        parts += [(self._direct(order) * np.exp(-self._s * delay_s))[np.newaxis] for order in range(of.direct)]
         return np.concatenate(parts).T
 
     def moves(self, theta: Floats, delay_s: float) -> tuple[Complex, Complex]:

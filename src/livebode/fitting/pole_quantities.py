@@ -81,9 +81,9 @@ class PoleQuantities:
 
     def _roots(self, theta: Floats) -> tuple[Complex, Complex]:
         """Poles of each pair, the one with the positive imaginary part first."""
-        half, a0 = (self._structure.pairs_of(theta)[..., i] * by for i, by in ((0, -0.5), (1, 1.0)))
-        root = np.sqrt((half**2 - a0).astype(np.complex128))
-        return half + root, half - root
+        a1, a0 = np.moveaxis(self._structure.pairs_of(theta), -1, 0)
+        root: Complex = np.sqrt((a1**2 / 4 - a0).astype(np.complex128))
+        return np.asarray(root - a1 / 2), np.asarray(-root - a1 / 2)
 
     def _residues(self, values: Floats, *, upper: bool) -> Complex:
         """At one pole of each pair, (..., outputs, pairs)."""

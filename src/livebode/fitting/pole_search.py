@@ -1,4 +1,4 @@
-"""Number of poles that responses show: poles are added where they explain most, and terms removed that explain little."""
+"""Number of poles that responses show: poles are added where they explain most, and needless terms removed."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def possible(outputs: Outputs, of: Separated, kind: Kind) -> bool:
         size = np.abs(poles_of(of.structure, of.theta))
         return bool(((size > ends[0] / _FAR) & (size < ends[1] * _FAR)).all())
     a1, a0 = of.structure.pairs_of(of.theta).T
-    return bool(((a1**2 < 4 * a0) & (a0 > (ends[0] / _BEYOND) ** 2) & (a0 < (ends[1] * _BEYOND) ** 2)).all())
+    return bool(((a1 > 0) & (a1**2 < 4 * a0) & (a0 > (ends[0] / _BEYOND) ** 2) & (a0 < (ends[1] * _BEYOND) ** 2)).all())
 
 
 def _delayed(outputs: Outputs, of: Separated) -> list[Separated]:
@@ -191,9 +191,7 @@ def _reals_to_try(outputs: Outputs, of: Separated) -> Floats:
     return _best(outputs, of, tried, lambda shapes: shapes.real(tried)[:, np.newaxis])
 
 
-def _best(
-    outputs: Outputs, of: Separated, tried: Floats, columns_of: Callable[[PartialFractions], Complex]
-) -> Floats:
+def _best(outputs: Outputs, of: Separated, tried: Floats, columns_of: Callable[[PartialFractions], Complex]) -> Floats:
     """Those of `tried` whose columns (tried, columns, lines) explain most of the residuals, far enough apart."""
     rest, bases = left_over(outputs, of)
     columns = columns_of(PartialFractions(of.structure, outputs.grid, outputs.unit))

@@ -62,8 +62,8 @@ class Separated:
     epsilon
         Model error of each output as a share of its measured |G|, (outputs,).
     cost
-        −2·ln(likelihood) plus ln(values) for each parameter: the criterion of Bayes and Schwarz (BIC); and 0.15 for each
-        pole and value whose error is the model's, not noise.
+        −2·ln(likelihood) plus ln(values) for each parameter, the criterion of Bayes and Schwarz (BIC); and for each
+        pole ln(lines), and 0.15 for each value whose error is the model's, not noise.
     settled
         Whether the search converged.
     """
@@ -96,9 +96,11 @@ def solve(
             break
     variance = noise + epsilon[:, np.newaxis] ** 2 * size
     likely = float(np.sum(misfit_by(rest, noise, variance, outputs.noise_dof, measured.use)))
-    # Errors of a model that is incomplete are alike at neighbouring lines and in all outputs: they are fewer than lines.
+    # Errors of an incomplete model are alike at neighbouring lines and in all outputs: they are fewer than lines.
     erring = 2 * float(np.sum(1 - (noise / np.where(variance > 0, variance, 1.0))[measured.use]))
-    cost = likely + structure.size * np.log(outputs.count) + _ERROR_PRICE * erring * structure.poles
+    # A pole is searched for over all lines, so the largest of as many random values is found.
+    each_pole = np.log(outputs.grid.frequency_hz.size) + _ERROR_PRICE * erring
+    cost = likely + structure.size * np.log(outputs.count) + structure.poles * each_pole
     return Separated(structure, theta, linear, response, problem.weight, epsilon, cost, settled)
 
 
@@ -118,17 +120,17 @@ def whole_covariance(outputs: Outputs, of: Separated) -> Floats:
     found = Solution(of.theta[np.newaxis], of.response.reshape(1, -1), slope[np.newaxis], np.ones(1, dtype=bool))
     share = np.where(measured.use, sigma / np.where(total > 0, total, 1.0), 0.0) ** 2
     dof = outputs.noise_dof / np.maximum(np.mean(share, axis=1, where=measured.use) ** 2, 1e-12)
-    return covariance(flat, found, np.zeros(1), np.array([np.min(dof)]))[0]
+    return np.asarray(covariance(flat, found, np.zeros(1), np.array([np.min(dof)]))[0])
 
 
 def left_over(outputs: Outputs, of: Separated) -> tuple[Floats, list[Floats]]:
-    """Weighted residuals, real above imaginary parts, (outputs, 2·lines), and the basis of the columns of each output."""
+    """Weighted residuals, real above imaginary parts, (outputs, 2·lines), and the basis of each output's columns."""
     problem = _Weighted(outputs, of.structure, of.weight)
     rest = of.weight * np.where(outputs.measured.use, outputs.measured.value - of.response, 0.0)
     return stacked(rest.T).T, [q for q, *_ in problem.factors(of.theta)]
 
 
-def stacked(values: Complex) -> Floats:
+def stacked(values: NDArray[Any]) -> Floats:
     """Real above imaginary parts, along the first axis."""
     return np.concatenate([values.real, values.imag])
 
@@ -198,7 +200,7 @@ class _Weighted:
         for k, (q, linear, _, _) in enumerate(self.factors(theta)):
             moved = stacked(self.weight[k][:, np.newaxis] * self._moved(theta, linear, k))
             parts.append(q @ (q.T @ moved) - moved)
-        return np.nan_to_num(np.concatenate(parts))
+        return np.asarray(np.nan_to_num(np.concatenate(parts)))
 
     def _moved(self, theta: Floats, linear: Floats, k: int) -> Complex:
         """Derivative of the response of output k by the nonlinear parameters, (lines, nonlinear)."""
@@ -231,4 +233,4 @@ def _weights(measured: Measured, epsilon: Floats) -> Floats:
 def _dof(outputs: Outputs, structure: Structure) -> Floats:
     """Degrees of freedom of each output's residuals, with an equal share of the common parameters."""
     values = 2.0 * np.count_nonzero(outputs.measured.use, axis=1)
-    return np.maximum(values - structure.size / structure.outputs, 1.0)
+    return np.asarray(np.maximum(values - structure.size / structure.outputs, 1.0))
