@@ -29,8 +29,8 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
     Raises
     ------
     ConfigError
-        If the section specifies modes or poles; if it does not specify the output, and its kind is neither a velocity nor a position; or if it
-        specifies a model in SI units and a unit is not one.
+        If the section specifies modes or poles; if it does not specify the output, and its kind is neither a velocity
+        nor a position; or if it specifies a model in SI units and a unit is not one.
     """
     name = section.model
     if name in POLE_MODELS:

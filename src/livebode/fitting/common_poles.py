@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,8 @@ class CommonPoles:
         Outputs whose residuals follow a pattern over the lines.
     specified
         Whether the order was specified.
+    raw_covariance
+        Of the coefficients of `found`: those of the poles and delays, then the weights of each output.
     """
 
     model: Kind
@@ -71,6 +73,7 @@ class CommonPoles:
     correlation: Floats
     patterned: tuple[str, ...]
     specified: bool
+    raw_covariance: Floats
 
     @property
     def status(self) -> str:
@@ -83,6 +86,20 @@ class CommonPoles:
         if self.status == NOT_SEEN:
             return "the lines do not determine so many modes or poles; specify a lower order"
         return SENTENCES[self.status]
+
+    @property
+    def raw(self) -> Floats:
+        """Coefficients of `found`, in the order of `raw_covariance`."""
+        return np.empty(0) if self.found is None else np.concatenate([self.found.theta, self.found.linear.ravel()])
+
+    def moved(self, raw: Floats, frequency_hz: Floats) -> Complex:
+        """Response of the first output for other coefficients, (lines,)."""
+        assert self.found is not None
+        of = self.found.structure
+        found = replace(
+            self.found, theta=raw[: of.nonlinear], linear=raw[of.nonlinear :].reshape(of.outputs, of.linear)
+        )
+        return np.asarray(response_of(found, self.grid._replace(frequency_hz=frequency_hz), self.unit)[0])
 
     @property
     def order(self) -> int:
@@ -213,14 +230,15 @@ def fit_common_poles(
         return blank.without_fit(outs)
     raw = np.concatenate([found.theta, found.linear.ravel()])
     quantities = PoleQuantities(found.structure, outs.unit, names, blank.units, raw)
-    parameters = blank.parameters(quantities, outs, found)
+    covariance = whole_covariance(outs, found)
+    parameters = blank.parameters(quantities, outs, found, covariance)
     rest = np.where(outs.measured.use, outs.measured.value - found.response, 0.0) * found.weight
     correlated = np.array([neighbours(one[use]) for one, use in zip(rest, outs.measured.use)])
     limit = RUNS / np.sqrt(2 * np.count_nonzero(outs.measured.use, axis=1))
     return CommonPoles(
         model, names, blank.units, found, outs.grid, outs.unit, tuple((_order(one, model), one.cost) for one in best),
         parameters, found.epsilon, _reduced_chi2(outs, found), correlated,
-        tuple(name for name, one in zip(names, correlated > limit) if one), order is not None,
+        tuple(name for name, one in zip(names, correlated > limit) if one), order is not None, covariance,
     )  # fmt: skip
 
 
@@ -283,11 +301,23 @@ class _Blank:
         nan = np.full(len(self._names), np.nan)
         parameters = self._row((), (), np.empty(0), np.empty((0, 0)), NO_RESPONSE, nan, nan, np.nan)
         return CommonPoles(
-            self._model, self._names, self.units, None, outs.grid, outs.unit, (), parameters, nan, nan, nan, (), False
+            self._model,
+            self._names,
+            self.units,
+            None,
+            outs.grid,
+            outs.unit,
+            (),
+            parameters,
+            nan,
+            nan,
+            nan,
+            (),
+            False,
+            np.empty((0, 0)),
         )
 
-    def parameters(self, quantities: PoleQuantities, outs: Outputs, found: Separated) -> Parameters:
-        covariance = whole_covariance(outs, found)
+    def parameters(self, quantities: PoleQuantities, outs: Outputs, found: Separated, covariance: Floats) -> Parameters:
         raw = np.concatenate([found.theta, found.linear.ravel()])
         names = tuple(f"x{i}" for i in range(len(raw)))
         status = OK
