@@ -82,7 +82,7 @@ def test_lines_outside_the_band_of_the_fit_or_another_rate_are_refused(fits: lis
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Two recordings of a rigid axis in position control, whose unmeasured load moves slowly; and a run on the first."""
+    """Two recordings of a rigid axis in position control with a slowly moving load, and a run on the first."""
     folder, rate_hz, window = tmp_path_factory.mktemp("drift"), 500.0, 500
     grid = "4:60:4"
     period = multisine(Lines.parse(grid, rate_hz, window))

@@ -47,7 +47,7 @@ class LineValidation:
     residual, sigma
         |Ĝ − G| and its standard deviation by noise and by the covariance of the fit, (lines,).
     missed
-        Root mean square over the lines of |Ĝ − G| over the larger of |Ĝ| and |G|, without the part that both
+        Root mean square over the lines of |Ĝ − G| over the larger of |G| and |Ĝ| − 2 sigma, without the part that both
         uncertainties explain. A line counts less the more its uncertainty exceeds a tenth.
     resolution
         Smallest `missed` that would show: from twice the scatter by chance.
@@ -170,7 +170,7 @@ def validate_at_lines(model: FittedModel, response: Response, *, reason: str) ->
     stacked = np.concatenate([rest.real, rest.imag])
     half = float(stacked @ np.linalg.solve(whole, stacked)) / 2
     total = np.sqrt(np.diag(whole)[: f.size] + np.diag(whole)[f.size :])
-    larger = np.sqrt(np.maximum(np.abs(value) ** 2 - sigma**2, np.abs(value - rest) ** 2))
+    larger = np.maximum(np.abs(value) - 2 * sigma, np.abs(value - rest))
     relative, size = (total / larger) ** 2, np.abs(rest / larger) ** 2
     share = 1 / (relative + SMALL**2)
     share /= np.sum(share)
@@ -180,7 +180,7 @@ def validate_at_lines(model: FittedModel, response: Response, *, reason: str) ->
         residual=np.abs(rest),
         sigma=total,
         missed=float(np.sqrt(max(share @ (size - relative), 0.0))),
-        resolution=float(np.sqrt(_SHOWS * np.linalg.norm(share * relative))),
+        resolution=float(np.sqrt(_SHOWS * float(np.linalg.norm(share * relative)))),
         chi2=half / f.size,
         p=_probability(half, f.size, float(response.dof)),
         fit_percent=100 * (1 - float(np.sqrt(share @ size))),
