@@ -33,7 +33,7 @@ demo: $(BUILT)   ## track a simulated machine, live
 	$(BIN)/livebode demo
 
 test: $(BUILT) lint  ## lint, types, import contract and every test
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal  # neighbouring tests share what they compute once
 
 $(VENV)/.docs: $(BUILT) requirements-docs.lock
 	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-docs.lock

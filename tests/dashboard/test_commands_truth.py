@@ -51,9 +51,9 @@ def started(folder: Path, *arguments: object) -> Iterator[tuple[subprocess.Popen
         assert "Traceback" not in log.read_text(), log.read_text()
 
 
-def test_the_demo_is_served_during_its_run_and_afterwards(tmp_path: Path) -> None:
+def test_the_demo_is_served_by_default_during_its_run_and_ends_by_itself(tmp_path: Path) -> None:
     out = tmp_path / "demo"
-    with started(tmp_path, "demo", "--serve", "--port", 0, "--seconds", 16, "--out", out) as (_, url):
+    with started(tmp_path, "demo", "--seconds", 16, "--out", out) as (process, url):
         assert url.startswith("http://127.0.0.1:")
         with chromium() as browser, Tab(browser, url) as tab:
             assert tab.js("page.facts.live")
@@ -61,6 +61,15 @@ def test_the_demo_is_served_during_its_run_and_afterwards(tmp_path: Path) -> Non
             assert tab.js("page.schedule.unit") == "m"
             first = tab.js("bode.curves.measured.frame.timeS[0]")
             tab.until(f"bode.curves.measured.frame.timeS[0] > {first} + 0.5")
+            assert tab.wrong == []
+        assert process.wait(60) == 0
+    assert "stiffness is 1" in (tmp_path / "log.txt").read_text()
+
+
+def test_the_page_of_the_demo_stays_after_its_run_where_it_was_asked_for(tmp_path: Path) -> None:
+    out = tmp_path / "demo"
+    with started(tmp_path, "demo", "--serve", "--fast", "--port", 0, "--seconds", 16, "--out", out) as (_, url):
+        with chromium() as browser, Tab(browser, url) as tab:
             tab.until("!timeline.span.live")  # the run is done, and the page stays
             assert (out / "run.json").is_file()
             last = RunRecord.open(out).responses()
@@ -70,13 +79,6 @@ def test_the_demo_is_served_during_its_run_and_afterwards(tmp_path: Path) -> Non
             assert tab.wrong == []
         # The page knows of the end before the summary is printed.
         until(lambda: "stiffness is 1" in (tmp_path / "log.txt").read_text(), "the alarm on the terminal")
-
-
-def test_the_demo_is_served_by_default_and_ends_by_itself(tmp_path: Path) -> None:
-    with started(tmp_path, "demo", "--seconds", 16, "--out", tmp_path / "demo") as (process, url):
-        assert b"livebode" in urllib.request.urlopen(url).read()
-        assert process.wait(60) == 0
-    assert "stiffness is 1" in (tmp_path / "log.txt").read_text()
 
 
 def test_a_recording_is_shown_by_run(tmp_path: Path) -> None:
