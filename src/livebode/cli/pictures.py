@@ -152,7 +152,8 @@ def show_fit(found: Fit, of: str) -> None:
         if (limit := found.at_most(name)) is not None:
             print(f"  {name:22}{'≤':>3}{limit:>9.2g}   {'':10}{unit}")
             continue
-        print(f"  {name:22}{value:>12.5g} ± {bound:<10.2g}{unit}")
+        around = f"± {bound:<10.2g}" if bound else f"{'fixed':12}"
+        print(f"  {name:22}{value:>12.5g} {around}{unit}")
     chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} from sigma alone"
     print(f"  {found.about_bounds}")
     print(f"  model error ε = {100 * found.epsilon:.2g} % of |G|{chi2}")

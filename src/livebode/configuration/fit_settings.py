@@ -57,7 +57,9 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
     output = section.output
     if output == "auto":
         output = _output_of(kinds)
-    options = {"side": section.side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
+    # The gain model is of the motor's side only: naming it is no conflict.
+    side = None if name == "two-mass-gain" and section.side == "motor" else section.side
+    options = {"side": side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
     return model_named(name, output=output, **options)
 
 

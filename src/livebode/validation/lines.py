@@ -179,7 +179,7 @@ def validate_at_lines(model: FittedModel, response: Response, *, reason: str) ->
         frequency_hz=f,
         residual=np.abs(rest),
         sigma=total,
-        missed=float(np.sqrt(max(share @ (size - relative), 0.0))),
+        missed=float(np.sqrt(max(float(share @ (size - relative)), 0.0))),
         resolution=float(np.sqrt(_SHOWS * float(np.linalg.norm(share * relative)))),
         chi2=half / f.size,
         p=_probability(half, f.size, float(response.dof)),
