@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from livebode.analysis.averaged import averaged
 from livebode.core import Lines
 from livebode.excitation import multisine
+from livebode.records import RunRecord
 from tests.support.command import livebode, write_parquet
 
 Floats = NDArray[np.float64]
@@ -141,3 +143,10 @@ def test_the_trolley_and_the_angle_of_a_crane_share_a_pendulum_in_closed_loop(tm
         quantity = poles["quantities"][name]
         assert abs(quantity["value"] - truth) < 2 * quantity["bound_95"]
         assert quantity["bound_95"] < 0.05 * truth
+
+
+def test_the_span_of_a_report_begins_at_the_first_valid_response(aircraft: list[Path]) -> None:
+    """The first windows begin before the recording: the centre of 20 s of samples at 0 s is at −10 s."""
+    of = averaged(RunRecord.open(aircraft[0]))
+    assert of.spans_s[0] > 0
+    assert float(of.overview.time_s[0]) < 0
