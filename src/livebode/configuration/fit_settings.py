@@ -35,9 +35,9 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
     name = section.model
     if name in POLE_MODELS:
         raise ConfigError(
-            "not-one-of",
+            "value-invalid",
             f"fit.model = {name!r} is fitted to finished runs only, not to every response",
-            f"leave [fit] out, and use livebode fit RUN --model {name}",
+            "fit the finished run with this model (livebode fit), or choose a model of a drive here",
             key="fit.model",
             value=name,
         )
