@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test docs lint bench bench-compare release-check peers studies repeating recognition fit-bounds common-modes monitoring healthy temperature fuzz crash damage soak attacks system-packages catalogues lock clean
+.PHONY: help demo test docs lint bench bench-compare release-check peers studies repeating recognition nonperiodic fit-bounds common-modes monitoring healthy temperature fuzz crash damage soak attacks system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -61,6 +61,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.fits
 	$(BIN)/python -m bench.bandwidth
 	$(BIN)/python -m bench.repeating
+	$(BIN)/python -m bench.nonperiodic
 	$(BIN)/python -m bench.live
 	$(BIN)/python -m bench.overload
 	$(BIN)/python -m bench.segments
@@ -84,6 +85,9 @@ repeating: $(BUILT) ## coverage of the bounds under friction, backlash, encoder 
 
 recognition: $(BUILT) ## share of 1,000 generated excitations whose period and lines are found exactly
 	$(BIN)/python -m studies.recognition
+
+nonperiodic: $(BUILT) ## chirps and noise: coverage of the bounds, and bias at a sharp resonance, of lpm and welch
+	$(BIN)/python -m studies.nonperiodic
 
 fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lacks something (docs/explanation/fits.md)
 	$(BIN)/python -m studies.fit_bounds

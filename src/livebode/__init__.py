@@ -31,7 +31,7 @@ With a machine, in this order:
 Names by subject:
 
 - Samples and lines: Block, Channel, Lines, Log, open_log
-- Responses: Response, Responses, Settings, Tracker, MotionCorrection, SlidingDFT, welch
+- Responses: Response, Responses, Settings, Tracker, NonPeriodicTracker, MotionCorrection, SlidingDFT, welch
 - Runs: Run
 - Excitation: design, Excitation, chirp, low_crest_phases, multisine, odd_lines, prbs, quantised, recognise,
   stepped_sine
@@ -85,7 +85,7 @@ if TYPE_CHECKING:
         StateError,
         UsageError,
     )
-    from livebode.estimation import Settings, Tracker, welch
+    from livebode.estimation import NonPeriodicTracker, Settings, Tracker, welch
     from livebode.excitation import (
         Excitation,
         chirp,
@@ -111,7 +111,7 @@ logging.getLogger(__name__).addHandler(logging.NullHandler())  # quiet, but for 
 
 _HOME = {
     "analysis.learning": ("learn",),
-    "estimation": ("Settings", "Tracker", "welch"),
+    "estimation": ("NonPeriodicTracker", "Settings", "Tracker", "welch"),
     "excitation": (
         "Excitation",
         "chirp",
@@ -189,6 +189,7 @@ __all__ = [
     "Model",
     "Monitor",
     "MotionCorrection",
+    "NonPeriodicTracker",
     "OutputError",
     "Parameter",
     "Parameters",

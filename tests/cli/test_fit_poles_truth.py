@@ -145,8 +145,15 @@ def test_the_trolley_and_the_angle_of_a_crane_share_a_pendulum_in_closed_loop(tm
         assert quantity["bound_95"] < 0.05 * truth
 
 
-def test_the_span_of_a_report_begins_at_the_first_valid_response(aircraft: list[Path]) -> None:
-    """The first windows begin before the recording: the centre of 20 s of samples at 0 s is at −10 s."""
-    of = averaged(RunRecord.open(aircraft[0]))
-    assert of.spans_s[0] > 0
-    assert float(of.overview.time_s[0]) < 0
+def test_the_span_of_a_run_begins_at_its_first_valid_response(tmp_path: Path) -> None:
+    """The first windows begin before the recording: the effective time of the first response is negative."""
+    u = np.resize(multisine(Lines.parse("2:20:2", 100.0, 400)), 2000)
+    noise = 1e-3 * np.random.default_rng(4).standard_normal(2000)
+    log = write_parquet(tmp_path / "log.parquet", {"u": u, "y": np.concatenate([[0.0], u[:-1]]) + noise})
+    options = ("--input", "u", "--rate", 100, "--lines", "2:20:2", "--window", 400, "--hop", 20, "--all-periods")
+    (directory,) = run(log, tmp_path / "run", "--output", "y", *options)
+    record = RunRecord.open(directory)
+    every = np.concatenate([part.time_s for part in record.batches()])
+    valid = np.concatenate([part.valid.any(axis=1) for part in record.batches()])
+    assert every[0] < 0
+    assert averaged(record).spans_s[0] == every[valid][0] > 0

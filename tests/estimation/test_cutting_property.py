@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Block, Event, Lines, Responses
-from livebode.estimation import RippleOrder, Settings, Tracker
+from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, Tracker
 from livebode.excitation import multisine
 from tests.support.responses import assert_same
 
@@ -27,6 +27,8 @@ OPTIONS = [
     {"estimator": "direct"},
     {"dtype": "float32"},
     {"dtype": "float32", "differenced": ("y",), "hann": True},
+    {"estimator": "lpm", "average": True, "differenced": ("y",), "hop": 7},
+    {"estimator": "welch"},
 ]
 
 
@@ -59,9 +61,12 @@ def cut(block: Block, at: list[int], jump: int) -> list[Block]:
     ]
 
 
-def new(options: dict) -> Tracker:
+def new(options: dict) -> Tracker | NonPeriodicTracker:
     names = {"lines": LINES, "output": "y", "input": "u", "excitation": "w", "schedule": "x"}
-    return Tracker(Settings(**(names | options)))
+    if options.get("estimator") == "welch":
+        names["lines"] = Lines((1, 3), 20, RATE_HZ)
+    made = Settings(**(names | options))
+    return Tracker(made) if made.periodic else NonPeriodicTracker(made)
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)

@@ -12,7 +12,7 @@ import numpy as np
 
 from livebode.configuration.axis import FitSection
 from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
-from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
+from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.fitting.drift import DriftTest
@@ -86,6 +86,34 @@ def tracker() -> Case:
         return Tracker(SETTINGS)
 
     return Case(configured, processed(cut(block(), 333, 777, 1100)), [other])
+
+
+def direct_tracker() -> Case:
+    def new(window: int = WINDOW) -> Tracker:
+        lines = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=window)
+        return Tracker(Settings(lines=lines, input="u", output="y", estimator="direct", hop=10))
+
+    return Case(new, processed(cut(block(), 333, 777, 1100)), [lambda: new(2 * WINDOW)])
+
+
+def _nonperiodic(estimator: str) -> Case:
+    def new(forgetting: float = 0.8) -> NonPeriodicTracker:
+        return NonPeriodicTracker(
+            Settings(
+                lines=LINES, excitation="w", input="u", output="y", schedule="x", hop=10, average=True,
+                estimator=estimator, forgetting=forgetting,
+            )
+        )  # fmt: skip
+
+    return Case(new, processed(cut(block(), 333, 777, 1100)), [lambda: new(0.9)])
+
+
+def local_polynomial() -> Case:
+    return _nonperiodic("lpm")
+
+
+def welch_average() -> Case:
+    return _nonperiodic("welch")
 
 
 def spectra() -> Iterator[Spectra]:
@@ -241,7 +269,7 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, spectra_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables,
-        change_detection, fits, run_counts, stream_position,
+        tracker, direct_tracker, local_polynomial, welch_average, spectra_tracker, motion_correction, fitter, drift,
+        monitor_by_model, monitor_by_tables, change_detection, fits, run_counts, stream_position,
     )
 }  # fmt: skip

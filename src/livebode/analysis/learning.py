@@ -98,6 +98,14 @@ def _axis(run: RunRecord) -> Axis:
             path=str(run.path),
         )
     axis = Axis.of(configuration, str(run.path / "run.json"))
+    if not axis.tracking.periodic:
+        raise BaselineError(
+            "run-not-periodic",
+            f"{str(run.path)!r} was estimated with {axis.tracking.estimator!r}, and a baseline needs an excitation "
+            "that repeats",
+            "learn from a run with the estimator joint, direct or indirect",
+            path=str(run.path),
+        )
     if axis.tracking.average:
         raise BaselineError(
             "run-averaged",

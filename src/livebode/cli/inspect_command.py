@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from livebode.preparation.inspection import Inspection
     from livebode.preparation.quiet import Quiet
 
+_SUITS = {
+    "joint": "the excitation repeats; name the plant input by --input, and in an open loop take --estimator direct",
+    "lpm": "for an excitation that does not repeat, in open and closed loop",
+}
 _LINES_SHOWN = 24
 _STRETCHES_SHOWN = 16
 _WIDTH_MAX = 4096
@@ -80,6 +84,8 @@ def inspect_command(
         _show_excitation(found, console)
     if found.unrecognised:
         console.print(f"The excitation is not recognised: {found.unrecognised}", soft_wrap=True)
+    if found.estimator:
+        console.print(f"estimator of a run: --estimator {found.estimator} ({_SUITS[found.estimator]})", soft_wrap=True)
 
 
 def _check(

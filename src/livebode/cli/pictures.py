@@ -64,6 +64,7 @@ def show(outcome: Outcome) -> None:
         _show_monitoring(outcome.summary["monitoring"])
 
 
+_LINES_SHOWN = 20
 _REASONS = {
     "distorted": "distortion by friction, backlash or steps of a sensor",
     "hum": "hum of the mains",
@@ -82,6 +83,9 @@ def _judged(found: dict[str, Any]) -> list[str]:
         lines.append(
             f"the schedule moves: noise of {counted(moved, 'response')} from detection lines (non-excited bins)"
         )
+    if at := judged.get("not_repeating_hz"):
+        where = ", ".join(f"{f:g}" for f in at[:_LINES_SHOWN]) + " …" * (len(at) > _LINES_SHOWN)
+        lines.append(f"not valid in most windows at {where} Hz: the input does not repeat (see events.jsonl)")
     for kind, frequency_hz in judged.get("invalid_lines_hz", {}).items():
         where = ", ".join(f"{f:g}" for f in frequency_hz)
         lines.append(f"not valid at {where} Hz: {_REASONS[kind]} (see events.jsonl)")

@@ -44,7 +44,10 @@ def run_command(
     ] = None,
     window: Annotated[str | None, typer.Option(metavar="SAMPLES", help="Window in samples, or auto.")] = None,
     hop: Annotated[int | None, typer.Option(metavar="SAMPLES", help="Samples between responses.")] = None,
-    estimator: Annotated[str | None, typer.Option(help="direct, joint or indirect. \\[default: joint]")] = None,
+    estimator: Annotated[
+        str | None,
+        typer.Option(help="direct, joint or indirect; for noise and chirps lpm or welch. \\[default: joint]"),
+    ] = None,
     quantity: Annotated[
         str | None, typer.Option(help="plant, 'open loop', 'closed loop' or sensitivity. \\[default: plant]")
     ] = None,

@@ -82,7 +82,8 @@ class TrackingSection(_Section):
     ----------
     estimator
         "direct" from input and output, "joint" from both by the excitation, "indirect" from the closed loop and the
-        controllers in [loop].
+        controllers in [loop]. For noise and single chirps, which do not repeat: "lpm" (local polynomial method) or
+        "welch".
     quantity
         The response that is estimated. All but "plant" need the controllers in [loop].
     hop
@@ -112,7 +113,7 @@ class TrackingSection(_Section):
         Include a transient at the start of a recording, and periods that differ from those around them.
     """
 
-    estimator: Literal["direct", "joint", "indirect"] = "joint"
+    estimator: Literal["direct", "joint", "indirect", "lpm", "welch"] = "joint"
     quantity: Quantity = "plant"
     hop: Annotated[int, Field(ge=1)] | None = None
     average: bool = False
@@ -125,6 +126,11 @@ class TrackingSection(_Section):
     ripple: list[Annotated[list[Positive], Field(min_length=2, max_length=2)]] = []
     accept_roles: bool = False
     all_periods: bool = False
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the estimator needs an excitation that repeats."""
+        return self.estimator not in ("lpm", "welch")
 
 
 class MotionSection(_Section):

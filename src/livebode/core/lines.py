@@ -85,11 +85,12 @@ class Lines:
                 )
 
     @classmethod
-    def parse(cls, text: str, rate_hz: float, window: int) -> Lines:
+    def parse(cls, text: str, rate_hz: float, window: int, *, rounded: bool = False) -> Lines:
         """Lines from text: frequencies in Hz, ``start:stop:step`` inclusive, joined by commas.
 
         ``k=`` before an item counts in bins instead of Hz, for windows whose lines have no short decimal
-        (``k=1:300`` with a PRBS of 2047). The other bins between the first and the last line are detection lines.
+        (``k=1:300`` with a PRBS of 2047). The other bins between the first and the last line are detection lines. With
+        `rounded`, each line is moved to the nearest bin, for an excitation that does not repeat.
 
         Raises
         ------
@@ -122,8 +123,10 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
                     frequency_hz=float(f),
                     nyquist_hz=rate_hz / 2,
                 )
-            if abs(f / resolution_hz - k) > ON_GRID_BINS:
+            if abs(f / resolution_hz - k) > ON_GRID_BINS and not rounded:
                 raise _off_grid(f, required, rate_hz, window)
+        if rounded:
+            bins = [k for k in dict.fromkeys(bins) if 0 < 2 * k < window]
         return cls.of_bins(bins, window, rate_hz)
 
     @classmethod

@@ -2,6 +2,7 @@
 
 from livebode.estimation.line_stage import plant_kinds, response_unit
 from livebode.estimation.movement import Movement
+from livebode.estimation.nonperiodic_tracker import NonPeriodicTracker
 from livebode.estimation.ripple import RippleOrder, RippleSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra_tracker import SpectraTracker
@@ -12,6 +13,7 @@ from livebode.estimation.welch import welch
 __all__ = [
     "Follower",
     "Movement",
+    "NonPeriodicTracker",
     "RippleOrder",
     "RippleSpeed",
     "Settings",

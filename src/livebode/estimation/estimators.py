@@ -38,4 +38,8 @@ INDIRECT = Estimator("indirect", reference="excitation", denominator="excitation
 """G = Gcl/(E − Gcl·F) with Gcl = S_wy/S_ww, Nevaranta 2016, eqs. (15) and (16). Needs no u, but the controllers F;
 biased by every error in their description (one forgotten tick of delay is 10 % near the resonance)."""
 
+NON_PERIODIC = ("lpm", "welch")
+"""Estimators for any excitation: the local polynomial method and Welch's method. Joint where an excitation is named,
+else direct; see `NonPeriodicTracker`."""
+
 ESTIMATORS = {estimator.name: estimator for estimator in (DIRECT, JOINT, INDIRECT)}

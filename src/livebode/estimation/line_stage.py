@@ -16,7 +16,8 @@ from livebode.estimation.estimators import Role
 from livebode.estimation.hann import Hann
 from livebode.estimation.moments import Moments, PeriodMoments
 from livebode.estimation.movement import Movement
-from livebode.estimation.quantities import convert
+from livebode.estimation.periodicity import Periodicity
+from livebode.estimation.quantities import from_plant
 from livebode.estimation.repeating import Repeating
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows
@@ -62,6 +63,7 @@ class LineStage(StatefulBase):
     ) -> None:
         lines = settings.lines
         self._settings, self._roles = settings, settings.roles
+        self._events = [] if events is None else events
         self._hann = Hann(lines) if settings.hann else None
         self._detection = None
         if settings.uses_detection_lines:
@@ -71,9 +73,20 @@ class LineStage(StatefulBase):
         self._places = max(1, lines.window // settings.step)
         self._moments = PeriodMoments(self._places, len(lines), settings.forgetting, own=settings.average)
         self._movement = Movement(self._places)
+        self._periodicity = None
+        if settings.method.reference == "input":
+            name = settings.input or ""
+            self._periodicity = Periodicity(lines, self._places, name, self._events)
         self._moving = 0
         self._largest = 0.0
-        self._events = [] if events is None else events
+
+    def _state(self) -> dict[str, Any]:
+        return super()._state() | ({"periodicity": self._periodicity} if self._periodicity else {})
+
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
+        if self._periodicity is not None and "periodicity" in state:  # older states have none
+            self._periodicity.restore(state["periodicity"])
 
     @property
     def bins(self) -> NDArray[np.int64]:
@@ -93,7 +106,8 @@ class LineStage(StatefulBase):
             "quiet_bins": list(lines.quiet),
             "hop": self._settings.step,
             "judged": {"noise": self._settings.noise, "noise_from_detection_lines": self._moving}
-            | ({"ripple": ripple} if ripple else {}),
+            | ({"ripple": ripple} if ripple else {})
+            | ({"not_repeating_hz": self._periodicity.not_repeating_hz()} if self._periodicity else {}),
         }
 
     def excitation_power(self) -> Floats:
@@ -176,6 +190,9 @@ class LineStage(StatefulBase):
         if repeating is not None:
             against = repeating.invalid & ~moving[:, np.newaxis]
             distortion, valid = np.where(valid & against, np.inf, distortion), valid & ~against
+        if self._periodicity is not None:
+            leaks = self._periodicity.process(reference, usable, rows.sample, centre[0])
+            valid = valid & (moving[:, np.newaxis] | ~leaks)
         several = valid & np.isfinite(moments.dof)[:, np.newaxis]
         return Responses(
             lines=s.lines,
@@ -270,11 +287,8 @@ class LineStage(StatefulBase):
         # U/W is (Y/W)/G, whatever it is that was divided.
         weight = powers[0] + 0j if s.method.reference == "input" else numerator / excitation / value
         if s.quantity != "plant":
-            entered = s.loop.entry_at(f) * excitation
-            # Without a description of the controller the signals contain its action: F·y = E·w − u.
-            known = s.loop.feedback is not None
-            feedback = s.loop.feedback_at(f) if known else (entered - denominator) / numerator
-            value, by_plant = convert(s.quantity, value, feedback)
+            signals = numerator, denominator, excitation + 0j
+            value, by_plant = from_plant(s.quantity, value, s.loop, signals, f)
             slope, weight = slope * by_plant, np.full_like(value, complex(np.nan, np.nan))
         scale = np.abs(slope)
         return Estimate(value, sigma * scale, dof, distortion * scale, weight)

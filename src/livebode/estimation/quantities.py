@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Quantity
+from livebode.core import Loop, Quantity
 
+Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
@@ -36,3 +37,17 @@ def convert(quantity: Quantity, plant: Complex, feedback: Complex) -> tuple[Comp
     if quantity == "sensitivity":
         return sensitivity, -feedback * sensitivity**2
     return open_loop * sensitivity, feedback * sensitivity**2
+
+
+def from_plant(
+    quantity: Quantity, plant: Complex, loop: Loop, signals: tuple[Complex, Complex, Complex], frequency_hz: Floats
+) -> tuple[Complex, Complex]:
+    """The quantity from plant G, and its derivative by G; the feedback is that of the loop, or of the signals.
+
+    Without a description of the controller the signals contain its action, F·y = E·w − u. `signals` are output, input
+    and excitation, each correlated with the excitation.
+    """
+    if loop.feedback is not None:
+        return convert(quantity, plant, loop.feedback_at(frequency_hz))
+    output, input_, excitation = signals
+    return convert(quantity, plant, (loop.entry_at(frequency_hz) * excitation - input_) / output)

@@ -7,8 +7,9 @@ from math import isqrt
 from typing import Literal
 
 from livebode.core import Lines, Loop, Quantity, UsageError
-from livebode.estimation.estimators import ESTIMATORS, Estimator, Role
+from livebode.estimation.estimators import DIRECT, ESTIMATORS, JOINT, NON_PERIODIC, Estimator, Role
 from livebode.estimation.ripple import RippleOrder
+from livebode.estimation.welch_average import WINDOWS
 
 DETECTION_LINES_MIN = 4
 """Smallest number of detection lines for an estimate of the noise."""
@@ -28,7 +29,8 @@ class Settings:
         Channel names of y, u, w and of the signal that responses are plotted over (position). Direct needs y and u,
         joint y, u and w, indirect y and w.
     estimator
-        "direct", "joint" or "indirect"; see `livebode.estimation.estimators` for when each is biased.
+        "direct", "joint" or "indirect"; see `livebode.estimation.estimators` for when each is biased. For an excitation
+        that does not repeat "lpm" or "welch", of a `NonPeriodicTracker`.
     loop
         The feedback, the injection point of w, and when signals were logged.
     quantity
@@ -90,12 +92,13 @@ class Settings:
     def __post_init__(self) -> None:
         self._check_words()
         if self.hop is None:
-            object.__setattr__(self, "hop", default_hop(self.lines.window))
-        window = self.lines.window
-        if self.step < 1 or (self.step > window and self.step % window):
+            object.__setattr__(self, "hop", default_hop(self.span))
+        window = self.span
+        if self.step < 1 or (self.step > window and (self.step % window or not self.periodic)):
             raise UsageError(
                 "out-of-range",
-                f"hop={self.hop} is not between 1 and the window of {window} samples, nor a multiple of it",
+                f"hop={self.hop} is not between 1 and the "
+                + (f"window of {window} samples, nor a multiple of it" if self.periodic else f"{window} samples used"),
                 "choose another hop",
                 argument="hop",
                 value=self.hop,
@@ -116,7 +119,7 @@ class Settings:
                 raise UsageError(
                     "missing",
                     f"the {self.estimator} estimator of the {self.quantity} needs the {role} signal",
-                    "name its channel",
+                    "name its channel" + ("" if self.periodic else ", or in an open loop the excitation as input only"),
                     argument=role,
                     estimator=self.estimator,
                     quantity=self.quantity,
@@ -153,9 +156,24 @@ class Settings:
                 value="quiet",
             )
 
+        if not self.periodic:
+            self._check_without_period()
+
+    def _check_without_period(self) -> None:
+        for name, usual in (("hann", False), ("spikes", ()), ("noise", "auto"), ("dtype", "float64"), ("ripple", ())):
+            if (value := getattr(self, name)) != usual:
+                raise UsageError(
+                    "conflict",
+                    f"{name}={value!r} needs an excitation that repeats, but estimator={self.estimator!r} is for one "
+                    "that does not",
+                    "leave it out",
+                    argument=name,
+                    estimator=self.estimator,
+                )
+
     def _check_words(self) -> None:
         for name, known in (
-            ("estimator", tuple(ESTIMATORS)),
+            ("estimator", (*ESTIMATORS, *NON_PERIODIC)),
             ("quantity", QUANTITIES),
             ("noise", ("auto", "periods", "quiet")),
             ("dtype", ("float64", "float32")),
@@ -179,7 +197,7 @@ class Settings:
                 argument="estimator",
                 estimator=self.estimator,
             )
-        if self.quantity != "plant" and self.method is ESTIMATORS["direct"] and self.loop.feedback is None:
+        if self.quantity != "plant" and self.method is DIRECT and self.loop.feedback is None:
             raise UsageError(
                 "missing",
                 f"the {self.quantity} from the direct estimator needs the loop's feedback",
@@ -190,8 +208,21 @@ class Settings:
             )
 
     @property
+    def periodic(self) -> bool:
+        """Whether the estimator needs an excitation that repeats every window."""
+        return self.estimator in ESTIMATORS
+
+    @property
     def method(self) -> Estimator:
-        return ESTIMATORS[self.estimator]
+        """The signals that are divided; of an estimator for any excitation those of joint or direct."""
+        if self.periodic:
+            return ESTIMATORS[self.estimator]
+        return DIRECT if self.excitation is None else JOINT
+
+    @property
+    def span(self) -> int:
+        """Samples that a response is computed from: the window, or with "welch" eight of them."""
+        return WINDOWS * self.lines.window if self.estimator == "welch" else self.lines.window
 
     @property
     def step(self) -> int:

@@ -62,6 +62,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
     """
 
     _stage = Stage("spectra-tracker", 1)
+    _lines: LineStage
 
     def __init__(self, settings: Settings, layout: SpectraLayout) -> None:
         _check(settings, layout)

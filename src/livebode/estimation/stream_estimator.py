@@ -8,8 +8,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Emit, Event, Responses, Stateful, StatefulBase, ignore
-from livebode.estimation.line_stage import LineStage
+from livebode.core import Block, Emit, Event, Responses, SignalError, Stateful, StatefulBase, ignore
 from livebode.estimation.settings import Settings
 from livebode.estimation.stream_counters import StreamCounters
 
@@ -39,10 +38,20 @@ class Follower(Stateful, Protocol):
     def repeatability(self) -> Floats: ...
 
 
-class StreamEstimator(StatefulBase, Generic[W]):
-    """Base of the classes that feed a LineStage. A subclass sets these parts and returns `_nothing` if it has none."""
+class ResponseStage(Protocol):
+    """What makes responses of spectra, or of samples: a LineStage or a NonPeriodicStage."""
 
-    _lines: LineStage
+    def found(self) -> dict[str, Any]: ...
+
+    def excitation_power(self) -> Floats: ...
+
+    def repeatability(self) -> Floats: ...
+
+
+class StreamEstimator(StatefulBase, Generic[W]):
+    """Base of the classes that feed a stage. A subclass sets these parts and returns `_nothing` if it has none."""
+
+    _lines: ResponseStage
     _watch: W
     _parts: Mapping[str, StatefulBase]
     _events: list[Event]
@@ -75,3 +84,22 @@ class StreamEstimator(StatefulBase, Generic[W]):
     def _load(self, state: dict[str, Any]) -> None:
         for name, part in self._parts.items():
             part.restore(state[name])
+
+
+def signals_of(block: Block, settings: Settings) -> tuple[Floats, Floats]:
+    """Signals of a Block in the order of the settings' roles, (signals, samples), and its schedule, NaN without one.
+
+    SignalError if it has no samples, another rate than the lines, or not the channels.
+    """
+    if abs(block.rate_hz / settings.lines.rate_hz - 1) > 1e-9:
+        raise SignalError(
+            "rate-differs",
+            f"the block has {block.rate_hz:g} samples per second, but the lines are for {settings.lines.rate_hz:g}",
+            "make the lines for the block's rate",
+            rate_hz=block.rate_hz,
+            lines_rate_hz=settings.lines.rate_hz,
+        )
+    if not len(block):
+        raise SignalError("empty", "the block is empty", "leave it out")
+    data = block.data[[block.index(settings.channel(role) or "") for role in settings.roles]]
+    return data, block[settings.schedule] if settings.schedule else np.full(len(block), np.nan)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Emit, Event, Responses, SignalError, Stage, hand_over, ignore
+from livebode.core import Block, Emit, Event, Responses, Stage, hand_over, ignore
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.repeating import RepeatingErrors
@@ -15,7 +15,7 @@ from livebode.estimation.ripple import RippleSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
-from livebode.estimation.stream_estimator import StreamEstimator
+from livebode.estimation.stream_estimator import StreamEstimator, signals_of
 from livebode.estimation.watch import InputStatistics
 
 
@@ -49,6 +49,7 @@ class Tracker(StreamEstimator[InputStatistics]):
     """
 
     _stage = Stage("tracker", 1)
+    _lines: LineStage
 
     def __init__(self, settings: Settings, *, repeating: bool = True) -> None:
         self.settings = settings
@@ -109,18 +110,7 @@ class Tracker(StreamEstimator[InputStatistics]):
             If the rate is not that of the lines, a channel is missing, or samples come twice.
         """
         s = self.settings
-        if abs(block.rate_hz / s.lines.rate_hz - 1) > 1e-9:
-            raise SignalError(
-                "rate-differs",
-                f"the block has {block.rate_hz:g} samples per second, but the lines are for {s.lines.rate_hz:g}",
-                "make the lines for the block's rate",
-                rate_hz=block.rate_hz,
-                lines_rate_hz=s.lines.rate_hz,
-            )
-        if not len(block):
-            raise SignalError("empty", "the block is empty", "leave it out")
-        channels = block.data[[block.index(s.channel(role) or "") for role in self._roles]]
-        schedule = block[s.schedule] if s.schedule else np.full(len(block), np.nan)
+        channels, schedule = signals_of(block, s)
         if self._watch.starts(block):
             self._spectra.restart(block.start)
             self._centre.restart()

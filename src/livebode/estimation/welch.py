@@ -6,6 +6,7 @@ import numpy as np
 
 from livebode.core import Block, Lines, Response, SignalError, UsageError
 from livebode.estimation.bounds import power
+from livebode.estimation.welch_average import independent_windows
 
 
 def welch(
@@ -97,7 +98,7 @@ def welch(
     with np.errstate(divide="ignore", invalid="ignore"):
         value = s_wy / s_wu
         unexplained = np.maximum(s_yy - 2 * (value.conj() * s_uy).real + power(value) * s_uu, 0.0)
-        independent = _independent_segments(segments, step, window, taper)
+        independent = independent_windows(segments, step, signal.get_window(taper, window))
         sigma = np.sqrt(unexplained * s_ww / (independent - 1)) / np.abs(s_wu)
         coherence = power(s_wy) / (s_ww * s_yy)
     return Response(
@@ -111,14 +112,3 @@ def welch(
         sample=block.start + window + (segments - 1) * step - 1,
         time_s=float(block.time_s[[0, window + (segments - 1) * step - 1]].mean()),
     )
-
-
-def _independent_segments(segments: int, step: int, window: int, taper: str) -> float:
-    """Equivalent number of segments without overlap (Welch 1967), for noise that is smooth over a bin."""
-    from scipy.signal import get_window
-
-    shape = get_window(taper, window)
-    shifts = np.arange(1, min(segments, -(-window // step)))
-    overlaps = np.array([np.dot(shape[k * step :], shape[: window - k * step]) for k in shifts])
-    correlation = (overlaps / np.dot(shape, shape)) ** 2
-    return float(segments / (1 + 2 * np.sum((1 - shifts / segments) * correlation)))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import SignalError
+from livebode.core.errors.signal import ANY_EXCITATION
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.evidence import log_chance
 from livebode.excitation.extent import extent
@@ -111,8 +112,7 @@ def _fundamental_of(calm: Floats) -> int:
         f"the excitation does not repeat within {half} samples, half of the recording "
         f"(the best lag, {period} samples, leaves {min(100, 100 * max(d[period], 0)):.0f} "
         "% of its power different)",
-        "record at least two whole periods of a multisine, PRBS, square wave or "
-        "repeated chirp, or use an estimator for noise and single chirps",
+        f"{ANY_EXCITATION}, or record at least two whole periods of a multisine, PRBS, square wave or repeated chirp",
         samples=int(calm.size),
         best_lag=period,
     )
@@ -213,7 +213,7 @@ def _too_short(flat: Floats, d: Floats, period: int) -> SignalError | None:
         "too-short",
         f"the excitation seems to repeat after {lag} samples, but the recording has only "
         f"{flat.size / lag:.2f} periods ({flat.size} samples)",
-        "record at least two periods",
+        f"record at least two periods, or {ANY_EXCITATION}",
         samples=int(flat.size),
         period=lag,
     )

@@ -30,6 +30,8 @@ SENTENCES = (
     "mains hum at {line} Hz is no longer detected without excitation",
     "the line is valid again",
     "the line is not valid",
+    "the input {name} does not repeat every {window} samples at {lines} Hz: a response is not valid where its window "
+    "does not repeat",
     "{line} Hz is a multiple of the mains frequency: mains hum detected",
     "use other lines",
     "the output moves only {steps} steps of its sensor at {line} Hz: increase the excitation",
@@ -174,6 +176,7 @@ SENTENCES = (
     "the output leads the input by {angle}° on average",
     "to keep these roles, set tracking.accept_roles",
     "name the channel of the signal that is added",
+    "for noise or a single chirp set tracking.estimator to 'lpm' (--estimator lpm)",
     "name another channel, or raise the amplitude",
     "{signal} does not respond to {reference} at any line: their coherence over {windows} windows is at most "
     "{coherence}",
@@ -301,8 +304,9 @@ NAMES = (
     "change-cleared", "change-corrected", "clock-jump", "computer-clock", "configuration-applied",
     "configuration-postponed", "configuration-refused", "connected", "disconnected", "distorted", "doubtful", "drift",
     "fit-failed", "fit-resumed", "foreign", "gap", "held", "hum", "hum-gone", "implausible", "layout-changed", "loss",
-    "malformed", "missing", "noise-from-detection-lines", "non-finite", "not-whole", "outlying-periods", "overflow",
-    "phase-slip", "phase-slips", "record-closed", "record-continued", "record-damaged", "record-paused",
+    "malformed", "missing", "noise-from-detection-lines", "non-finite", "not-periodic", "not-whole",
+    "outlying-periods", "overflow", "phase-slip", "phase-slips", "record-closed", "record-continued",
+    "record-damaged", "record-paused",
     "record-removed", "record-resumed", "record-stopped", "record-unclosed", "record-unfinished", "reordered",
     "repeat", "replaced", "restart", "resumed", "roles-doubtful", "spike", "steps", "thinned", "transient",
     "unit-changed", "waiting", "window-doubtful", "wrong-rate", "a delay", "viscous friction at the motor (B)",

@@ -20,7 +20,7 @@ _LISTED_MAX = 1000
 def slips_of(log: Log, settings: Settings) -> tuple[Slip, ...]:
     """Phase slips of the excitation at the period of the lines; none if the reference is not an excitation."""
     name, period = settings.excitation, settings.lines.window
-    if settings.method.reference != "excitation" or name is None:
+    if settings.method.reference != "excitation" or name is None or not settings.periodic:
         return ()
     search, size = SlipSearch(period, log.first), max(_PART // period, 4 * _OVERLAP) * period
     return tuple(slip for part in _whole_parts(log, name, size) for slip in search.take(bridged(part)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import NOT_WHOLE, Block, SignalError, Spectra, Stage, StatefulBase, rms
+from livebode.core.errors.signal import ANY_EXCITATION
 from livebode.estimation.stream_estimator import Follower
 
 # Rounding of a DFT gives 1e-30 of a signal's power at an empty line.
@@ -13,6 +14,7 @@ POWERLESS_SHARE = 1e-20
 _POWERLESS_DB = -80.0
 _REPEATS = 0.5  # noise alone repeats by 1/m over m periods
 _PERIODS_TO_JUDGE = 4
+_LISTED_MAX = 20
 
 
 class ChannelCheck(StatefulBase):
@@ -123,7 +125,7 @@ def check_excitation(tracker: Follower, variance: float) -> None:
             channel=name,
             frequency_hz=float(f[worst]),
         )
-    if settings.method.reference != "excitation":
+    if settings.method.reference != "excitation" or not settings.periodic:
         return
     repeats = tracker.repeatability()
     if tracker.counts["samples"] >= _PERIODS_TO_JUDGE * settings.lines.window and np.any(repeats < _REPEATS):
@@ -132,7 +134,7 @@ def check_excitation(tracker: Follower, variance: float) -> None:
             "not-periodic",
             f"{name!r} does not repeat every {settings.lines.window} samples at {f[worst]:g} Hz "
             f"({100 * repeats[worst]:.0f} % of its power does)",
-            "remove that line, or set lines.window to 'auto'",
+            f"remove that line, or set lines.window to 'auto'; {ANY_EXCITATION}",
             channel=name,
             frequency_hz=float(f[worst]),
             window=settings.lines.window,
@@ -160,7 +162,7 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
             responses=responses,
             window=window,
         )
-    if not responses or valid:
+    if valid or (not responses and tracker.settings.periodic):
         return
     if judged := tracker.found().get("judged", {}).get("invalid_lines_hz"):
         lines = "; ".join(f"{kind} at {', '.join(f'{f:g}' for f in at)} Hz" for kind, at in judged.items())
@@ -170,6 +172,17 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
             f"excitation: {lines}",
             "see events.jsonl for the remedy at each",
             reason="lines-invalid",
+            responses=responses,
+            window=window,
+        )
+    if at := tracker.found().get("judged", {}).get("not_repeating_hz"):
+        name = tracker.settings.channel(tracker.settings.method.reference)
+        raise SignalError(
+            "no-valid-response",
+            f"none of {responses} responses is valid: {name!r} does not repeat every {window} samples at "
+            f"{', '.join(f'{f:g}' for f in at[:_LISTED_MAX])}{' …' * (len(at) > _LISTED_MAX)} Hz",
+            f"set lines.window to its period; {ANY_EXCITATION}",
+            reason="not-periodic",
             responses=responses,
             window=window,
         )

@@ -23,6 +23,9 @@ _WITHOUT_RATE = tuple(
 )
 
 
+_NOT_REPEATING = ("signal.not-periodic", "signal.too-short")
+
+
 class _Given(TypedDict):
     """What `open_log` is given besides the rate."""
 
@@ -35,8 +38,9 @@ class _Given(TypedDict):
 class Inspection:
     """Result of `livebode inspect`.
 
-    `unrecognised`: why an excitation next to a silent stretch is not recognised. `without_rate`: why the recording has
-    no rate; the rate of `log` has no meaning then.
+    `unrecognised`: why an excitation is not recognised, because it does not repeat, or next to a silent stretch.
+    `without_rate`: why the recording has no rate; the rate of `log` has no meaning then. `repeats`: whether the
+    excitation repeats, as far as it was examined.
     """
 
     log: Log
@@ -45,6 +49,14 @@ class Inspection:
     quiet: Quiet | None = None
     unrecognised: str = ""
     without_rate: str = ""
+    repeats: bool = True
+
+    @property
+    def estimator(self) -> str:
+        """The estimator for this excitation; empty if none was examined."""
+        if not self.repeats:
+            return "lpm"
+        return "joint" if self.excitation is not None else ""
 
     @property
     def skipped(self) -> tuple[Skipped, ...]:
@@ -104,6 +116,8 @@ class Inspection:
                 "stretches": [asdict(stretch) for stretch in self.stretches],
                 "phase_slips": [[log.first + slip.sample, slip.missing] for slip in found.slips],
             }
+        if self.estimator:
+            plain["estimator"] = self.estimator
         if self.unrecognised:
             plain["unrecognised"] = self.unrecognised
         return plain
@@ -130,7 +144,7 @@ def inspect(
     Raises
     ------
     LivebodeError
-        If it cannot be read, has no periodic signal, or the part has no samples.
+        If it cannot be read, the excitation cannot be judged, or the part has no samples.
     """
     required = [name for name in (excitation, output, input) if name is not None]
     given: _Given = {"time": time, "dbc": dbc, "channels": required[:1] or None}
@@ -146,16 +160,16 @@ def inspect(
     if lines is not None:
         signals = [name for name in (output, input) if name is not None]
         quiet = look_for_hum(log, signals, excitation, Lines.parse(lines[0], log.rate_hz, lines[1]))
-    unrecognised = ""
+    unrecognised, repeats = "", True
     if excitation is not None and not (quiet is not None and quiet.constant):
         try:
             w = beginning(log, excitation)
             found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
         except LivebodeError as error:
-            if quiet is None:
+            if quiet is None and error.code not in _NOT_REPEATING:
                 raise
-            unrecognised = str(error)
-    return Inspection(log, contents, found, quiet, unrecognised, without_rate)
+            unrecognised, repeats = str(error), error.code not in _NOT_REPEATING
+    return Inspection(log, contents, found, quiet, unrecognised, without_rate, repeats)
 
 
 def open_with_or_without_rate(path: Path, rate_hz: float | None, given: _Given, *, needs_rate: bool) -> tuple[Log, str]:

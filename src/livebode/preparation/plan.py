@@ -9,10 +9,13 @@ import numpy as np
 
 from livebode.configuration.axis import Axis
 from livebode.core import Block, ConfigError, Event, Lines, SpectraLayout
-from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
+from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, SpectraTracker, Tracker
+from livebode.estimation.local_polynomial import WINDOW_MIN
 from livebode.estimation.settings import nearest_hop
 from livebode.estimation.stream_estimator import Follower
+from livebode.estimation.welch_average import WINDOWS
 from livebode.preparation.checks import check_length
+from livebode.preparation.nonperiodic import excited_lines, whole_stretch
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
 from livebode.preparation.spectra_plan import check_spectra
 from livebode.preparation.window_check import WINDOWS_COMPARED, divided_window, window_doubt
@@ -52,12 +55,21 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
             "set lines.frequencies and lines.window for a live source",
             key="lines",
         )
-    lines = Lines.parse(frequencies, rate_hz, window)
+    lines = Lines.parse(frequencies, rate_hz, window, rounded=not axis.tracking.periodic)
     hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
     return _follower(axis, _settings(axis, rate_hz, lines, hop))
 
 
 def _follower(axis: Axis, settings: Settings) -> Follower:
+    if not settings.periodic:
+        if axis.motion is not None:
+            raise ConfigError(
+                "key-conflict",
+                f"[motion] needs an excitation that repeats, but tracking.estimator is {settings.estimator!r}",
+                "remove [motion], or choose another estimator",
+                key="motion",
+            )
+        return NonPeriodicTracker(settings)
     if axis.motion is None:
         return Tracker(settings)
     # The simulation, which its model needs, is slow to import.
@@ -81,12 +93,47 @@ def _follower(axis: Axis, settings: Settings) -> Follower:
 
 def make_settings(axis: Axis, log: Log) -> Settings:
     """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
+    if not axis.tracking.periodic:
+        return _nonperiodic_settings(axis, log)
     return _settings(axis, log.rate_hz, make_lines(axis, log))
+
+
+def _nonperiodic_settings(axis: Axis, log: Log) -> Settings:
+    """With window "auto", one response from the longest stretch without gap; lines need not be on its grid."""
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    windows = WINDOWS if axis.tracking.estimator == "welch" else 1
+    hop = None
+    if window != "auto":
+        check_length(log.samples, windows * window)
+    if frequencies != "auto" and window != "auto":
+        return _settings(axis, log.rate_hz, Lines.parse(frequencies, log.rate_hz, window, rounded=True))
+    signals = axis.signals
+    reference = signals.input if signals.excitation is None else signals.excitation
+    if reference is None:
+        raise ConfigError(
+            "auto-needs-recording",
+            "lines or window are 'auto', but signals.excitation and signals.input are missing",
+            "name the channel of the excitation, or in an open loop of the input",
+            key="signals.excitation",
+        )
+    names = list(dict.fromkeys(name for name in (reference, signals.input, signals.output) if name))
+    samples = beginnings(log, names, SEARCHED)
+    stretch = whole_stretch(samples, windows * (WINDOW_MIN if window == "auto" else window))
+    if window == "auto":
+        window = (stretch.stop - stretch.start) // windows
+        hop = axis.tracking.hop or windows * window
+    if frequencies != "auto":
+        lines = Lines.parse(frequencies, log.rate_hz, window, rounded=True)
+    else:
+        lines = excited_lines(samples[0, stretch], window, log.rate_hz, hann=windows > 1)
+    return _settings(axis, log.rate_hz, lines, hop)
 
 
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
     """An event if the excitation does not repeat with the window that the configuration specifies."""
     if settings.method.reference != "excitation" or not settings.excitation or axis.lines.window == "auto":
+        return []
+    if not settings.periodic:
         return []
     if axis.lines.frequencies == "auto":
         return divided_window(beginning(log, settings.excitation), settings)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import SignalError
+from livebode.core.errors.signal import ANY_EXCITATION
 from livebode.estimation import Settings
 from livebode.estimation.estimators import Role
 from livebode.preparation.role_shapes import direct, lags, limit, mean_deg, sized, slope, wide
@@ -77,6 +78,8 @@ def suspicions(signals: Mapping[Role, Floats], settings: Settings) -> list[Suspi
     its whole band, up to six times the lowest line, cannot be distinguished from one with exchanged signals.
     """
     found = list(_copies(signals, settings))
+    if not settings.periodic:
+        return found
     spectra = role_spectra(signals, settings)
     if spectra is None or any(one.certain for one in found):
         return found
@@ -106,7 +109,7 @@ def _not_repeating(spectra: RoleSpectra) -> Suspicion | None:
     return Suspicion(
         f"{settings.excitation!r} does not repeat like an excitation: "
         f"{100 * max(spectra.repeating, 0.0):.2g} % of its variance repeats every {settings.lines.window} samples",
-        f"name the channel of the signal that is added, or find it with `livebode inspect`; {_ACCEPT}",
+        f"name the channel of the signal that is added; {ANY_EXCITATION}; {_ACCEPT}",
         spectra.repeating < _REPEATING_MIN,
         (settings.excitation,),
     )
@@ -142,7 +145,7 @@ def _noise_as_input(spectra: RoleSpectra) -> Suspicion | None:
     return Suspicion(
         f"{settings.input!r} is noise at all {len(returning)} lines: at most {100 * returning.max():.2g} % of its "
         f"power repeats every {settings.lines.window} samples, so that a window leaks",
-        f"name the excited input, or estimate with livebode.welch in Python; {_ACCEPT}",
+        f"name the excited input; {ANY_EXCITATION}; {_ACCEPT}",
         True,
         (settings.input,),
     )

@@ -16,6 +16,13 @@ def check_spectra(axis: Axis, layout: SpectraLayout, rate_hz: float) -> Lines:
             "remove it, or send samples",
             key="motion",
         )
+    if not axis.tracking.periodic:
+        raise ConfigError(
+            "needs-samples",
+            f"tracking.estimator = {axis.tracking.estimator!r} needs samples, but the drive sends spectra",
+            "use 'joint', or send samples",
+            key="tracking.estimator",
+        )
     if axis.record is not None and axis.record.samples:
         raise ConfigError(
             "needs-samples",

@@ -12,6 +12,8 @@ from livebode.reporting.wording import duration, pairs
 _ESTIMATOR = {
     "joint": marked("joint: S_wy/S_wu, unbiased in any linear loop"),
     "direct": marked("direct: S_uy/S_uu, biased if y is fed back to u"),
+    "lpm": marked("lpm: local polynomial method, for an excitation that does not repeat"),
+    "welch": marked("welch: averaged Hann windows, for an excitation that does not repeat"),
     "indirect": marked("indirect: response of the closed loop, from which the described controllers are removed"),
 }
 _NOISE = {
@@ -20,6 +22,8 @@ _NOISE = {
         "the scatter between windows that are whole periods apart; where the schedule moves, detection lines "
         "(non-excited bins)"
     ),
+    "bins": marked("what the local polynomials do not explain at the bins around each line"),
+    "windows": marked("what the response does not explain in the averaged windows"),
     "quiet": marked("detection lines (non-excited bins); at standstill the scatter between periods if it is larger"),
 }
 _ROLES = {
@@ -34,6 +38,7 @@ def how(of: ReportData) -> Section:
     """The section "How it was measured"."""
     found, tracking = of.run.found, of.configuration.get("tracking", {})
     window_s = found["window"] / found["rate_hz"]
+    noise = found.get("judged", {}).get("noise", tracking.get("noise", ""))
     f = of.run.lines.frequency_hz
     source = of.configuration.get("source", {})
     rows = [
@@ -54,7 +59,7 @@ def how(of: ReportData) -> Section:
         )),
         (tr("hop"), _hop(found)),
         (tr("estimator"), recognised(_ESTIMATOR.get(tracking.get("estimator", ""), ""))),
-        (tr("bounds from"), recognised(_NOISE.get(tracking.get("noise", ""), ""))),
+        (tr("bounds from"), recognised(_NOISE.get(noise, ""))),
         (tr("options"), listed(_options(tracking, of))),
         (tr("loop"), "; ".join(_loop(of.configuration.get("loop", {})))),
     ]  # fmt: skip

@@ -46,11 +46,12 @@ class LiveChecks:
         judged: Callable[[], None] = lambda: None,
     ) -> None:
         self._settings, self._channels, self._report_judged = settings, channels, judged
-        self._roles, self._transient = roles, transient
+        self._roles, self._transient = roles and settings.periodic, transient and settings.periodic
         lines = settings.lines
         self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
         self._stretch = _Stretch()
-        self._reference = settings.excitation if settings.method.reference == "excitation" else None
+        repeats = settings.periodic and settings.method.reference == "excitation"
+        self._reference = settings.excitation if repeats else None
         self._slips = SlipSearch(lines.window)
         self._searched = _Stretch()
 

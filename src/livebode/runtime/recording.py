@@ -39,7 +39,7 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     if slips:
         noticed.append(slip_event(slips, settings))
     source = AlignedLog(log, slips, log.first)
-    if not axis.tracking.all_periods and axis.motion is None:
+    if settings.periodic and not axis.tracking.all_periods and axis.motion is None:
         source = _steady(source, pipeline.follower, noticed)
     if isinstance(pipeline.follower, Tracker):
         pipeline.follower.know_spikes(early_spikes(source, settings))
@@ -48,7 +48,7 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     if log.is_part:
         found["part"] = {"first": log.first, "stop": log.stop}
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": found}
-    if settings.quantity == "plant" and not settings.average:
+    if settings.quantity == "plant" and settings.periodic and not settings.average:
         pipeline = replace(pipeline, drift=DriftTest(settings.lines))
     loop = RunLoop(
         source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed

@@ -34,6 +34,7 @@ class BaselineError(LivebodeError):
         "not-a-baseline": "The file is not a baseline.",
         "run-averaged": "A run's responses contain those before them, so that they are not independent.",
         "run-not-of-machine": "A run does not come from `livebode run` and so has no description of its machine.",
+        "run-not-periodic": "A run is of an estimator for an excitation that does not repeat.",
         "run-repeated": "Two of the runs contain the same samples.",
         "runs-differ": "The runs have different lines, signals or options.",
         "settings-differ": "The baseline was learned with other settings than those of the run.",

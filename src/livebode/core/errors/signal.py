@@ -7,6 +7,9 @@ from typing import ClassVar
 
 from livebode.core.errors.base import LivebodeError
 
+ANY_EXCITATION = "for noise or a single chirp set tracking.estimator to 'lpm' (--estimator lpm)"
+"""Remedy for an excitation that does not repeat."""
+
 
 class SignalError(LivebodeError):
     """The samples do not fit what was asked: no excitation, no period, too short, channels with the wrong role.

@@ -1,0 +1,141 @@
+"""Whether the input of a direct estimate repeats from window to window, within what noise explains."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import Event, Lines, Stage, StatefulBase
+from livebode.core.errors.signal import ANY_EXCITATION
+from livebode.estimation.bounds import power
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+_CHANGED = 0.1  # of the input's power: a smaller change leaks less than it
+_CHANCE, _CHANCE_Z = 1e-6, 4.75  # the same probability, as a quantile of the normal distribution
+_OF_DIFFERENCES = (
+    2 / 3
+)  # degrees of freedom that differences of neighbours have of those of a scatter (von Neumann 1941)
+_FORGETTING = 0.95  # of a window relative to the next one: about forty windows
+# Mean share of a difference in the power of its two windows: 1 for noise, 1/(1 + SNR) for noise on what repeats.
+_SHARE, _SHARE_SPREAD = 0.5, 1.5
+# Radians by which the input turns from each window to the next, and standard deviations: the window is no whole period.
+_TURNED, _TURNED_SIGMAS, _TURNED_WINDOWS_MIN = 0.05, 6.0, 8.0
+_LISTED_MAX = 20
+
+
+class Periodicity(StatefulBase):
+    """Finds the windows whose input, at a line, does not repeat the window before or the periods before.
+
+    The leakage of a window is the response to the difference of its samples from those one window before. A window does
+    not repeat where the input differs from the one a window before by more than a tenth of its power, and by more than
+    the differences before it explain (a chirp arrives); where the differences have more power than what repeats, over
+    all windows or in most of them (noise, and between the passes of a chirp); and where the input turns by the same
+    angle from each window to the next (a wrong period). A slow change, and a jump of amplitude or phase, only count
+    where they happen.
+
+    Of an input that repeats with a signal-to-noise ratio of 6 dB or more, at a line and in one window, less than one
+    window in 1,000 is taken for one that does not repeat.
+
+    Parameters
+    ----------
+    lines
+        The lines.
+    places
+        Windows in one period.
+    name, events
+        Channel of the input, and where the first such window is reported.
+    """
+
+    _stage = Stage("periodicity", 1)
+    _STATE = ("_before", "_means", "_weights", "_counts", "_told")
+
+    def __init__(self, lines: Lines, places: int, name: str, events: list[Event]) -> None:
+        self._lines, self._name, self._events = lines, name, events
+        # All of the last period, the oldest first.
+        self._before = np.full((places, len(lines)), complex(np.nan, np.nan))
+        # Of half a difference's power, of the power, of the product with the window before, real and imaginary, and of
+        # the difference's share.
+        self._means = np.zeros((5, places, len(lines)))
+        self._weights = np.zeros((2, places))  # Σλ^i, Σλ^2i
+        self._counts = np.zeros((2, len(lines)), dtype=np.int64)  # windows, and those that do not repeat
+        self._told = False
+
+    def process(self, input_: Complex, usable: Flags, sample: NDArray[np.int64], centre_s: Floats) -> Flags:
+        """Which windows do not repeat, shape (rows, lines).
+
+        Parameters
+        ----------
+        input_
+            Spectrum of the input, shape (rows, lines), at consecutive places.
+        usable
+            Windows that count, shape (rows,).
+        sample, centre_s
+            Newest sample and time of the centre of each window, shape (rows,).
+        """
+        places = len(self._before)
+        parts = [slice(at, at + places) for at in range(0, len(usable), places)]
+        found = np.concatenate(
+            [self._period(input_[part], usable[part]) for part in parts] or [np.zeros(input_.shape, dtype=np.bool_)]
+        )
+        self._counts[0] += np.count_nonzero(usable)
+        self._counts[1] += np.count_nonzero(found, axis=0)
+        self._report(found, sample, centre_s)
+        return found
+
+    def _period(self, input_: Complex, usable: Flags) -> Flags:
+        """The same for at most one period."""
+        rows = slice(0, len(input_))
+        now = np.where(usable[:, np.newaxis], input_, np.nan)
+        difference, every = power(now - self._before[rows]) / 2, power(now)
+        means, weights = self._means[:, rows], self._weights[:, rows]
+        scatter, repeating = means[0], means[1] - means[0]
+        count = (weights[0] ** 2 / weights[1])[:, np.newaxis]  # NaN before the first difference
+        dof = _OF_DIFFERENCES * count
+        explained = scatter * dof * (_CHANCE ** (-1 / dof) - 1)  # F(2, 2·dof)
+        most = (1 - 1 / (9 * dof) + _CHANCE_Z / (3 * np.sqrt(dof))) ** 3  # of chi², Wilson, Hilferty 1931
+        found = (2 * difference > _CHANGED * every) & (difference > explained) | (scatter > most * repeating)
+        found |= _turns(means, count) | (means[4] > _SHARE + _SHARE_SPREAD / np.sqrt(count))
+        product, both = now * self._before[rows].conj(), every + power(self._before[rows])
+        known = np.isfinite(difference[:, 0])
+        kept = np.array([_FORGETTING, _FORGETTING**2])
+        after = np.where(known, kept[:, np.newaxis] * weights + 1, weights)
+        share = np.divide(2 * difference, both, out=np.zeros_like(both), where=both > 0)
+        new = np.stack([difference, every, product.real, product.imag, share])
+        means = np.where(known[:, np.newaxis], means + (new - means) / after[0, :, np.newaxis], means)
+        self._before = np.concatenate([self._before[rows.stop :], now])
+        self._means = np.concatenate([self._means[:, rows.stop :], means], axis=1)
+        self._weights = np.concatenate([self._weights[:, rows.stop :], after], axis=1)
+        return np.asarray(found & usable[:, np.newaxis])
+
+    def not_repeating_hz(self) -> list[float]:
+        """Lines at which the input does not repeat in most of the windows."""
+        windows, found = self._counts
+        return [float(f) for f in self._lines.frequency_hz[2 * found > windows]]
+
+    def _report(self, found: Flags, sample: NDArray[np.int64], centre_s: Floats) -> None:
+        rows = found.any(axis=1)
+        if self._told or not rows.any():
+            return
+        self._told = True
+        row = int(np.argmax(rows))
+        f = self._lines.frequency_hz[found[row]]
+        where = ", ".join(f"{x:g}" for x in f[:_LISTED_MAX]) + " …" * (f.size > _LISTED_MAX)
+        message = (
+            f"the input {self._name!r} does not repeat every {self._lines.window} samples at {where} Hz: a response is "
+            f"not valid where its window does not repeat; {ANY_EXCITATION}"
+        )
+        details: dict[str, Any] = {"lines_hz": f[:_LISTED_MAX].tolist(), "window": self._lines.window}
+        self._events.append(Event("not-periodic", int(sample[row]), float(centre_s[row]), message, details))
+
+
+def _turns(means: Floats, count: Floats) -> Flags:
+    """Where the input turns from window to window by more than noise explains, shape (rows, lines)."""
+    every, real, imaginary = means[1:4]
+    rest = np.maximum(every - np.hypot(real, imaginary), 0.0)
+    significant = imaginary**2 > _TURNED_SIGMAS**2 * every * rest / count
+    return np.asarray((np.abs(imaginary) > _TURNED * every) & significant & (count >= _TURNED_WINDOWS_MIN))

@@ -1,0 +1,59 @@
+"""Window and lines for an excitation that does not repeat, where they are not specified."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import Lines, SignalError
+
+LINES_MAX = 1000
+"""Lines that are chosen at most, at equal ratios."""
+_POWER = 1e-3  # of the excitation's power, in the weakest bins, is left out
+
+
+def whole_stretch(signals: NDArray[np.float64], samples_min: int) -> slice:
+    """The longest stretch of samples that are finite in all signals, shape (signals, samples).
+
+    SignalError if it has fewer samples than the minimum.
+    """
+    finite = np.isfinite(signals.sum(axis=0))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]])))
+    starts, stops = edges[::2], edges[1::2]
+    longest = int(np.argmax(stops - starts)) if starts.size else -1
+    samples = int(stops[longest] - starts[longest]) if starts.size else 0
+    if samples < samples_min:
+        raise SignalError(
+            "no-clean-samples",
+            f"the longest stretch without gaps and samples that are not finite has {samples} samples, less than the "
+            f"{samples_min} of one response",
+            "choose a shorter window, or check the recording with `livebode inspect`",
+            samples=samples,
+            samples_min=samples_min,
+        )
+    return slice(int(starts[longest]), int(stops[longest]))
+
+
+def excited_lines(reference: NDArray[np.float64], window: int, rate_hz: float, *, hann: bool) -> Lines:
+    """Bins of a window that together have 99.9 % of the reference's power, at most 1,000 of them at equal ratios.
+
+    `reference` is finite. Its power is summed over windows that follow each other, `hann` windows as in Welch's method.
+    """
+    windows = reference[: reference.size // window * window].reshape(-1, window)
+    if hann:
+        windows = (windows - windows.mean(axis=1, keepdims=True)) * np.hanning(window + 1)[:-1]
+    power = np.sum(np.abs(np.fft.rfft(windows)) ** 2, axis=0)
+    power = power[1 : (window + 1) // 2]
+    order = np.argsort(power)
+    weak = order[np.cumsum(power[order]) <= _POWER * power.sum()]
+    bins = np.setdiff1d(np.arange(power.size), weak) + 1
+    if not power.any() or not bins.size:
+        raise SignalError(
+            "line-not-excited",
+            "the excitation has no power at any frequency",
+            "choose the channel with the signal",
+        )
+    if bins.size > LINES_MAX:
+        targets = np.geomspace(bins[0], bins[-1], LINES_MAX)
+        bins = np.unique(bins[np.minimum(np.searchsorted(bins, targets), bins.size - 1)])
+    return Lines.of_bins(bins.tolist(), window, rate_hz)
