@@ -20,10 +20,10 @@ def of(system: control.StateSpace, words: str, share: float, seed: int = 0, **op
 
 
 def test_bounds_of_common_modes_cover() -> None:
-    """10 fits, 40 values: 63 and 98 % within four deviations of the binomial; `make common-modes` has 200 of each."""
-    _, shares = covered(CASES[0], 10, order=2)
+    """6 fits, 24 values: 63 and 98 % within four deviations of the binomial; `make common-modes` has 200 of each."""
+    _, shares = covered(CASES[0], 6, order=2)
     for share, probability in zip(shares, PROBABILITIES):
-        assert abs(share - probability) < 4 * np.sqrt(probability * (1 - probability) / 40)
+        assert abs(share - probability) < 4 * np.sqrt(probability * (1 - probability) / 24)
 
 
 def test_the_number_of_modes_is_found() -> None:
@@ -32,13 +32,15 @@ def test_the_number_of_modes_is_found() -> None:
 
 
 def test_modes_of_a_fifth_of_a_percent_of_damping_over_decades() -> None:
+    """The slowest is between two lines 1 Hz apart: its damping is hardly seen, and may by noise be below zero."""
     modes = ((1.3, 0.002), (25.4, 0.002), (26.3, 0.004), (310.6, 0.002))
-    found = of(machine(modes, np.array([[1.0, 1.0, 0.8, 0.3], [0.5, -0.4, 1.0, 0.2]])), "1:400:1", 0.003)
+    system = machine(modes, np.array([[1.0, 1.0, 0.8, 0.3], [0.5, -0.4, 1.0, 0.2]]))
+    found = of(system, "1:40:1,60:300:20,301:320:1", 0.003)
     assert found.order == 4
     for i, (frequency, damping) in enumerate(modes):
-        assert found[f"frequency_{i + 1}"] == pytest.approx(frequency, abs=4 * found.bound(f"frequency_{i + 1}", 0.68))
-        assert found[f"damping_{i + 1}"] == pytest.approx(damping, abs=4 * found.bound(f"damping_{i + 1}", 0.68))
-        assert found.bound(f"frequency_{i + 1}") < 2e-3 * frequency
+        for name, truth in ((f"frequency_{i + 1}", frequency), (f"damping_{i + 1}", damping)):
+            assert found[name] == pytest.approx(truth, abs=4 * found.bound(name, 0.68))
+        assert found.bound(f"frequency_{i + 1}") < 5e-3 * frequency
 
 
 def test_few_lines_show_one_mode_of_a_single_output() -> None:

@@ -24,6 +24,7 @@ _TRIED = 3  # starts for each added pole
 _PEAKS, _WIDTHS = 24, (0.3, 1.0, 4.0)  # lines with the largest residuals; half-widths over the spacing of lines
 _SPREAD, _DAMPINGS = 30, (0.02, 0.1, 0.4)
 _BEYOND = 1.5  # times the highest line, or the lowest line over it: a mode outside is a residual term
+_NARROW = 0.1  # of the spacing of lines, for the half-width of a mode
 _FAR = 30.0  # times the highest line, or the lowest line over it: a pole outside is an integrator or a direct term
 _EVALUATIONS_FIRST = 12  # of a start, before the best one is continued
 _ROUNDS_SEARCH, _ROUNDS_LAST = 2, 8
@@ -88,7 +89,10 @@ def possible(outputs: Outputs, of: Separated, kind: Kind) -> bool:
         size = np.abs(poles_of(of.structure, of.theta))
         return bool(((size > ends[0] / _FAR) & (size < ends[1] * _FAR)).all())
     a1, a0 = of.structure.pairs_of(of.theta).T
-    return bool(((a1 > 0) & (a1**2 < 4 * a0) & (a0 > (ends[0] / _BEYOND) ** 2) & (a0 < (ends[1] * _BEYOND) ** 2)).all())
+    # A mode much narrower than the spacing of lines may by noise have a damping a little below zero.
+    damped = a1 > -_NARROW * 4 * np.pi * np.min(np.diff(outputs.grid.frequency_hz), initial=np.inf)
+    between = (a0 > (ends[0] / _BEYOND) ** 2) & (a0 < (ends[1] * _BEYOND) ** 2)
+    return bool((damped & (a1**2 < 4 * a0) & between).all())
 
 
 def _delayed(outputs: Outputs, of: Separated) -> list[Separated]:
