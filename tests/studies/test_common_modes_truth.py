@@ -59,6 +59,13 @@ def test_real_poles_and_a_double_integrator_are_found_as_rational() -> None:
     assert found["1/s² y1"] == pytest.approx(4e4, abs=4 * found.bound("1/s² y1", 0.68))
 
 
+def test_noise_alone_shows_no_mode() -> None:
+    lines = Lines.parse("2:40:2", rate_hz=RATE_HZ, window=1000)
+    found = fit_common_poles(measured(lines, np.full((1, len(lines)), 1e-6 + 0j), 1e6, 0))
+    assert found.status == "not seen"
+    assert "neither a pole nor an integrator" in found.sentence
+
+
 def test_residues_agree_with_partial_fractions_of_scipy() -> None:
     system = machine(DAMPED, np.array([[1.0, 0.5]]))
     below, above = control.tfdata(control.tf(system))[::-1]

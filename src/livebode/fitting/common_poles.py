@@ -83,6 +83,8 @@ class CommonPoles:
     @property
     def sentence(self) -> str:
         """The status for people."""
+        if self.status == NOT_SEEN and self.order == 0:
+            return "the lines show neither a pole nor an integrator above their noise"
         if self.status == NOT_SEEN:
             return "the lines do not determine so many modes or poles; specify a lower order"
         return SENTENCES[self.status]
@@ -321,7 +323,8 @@ class _Blank:
         raw = np.concatenate([found.theta, found.linear.ravel()])
         names = tuple(f"x{i}" for i in range(len(raw)))
         status = OK
-        if not np.isfinite(covariance).all() or not possible(outs, found, self._model):
+        terms = found.structure.poles + found.structure.integrators
+        if not terms or not np.isfinite(covariance).all() or not possible(outs, found, self._model):
             status = NOT_SEEN
         elif (found.epsilon > EPSILON_MAX).any():
             status = NO_FIT
