@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode.core import Lines
+from livebode.core import Lines, SignalError
 from livebode.core.steps import step_of
 from livebode.excitation import multisine, recognise
 from livebode.records import RunRecord
@@ -120,3 +120,76 @@ def test_inspect_names_the_design(tmp_path: Path) -> None:
     log = recorded(tmp_path / "log.parquet", np.tile(multisine(lines), 4))
     done = livebode("inspect", log, "--excitation", "w", "--json")
     assert json.loads(done.out)["excitation"]["design"] == "odd-odd, k=1:249:4"
+
+
+def with_second(ratio: float, first: int = 3, second: int = 6, noise: float = 1e-3) -> np.ndarray:
+    """A measured sine with another one of this relative amplitude; ten periods of 256 samples."""
+    n = np.arange(2560)
+    w = np.cos(2 * np.pi * first * n / 256) + ratio * np.cos(2 * np.pi * second * n / 256)
+    return np.asarray(w + noise * np.random.default_rng(0).standard_normal(n.size))
+
+
+def test_a_sine_with_a_strong_harmonic_is_ambiguous_and_both_candidates_are_commands(tmp_path: Path) -> None:
+    """A drive of 10 % distortion, or two lines 20 dB apart: nothing in the recording tells."""
+    log = recorded(tmp_path / "log.parquet", with_second(0.1))
+    with pytest.raises(SignalError) as caught:
+        recognise(with_second(0.1), RATE_HZ)
+    assert (caught.value.code, caught.value.period) == ("signal.lines-ambiguous", 256)
+    refused = livebode("run", log, *ROLES, "--out", tmp_path / "run")
+    assert refused.code != 0
+    assert all(candidate in refused.err for candidate in caught.value.candidates)
+    shown = livebode("inspect", log, "--excitation", "w")
+    assert shown.code == 0
+    assert caught.value.candidates[1] in shown.out
+    for number, candidate in enumerate(caught.value.candidates, 1):
+        done = livebode("run", log, *ROLES, *candidate.split(), "--out", tmp_path / str(number))
+        assert done.code == 0, done.err
+        assert len(RunRecord.open(tmp_path / str(number)).lines.bins) == number
+
+
+def test_weak_harmonics_of_a_sine_are_distortion() -> None:
+    found = recognise(with_second(0.03), RATE_HZ)
+    assert (found.lines.bins, found.distortion) == ((3,), (6,))
+
+
+def test_a_weak_line_that_is_no_harmonic_of_the_strong_one_was_designed() -> None:
+    assert recognise(with_second(0.1, 5, 27), RATE_HZ).lines.bins == (5, 27)
+
+
+def test_a_line_near_a_high_harmonic_of_the_mains_is_not_hum() -> None:
+    """1864 Hz is 4 Hz beside the 31st harmonic of 60 Hz; without it the recording would repeat after 125 samples."""
+    n = np.arange(5000)
+    w = np.cos(2 * np.pi * 176 * n / 500) + 0.316 * np.cos(2 * np.pi * 233 * n / 500)
+    assert recognise(w, RATE_HZ).lines.bins == (176, 233)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+@pytest.mark.parametrize(("times", "whole"), [(3, 500), (3, 1000), (4, 1001)])
+def test_a_period_that_is_no_whole_number_of_samples_gives_a_window_of_several(
+    noise: float, times: int, whole: int
+) -> None:
+    """2000 Hz / 12 samples at 2 kHz is 166.67 samples: three periods are 500."""
+    n = np.arange(8 * whole)
+    w = sum(np.cos(2 * np.pi * k * times * n / whole + k * k) for k in (1, 2, 5))
+    found = recognise(w + noise * np.random.default_rng(1).standard_normal(n.size), 2000.0)
+    assert (found.period, found.lines.bins) == (whole, (times, 2 * times, 5 * times))
+
+
+def test_lines_far_below_the_others_that_the_output_does_not_show_are_left_out() -> None:
+    """The reference repeats exactly, with products of its own computation 40 dB below; the output is noisy."""
+    lines, junk = Lines(tuple(range(1, 126, 2)), 1000, RATE_HZ), Lines(tuple(range(2, 400, 2)), 1000, RATE_HZ)
+    w = np.tile(multisine(lines) + 0.01 * multisine(junk) * np.sqrt(len(junk.bins) / len(lines.bins)), 8)
+    y = 0.5 * w + 0.3 * np.abs(w).max() * np.random.default_rng(2).standard_normal(w.size)
+    assert len(recognise(w, RATE_HZ).lines.bins) > 200
+    assert recognise(w, RATE_HZ, y).lines.bins == lines.bins
+
+
+def test_hum_far_below_the_lines_on_both_sides_is_no_line_of_a_sloping_design() -> None:
+    """50 and 150 Hz fit the period; the weakest line is weaker than the hum."""
+    bins = np.array([3, 9, 21, 24, 33, 41, 60, 70, 81, 90, 120, 200])
+    n = np.arange(2000)
+    amplitude = 10 ** (-np.arange(bins.size) / 6)
+    w = sum(a * np.cos(2 * np.pi * k * n / 2000 + k * k) for a, k in zip(amplitude, bins))
+    hum = 0.02 * np.cos(2 * np.pi * 25 * n / 2000) + 0.004 * np.cos(2 * np.pi * 75 * n / 2000)
+    assert recognise(np.tile(w + hum, 4), RATE_HZ).lines.bins == tuple(bins)
+    assert recognise(np.tile(w + 10 * hum, 4), RATE_HZ).lines.bins == tuple(sorted({*bins.tolist(), 25, 75}))

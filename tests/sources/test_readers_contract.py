@@ -126,7 +126,9 @@ def test_time_that_goes_back_names_the_sample(module, tmp_path):
     given = with_time(signals())
     given["t"][700] = given["t"][698]
     path = write(module, tmp_path, given)
-    unit = {"mcap": 1e9, "rosbag": 1e9, "twincat": 1e3}.get(module, 1)  # ns where time is UTC
+    unit = {"codesys": 1e3, "mcap": 1e9, "rosbag": 1e9, "svdx": 1e9, "twincat": 1e3}.get(
+        module, 1
+    )  # ns where time is UTC
     times = [round(0.17475 * unit, 9), round(0.1745 * unit, 9)]
     with refused(RecordingError, "time-not-increasing", sample=700, times=times):
         open_log(path)

@@ -44,7 +44,7 @@ from tests.support.recordings import (
 )
 
 MODULES = sorted(WRITERS)
-MAY_END_ANYWHERE = "asc", "delimited", "lvm", "twincat", "ulog"
+MAY_END_ANYWHERE = "asc", "codesys", "delimited", "lvm", "twincat", "ulog"
 """A table may end after any row, and a flight recorder when its battery is removed."""
 ROUNDS = int(os.environ.get("LIVEBODE_FUZZ_ROUNDS", "150"))
 """Damaged files of each kind; raise it for a campaign."""
@@ -344,6 +344,8 @@ def test_hdf5_without_its_library_names_the_extra(tmp_path, monkeypatch):
             "\ufeff",
             "Name\tscope\nFile\tx\nName\tu\n0\t1\n",
             "LabVIEW Measurement\nX_Value\tu\n0\t1\n",
+            "\x14" + 19 * "\0",
+            "[key]; [value]\n0.Variable; u\n0.Data; \n; 0; 1\n; 1; 2\n",
         ]
     ),
 )
@@ -394,6 +396,17 @@ def test_damaged_files_are_read_or_refused(module, tmp_path):
         rng = random.Random(f"{module} {round_}")
         path = text(tmp_path, damaged(whole, rng) or b"x", "damaged.bin")
         survives(path, rate_hz=rng.choice([None, 4000.0]), time=rng.choice([None, "none"]))
+
+
+@pytest.mark.parametrize(("module", "rounds"), [("mdf", (625, 805, 980, 1494)), ("ulog", (3, 13, 104, 157))])
+def test_libraries_print_nothing_about_damaged_files(module, rounds, tmp_path, capsys):
+    """asammdf and pyulog printed what they had found in these; standard output is still that of the process."""
+    whole, output = seeds(module, tmp_path), sys.stdout
+    for round_ in rounds:
+        path = text(tmp_path, damaged(whole, random.Random(f"{module} {round_}")), "damaged.bin")
+        survives(path, rate_hz=4000)
+        assert sys.stdout is output
+    assert capsys.readouterr() == ("", "")
 
 
 def test_damaged_dbc_files_are_read_or_refused(tmp_path):
@@ -488,6 +501,28 @@ def test_memory_of_a_long_wav_file_is_that_of_a_block(tmp_path):
     tracemalloc.stop()
     assert read == frames
     assert peak < frames * 16 / 4
+
+
+def test_a_scope_project_is_read_in_pieces_and_hostile_sizes_are_refused(tmp_path):
+    peaks = []
+    for samples in (150_000, 450_000):
+        path = write("svdx", tmp_path, signals(samples))
+        tracemalloc.start()
+        read = sum(len(block) for block in open_log(path).blocks(["input"], 4096))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert read == samples
+    assert peaks[1] < 1.1 * peaks[0]
+    whole = write("svdx", tmp_path, signals(40)).read_bytes()
+    at = 20 + 2 * 20 + 67 + 2 * 56 + 8  # behind the table, the head and levels of the first acquisition, and a time
+    assert whole[at : at + 8] == struct.pack("<Q", 16)
+    for wrong in (0, 17, 1 << 40, (1 << 64) - 1):
+        raw = whole[:at] + struct.pack("<Q", wrong) + whole[at + 8 :]
+        with refused(RecordingError, "damaged"):
+            drain(text(tmp_path, raw, "a.svdx"))
+    for first, wrong in ((0, 1 << 40), (8, 1 << 63), (20, 1 << 50), (28, 1 << 50)):
+        raw = whole[:first] + struct.pack("<Q", wrong) + whole[first + 8 :]
+        assert not survives(text(tmp_path, raw, "b.svdx"))
 
 
 @pytest.mark.parametrize("long", ['<a b="{}"/>', "<a><!-- {} --></a>", "<{}/>", "<a><?b {}?></a>"])

@@ -26,7 +26,7 @@ from tests.support.recordings import (
 )
 
 WINDOW = 64
-OWN_UNITS = "lvm", "mdf", "sinumerik", "tdms", "twincat"
+OWN_UNITS = "codesys", "lvm", "mdf", "sinumerik", "svdx", "tdms", "twincat"
 """Formats that have a place for the unit, so that brackets in a name are none."""
 
 

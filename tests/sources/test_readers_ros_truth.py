@@ -197,6 +197,52 @@ def test_records_and_types_that_contradict_or_expand_without_end_are_refused(tmp
         open_log(path, rate_hz=1)
 
 
+def split_bag(folder, name, pieces=3):
+    """A bag whose recorder began a new file from time to time, as `ros2 bag record -d` does; files 8, 9 and 10."""
+    bag = folder / "bag"
+    bag.mkdir()
+    suffix = Path(name).suffix
+    for number, part in enumerate(np.array_split(np.arange(300), pieces), 8):
+        with Writer(folder / f"part{number}", version=9, storage_plugin=PLUGINS[name]) as writer:
+            topic = writer.add_connection("/joints", "sensor_msgs/msg/JointState", typestore=STORE)
+            for k in part.tolist():
+                writer.write(topic, EPOCH_NS + k, STORE.serialize_cdr(joint(k), "sensor_msgs/msg/JointState"))
+        next((folder / f"part{number}").glob(f"*{suffix}")).rename(bag / f"bag_{number}{suffix}")
+    return bag
+
+
+@pytest.mark.parametrize("name", PLUGINS)
+def test_the_directory_of_a_bag_is_one_recording_in_the_order_of_its_files(tmp_path, name):
+    bag = split_bag(tmp_path, name)
+    log = open_log(bag)
+    assert (log.rate_hz, log.samples, log.path) == (500, 300, bag)
+    got = np.concatenate([block["/joints.position[1]"] for block in log.blocks(["/joints.position[1]"], 77)])
+    np.testing.assert_array_equal(got, POSITION[:, 1])
+    assert "/joints.position[1]" in livebode("inspect", bag).out
+
+
+def test_a_bag_that_is_not_complete_is_refused_with_the_file_that_is_missing(tmp_path):
+    bag = split_bag(tmp_path, "a.mcap")
+    (bag / "metadata.yaml").write_text("info:\n  relative_file_paths:\n    - bag_8.mcap\n    - bag_11.mcap\n")
+    with refused(RecordingError, "truncated", path=str(bag), part="bag_11.mcap"):
+        open_log(bag)
+    (bag / "metadata.yaml").unlink()
+    (bag / "bag_10.mcap").write_bytes((bag / "bag_10.mcap").read_bytes()[:-100])
+    with refused(RecordingError, "truncated", path=str(bag / "bag_10.mcap")):
+        open_log(bag)
+    (bag / "bag_10.mcap").rename(bag / "bag_10.mcap.zstd")
+    with refused(RecordingError, "not-a-file", path=str(bag / "bag_10.mcap.zstd")):
+        open_log(bag)
+    (bag / "bag_10.mcap.zstd").rename(bag / "bag_10.db3")
+    with refused(RecordingError, "not-a-file", path=str(bag)):
+        open_log(bag)
+    (bag / "bag_10.db3").write_text("t,u\n0,1\n")
+    for other in bag.glob("*.mcap"):
+        other.unlink()
+    with refused(RecordingError, "format-unknown", path=str(bag / "bag_10.db3")):
+        open_log(bag)
+
+
 @pytest.mark.parametrize("name", sorted(PLUGINS))
 def test_ros_without_its_library_names_the_extra(tmp_path, monkeypatch, name):
     path = written(tmp_path, name)

@@ -120,6 +120,17 @@ def test_text_in_a_channel_that_was_asked_for_is_still_refused(tmp_path):
         inspect(log.path, excitation="axisP[0]", output="flightModeFlags")
 
 
+@pytest.mark.parametrize(
+    "name", ["failsafePhase", "failsafePhase (flags)", "loopIteration + failsafePhase", "2*failsafePhase"]
+)
+def test_the_request_for_a_column_of_text_says_why_it_was_left_out(tmp_path, name):
+    log = opened(tmp_path, blackbox(["0"] * 100))
+    with pytest.raises(RecordingError, match=r"failsafePhase.* was left out: it contains text; name a channel of n"):
+        log.blocks([name])
+    with pytest.raises(RecordingError, match=r"failsafePhase.* was left out: it contains text; name a channel of n"):
+        open_log(log.path, channels=[name])
+
+
 def test_a_log_of_vesc_tool_has_its_time_in_ms_today(tmp_path):
     rows = "".join(f"{36_000_000 + 20 * k};50.{k % 9};{k * 10};FAULT_CODE_NONE;\n" for k in range(100))
     log = opened(tmp_path, f"ms_today;input_voltage;erpm;fault;\n{rows}")

@@ -25,6 +25,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from livebode.sources import Log
 from livebode.sources import open_log as open_alone
+from tests.support.scope_project import Acquired, write_project
 from tests.support.ulog_file import ulog_file
 
 RATE_HZ = 4000.0
@@ -114,6 +115,31 @@ def write_twincat(path: Path, signals: Signals) -> None:
     time = signals.get("t", np.arange(len(next(iter(signals.values())))) / RATE_HZ)
     given = {name: values for name, values in signals.items() if name != "t"}
     write_scope(path, [(time, {name: ("", values) for name, values in given.items()})])
+
+
+def write_svdx(path: Path, signals: Signals) -> None:
+    """A project with a chart; its times have the resolution of 100 ns."""
+    given = {name: values.astype("<f8") for name, values in signals.items() if name != "t"}
+    time_s = clock_s(signals)
+    write_project(path, [Acquired(f"MAIN.{name}", time_s, values, name) for name, values in given.items()])
+
+
+def write_codesys(path: Path, signals: Signals) -> None:
+    """A trace in ms; where the signals have no time it is that of the rate."""
+    given = {name: values for name, values in signals.items() if name != "t"}
+    write_trace(path, {name: (clock_s(signals) * 1e3, values) for name, values in given.items()})
+
+
+def write_trace(
+    path: Path, variables: Mapping[str, tuple[Sequence[float], Sequence[object]]], flags: str = "Flags; 16"
+) -> None:
+    """A trace of CODESYS: of each variable its times, in the unit of the flags, and its values."""
+    lines = ["[key]; [value]", "IecTaskName; MainTask", "EveryNCycles; 1", flags]
+    for number, (name, (times, values)) in enumerate(variables.items()):
+        lines += [f"{number}.Variable; {name}", f"{number}.Class; 7", f"{number}.GraphColor; 4278190335"]
+        rows = [f"; {time:.9g}; {value}" for time, value in zip(times, values, strict=True)]
+        lines += [f"{number}.Data; ", *rows]
+    path.write_text("\r\n".join(lines) + "\r\n", encoding="utf-8", newline="")
 
 
 def write_scope(
@@ -288,6 +314,8 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "mdf": (".mf4", write_mdf),
     "sinumerik": (".xml", write_sinumerik),
     "lvm": (".lvm", write_lvm),
+    "codesys": (".csv", write_codesys),
+    "svdx": (".svdx", write_svdx),
     "twincat": (".csv", write_twincat),
     "ulog": (".ulg", write_ulog),
     "wav": (".wav", write_wav),
@@ -311,9 +339,11 @@ OWN_RATE = "sinumerik", "wav"
 CLOCKS = {
     "asc": "Log.time",
     "blf": "Log.time",
+    "codesys": "t",
     "mcap": "/log.header.stamp",
     "mdf": "t",
     "rosbag": "/log.header.stamp",
+    "svdx": "t",
     "twincat": "t",
     "ulog": "log.timestamp",
 }

@@ -139,8 +139,8 @@ def wrong_ones(snapshot: bytes) -> Iterator[tuple[bytes, tuple[str, ...]]]:
         yield flipped(snapshot, bit), ("state.not-a-state", *damaged)  # a magic, of it or of a stage inside
     yield encode(Stage("another", 1), {}), ("state.other-stage",)
     newer = ("state.newer-version",)
-    yield renewed(snapshot, encoding=2), newer
-    yield renewed(snapshot, version=2), newer
+    yield renewed(snapshot, encodings=1), newer
+    yield renewed(snapshot, versions=1), newer
     yield from ((inside, newer) for inside in newer_inside(snapshot))
 
 
@@ -151,10 +151,10 @@ def flipped(snapshot: bytes, bit: int) -> bytes:
     return bytes(data)
 
 
-def renewed(snapshot: bytes, *, encoding: int = 1, version: int = 1) -> bytes:
-    """As a newer livebode would write it."""
-    magic, _, _, length, check = struct.unpack_from("<4sHHII", snapshot)
-    head = struct.pack("<4sHHII", magic, encoding, version, length, check)
+def renewed(snapshot: bytes, *, encodings: int = 0, versions: int = 0) -> bytes:
+    """As a livebode newer by so many versions would write it."""
+    magic, encoding, version, length, check = struct.unpack_from("<4sHHII", snapshot)
+    head = struct.pack("<4sHHII", magic, encoding + encodings, version + versions, length, check)
     return head + struct.pack("<I", zlib.crc32(head)) + snapshot[HEAD_BYTES:]
 
 
@@ -165,7 +165,7 @@ def newer_inside(snapshot: bytes) -> Iterator[bytes]:
         length = list(parts.values())[-1]
         part = snapshot[len(snapshot) - length :]
         if part[:4] == snapshot[:4]:
-            yield snapshot[: len(snapshot) - length] + renewed(part, version=2)
+            yield snapshot[: len(snapshot) - length] + renewed(part, versions=1)
 
 
 def described(snapshot: bytes) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import numpy as np
 from livebode.configuration.axis import FitSection
 from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
 from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, SpectraTracker, Tracker
+from livebode.estimation.successive import SuccessiveTrackers
 from livebode.excitation import multisine
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.fitting.drift import DriftTest
@@ -130,6 +131,16 @@ def spectra_tracker() -> Case:
         processed(list(spectra())),
         [lambda: SpectraTracker(other, LAYOUT)],
     )
+
+
+def successive_trackers() -> Case:
+    """The second recording begins in the second step; odd lines have levels of distortion."""
+    odd = replace(SETTINGS, lines=Lines.of_bins((1, 3, 7), WINDOW, RATE_HZ))
+
+    def new() -> SuccessiveTrackers:
+        return SuccessiveTrackers([Tracker(odd), Tracker(odd)], [0, 777])
+
+    return Case(new, processed(cut(block(), 777, 1100)))
 
 
 @cache
@@ -269,7 +280,8 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, direct_tracker, local_polynomial, welch_average, spectra_tracker, motion_correction, fitter, drift,
-        monitor_by_model, monitor_by_tables, change_detection, fits, run_counts, stream_position,
+        tracker, direct_tracker, successive_trackers, local_polynomial, welch_average, spectra_tracker,
+        motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits, run_counts,
+        stream_position,
     )
 }  # fmt: skip

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from livebode.analysis.overview import Overview
 from livebode.core import PlantKinds, Response, Responses
 from livebode.estimation import Movement
-from livebode.fitting import RunningMean
+from livebode.fitting import RecordingsMean, RunningMean
 from livebode.records import RunRecord
 
 
@@ -58,12 +58,14 @@ def averaged(run: RunRecord) -> Averaged:
     SignalError, RecordError
         If no line is ever valid, or the run cannot be read.
     """
-    mean, overview, counted = RunningMean(), Overview(), _Counted(run)
+    mean, overview, counted = running_mean(run), Overview(), _Counted(run)
     for part in run.steady_batches():
         mean.add(part)
         overview.add(part)
         counted.add(part)
     one, words = mean.response()[0], f"the mean of {mean.rows} responses"
+    if isinstance(mean, RecordingsMean):
+        words += f" in {len(run.found['recordings'])} recordings"
     if mean.averages:
         words = f"the average up to {counted.begin_s + (one.sample + 1) / run.lines.rate_hz:.6g} s"
     found = Averaged(
@@ -82,6 +84,23 @@ def averaged(run: RunRecord) -> Averaged:
         return found
     words += f" from {found.spans[0]:.4g} to {found.spans[1]:.4g} of the schedule, whose change is in the bounds"
     return Averaged(**{**found.__dict__, "words": words})
+
+
+def running_mean(run: RunRecord) -> RunningMean | RecordingsMean:
+    """A mean for all responses of the run: of several recordings that of their means."""
+    recordings = run.found.get("recordings") or ()
+    if not recordings:
+        return RunningMean()
+    starts = [recording["first"] for recording in recordings]
+    return RecordingsMean(starts, realisations=bool(run.found.get("realisations")))
+
+
+def mean_of(run: RunRecord) -> Responses:
+    """Mean of all responses as a batch of one; SignalError if no line is ever valid."""
+    mean = running_mean(run)
+    for part in run.steady_batches():
+        mean.add(part)
+    return mean.response()
 
 
 class _Counted:

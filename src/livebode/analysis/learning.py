@@ -120,8 +120,9 @@ def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
     """Duplicated data would count as twice as much evidence."""
     seen: dict[Path, RunRecord] = {}
     for run, axis in zip(runs, axes):
-        for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()):
-            if thing is not None and thing in seen:
+        things = [path.resolve() for path in (run.path, *axis.source.logs)]
+        for thing in things:
+            if thing in seen:
                 raise BaselineError(
                     "run-repeated",
                     f"{str(run.path)!r} contains the same data as {str(seen[thing].path)!r}",
@@ -129,7 +130,7 @@ def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
                     path=str(run.path),
                     other=str(seen[thing].path),
                 )
-        seen |= {thing: run for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()) if thing}
+        seen |= dict.fromkeys(things, run)
 
 
 def _check_same(first: RunRecord, mine: Axis, run: RunRecord, axis: Axis) -> None:
@@ -190,7 +191,7 @@ def _machine(
         return None, "a model of the machine needs the torque and a scheduling position"
     if axes[0].tracking.quantity != "plant":
         return None, f"a model describes the plant, but the runs contain the {axes[0].tracking.quantity}"
-    if any(axis.source.log is None for axis in axes):
+    if any(len(axis.source.logs) != 1 for axis in axes):
         return None, "a model is learned from recordings, but not all of these runs are from one"
     report("learning a model of the moving machine from the recordings")
     try:

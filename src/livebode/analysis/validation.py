@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,7 @@ def validate_run(
             path=str(directory),
             role="input",
         )
-    notes = _freshness(own_words["source"].get("log"), log)
+    notes = _freshness(axis.source.logs, log)
     given = axis.source
     opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=[signals.output])
     if signals.excitation and "excitation" not in named and not opened.has(signals.excitation):
@@ -90,8 +91,8 @@ def validate_run(
     return judged, notes + refused
 
 
-def _freshness(own: str | None, log: Path) -> list[str]:
-    if own is None or Path(own).resolve() != log.resolve():
+def _freshness(own: Sequence[Path], log: Path) -> list[str]:
+    if log.resolve() not in [path.resolve() for path in own]:
         return []
     return [f"{log.name} is the recording of the run: this is not independent data, because the model was fitted to it"]
 

@@ -48,9 +48,9 @@ def export_command(
     if at is not None:
         parts = iter([Responses.of(export.at(record.batches(), at))])
     elif mean:
-        from livebode.fitting import mean_response
+        from livebode.analysis.averaged import mean_of
 
-        parts = iter([mean_response(record.steady_batches())])
+        parts = iter([mean_of(record)])
     else:
         parts = record.batches()
     written = export.save(path, lambda path: export.FORMATS[to](path, parts, record.summary), force=force)

@@ -10,7 +10,7 @@ from livebode.runtime import Document
 _KINDS = {
     "roles-doubtful", "transient", "outlying-periods", "phase-slip", "phase-slips", "restart", "replaced",
     "computer-clock", "foreign", "backlog", "backlog-cleared", "waiting", "window-doubtful",
-    "drift", "not-periodic",
+    "drift", "not-periodic", "distortion-levels", "best-linear-approximation", "recordings-differ",
 }  # fmt: skip
 _ONCE = {"foreign"}
 

@@ -51,6 +51,8 @@ def show(outcome: Outcome) -> None:
     found = outcome.summary["found"]
     for line in _judged(found):
         print(line)
+    if (between := outcome.summary.get("between")) is not None and not between["differs"]:
+        print(f"mean of {counted(between['recordings'], 'recording')}, which differ by no more than their noise")
     if (moving := found.get("motion", {}).get("model")) is not None:
         _show_moving(moving)
     if "fit" in outcome.summary:

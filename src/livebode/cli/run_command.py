@@ -23,7 +23,10 @@ from livebode.runtime.documents import TrackerResults
 
 
 def run_command(
-    target: Annotated[Path, typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or a configuration.")],
+    targets: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or several that are averaged, or a configuration."),
+    ],
     excitation: Excitation = None,
     output: Outputs = None,
     input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
@@ -143,8 +146,16 @@ def run_command(
     }
     specified = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
     over = {section: values for section, values in specified.items() if values} | ({"record": {}} if go_on else {})
+    target = targets[0]
+    if len(targets) > 1 and any(path.suffix.lower() == ".toml" for path in targets):
+        raise UsageError(
+            "conflict",
+            "a configuration cannot be combined with other arguments",
+            "list the recordings in its source.log",
+            argument="log",
+        )
     file = ConfigurationFile(target, over) if target.suffix.lower() == ".toml" else None
-    axes: Axes = _axes(target, over, output or []) if file is None else file.read()
+    axes: Axes = _axes(targets, over, output or []) if file is None else file.read()
     if file is not None and len(output or []) > 1:
         raise UsageError(
             "conflict",
@@ -176,22 +187,22 @@ def _serving(axes: Axes) -> ServeSection:
     return first.serve
 
 
-def _axes(target: Path, specified: dict[str, dict[str, Any]], outputs: list[str]) -> Axes:
-    """The configuration of a recording; of several outputs one axis for each, with a name that a directory can have."""
+def _axes(recordings: list[Path], specified: dict[str, dict[str, Any]], outputs: list[str]) -> Axes:
+    """The configuration of recordings; of several outputs one axis for each, with a name that a directory can have."""
     if len(outputs) < 2:
-        return {"": _axis(target, specified)}
+        return {"": _axis(recordings, specified)}
     found: dict[str, Axis] = {}
     for number, output in enumerate(outputs, 1):
         name = re.sub(r"[^A-Za-z0-9_]+", "_", output).strip("_")[:48] or "output"
         if name.casefold() in map(str.casefold, found):
             name = f"{name}_{number}"
         signals = specified.get("signals", {}) | {"output": output}
-        found[name] = _axis(target, specified | {"signals": signals})
+        found[name] = _axis(recordings, specified | {"signals": signals})
     return found
 
 
-def _axis(target: Path, specified: dict[str, dict[str, Any]]) -> Axis:
-    """The configuration of a recording from the options."""
+def _axis(recordings: list[Path], specified: dict[str, dict[str, Any]]) -> Axis:
+    """The configuration of recordings from the options."""
     if "output" not in specified.get("signals", {}):
         raise UsageError(
             "missing",
@@ -199,7 +210,8 @@ def _axis(target: Path, specified: dict[str, dict[str, Any]]) -> Axis:
             "give --output CHANNEL (livebode inspect lists the channels)",
             argument="output",
         )
-    return Axis.of(specified | {"source": specified.get("source", {}) | {"log": target}}, "the options")
+    log = recordings if len(recordings) > 1 else recordings[0]
+    return Axis.of(specified | {"source": specified.get("source", {}) | {"log": log}}, "the options")
 
 
 def _window(text: str | None) -> int | str | None:

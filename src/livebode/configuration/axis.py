@@ -502,6 +502,13 @@ class Axis(_Section):
                 "set source.log for a recording, or source.url for a live source",
                 key="source",
             ).at(origin)
+        if len(axis.source.logs) > 1 and (keys := _of_one_recording(axis)):
+            raise ConfigError(
+                "key-conflict",
+                f"{keys[0]} does not apply to several recordings in one run",
+                "omit it, or track each recording in a run of its own",
+                keys=["source.log", keys[0]],
+            ).at(origin)
         if axis.source.url is not None:
             checked_address(axis.source.url, axis.source)
         return axis
@@ -514,6 +521,18 @@ class Axis(_Section):
             return axis
         monitoring = axis.monitoring.model_copy(update={"baseline": folder / baseline})
         return axis.model_copy(update={"monitoring": monitoring})
+
+
+def _of_one_recording(axis: Axis) -> list[str]:
+    """Keys that are set and need a single recording."""
+    given = {
+        "source.follow": axis.source.follow,
+        "[record] (option --continue)": axis.record is not None,
+        "[motion]": axis.motion is not None,
+        "monitoring.baseline": axis.monitoring.baseline is not None,
+        f"tracking.estimator {axis.tracking.estimator!r}": axis.tracking.estimator in ("lpm", "welch"),
+    }
+    return [key for key, there in given.items() if there]
 
 
 def _first_of(error: ValidationError) -> ConfigError:

@@ -7,11 +7,11 @@ from livebode.sources import Log, open_log
 
 
 def open_recording(axis: Axis) -> Log:
-    """Open `source.log` as [source] describes it, at the clock of the output; LivebodeError if it cannot be read."""
+    """Open the one recording in [source] at the clock of the output; LivebodeError if it cannot be read."""
     source = axis.source
-    assert source.log is not None
+    (path,) = source.logs
     return open_log(
-        source.log,
+        path,
         rate_hz=source.rate_hz,
         time=source.time,
         kinds=source.kinds,

@@ -76,6 +76,8 @@ class StatefulBase:
             then.
         """
         state, before = decode(self._stage, snapshot, self._identity), self.snapshot()
+        if (version := _head(self._stage, snapshot)[0]) < self._stage.version:
+            state = self._converted(state, version)
         try:
             self._load(state)
         except _INVALID as error:
@@ -83,6 +85,10 @@ class StatefulBase:
             if isinstance(error, StateError):
                 raise
             _damaged(self._stage, f"invalid value ({error})")
+
+    def _converted(self, state: dict[str, Any], version: int) -> dict[str, Any]:  # noqa: ARG002 - for subclasses
+        """The values of a state of an older version as this version has them."""
+        return state
 
     @property
     def _identity(self) -> str:

@@ -32,8 +32,8 @@ def _check(axis: str, settings: SourceSettings) -> Check:
     name = f"{NAME} of {axis}" if axis else NAME
     try:
         if settings.url is None:
-            assert settings.log is not None
-            return _recording(name, settings.log)
+            found = [_recording(name, path) for path in settings.logs]
+            return next((check for check in found if check.verdict != "ok"), found[0])
         address = make_source(settings).address
     except LivebodeError as error:
         return Check.of_error(name, error)

@@ -13,6 +13,7 @@ from livebode.core import Block, Channel, Event, QuantityKind, Stage, StatefulBa
 from livebode.core.steps import step_of
 from livebode.estimation.bounds import power
 from livebode.estimation.distortion import Distortion, reached
+from livebode.estimation.levels import DistortionLevels
 from livebode.estimation.mains import Mains
 from livebode.estimation.moments import Moments, PeriodMoments
 from livebode.estimation.movement import PLACES, Movement
@@ -54,12 +55,17 @@ class RepeatingErrors(StatefulBase):
     ----------
     settings
         Lines, signals and estimator.
+
+    Attributes
+    ----------
+    levels
+        Even and odd distortion.
     """
 
-    _stage = Stage("repeating-errors", 1)
+    _stage = Stage("repeating-errors", 2)
     _STATE = (
         "_samples", "_position", "_output", "_told", "_at", "_whole", "_largest", "_step", "_periods", "_moments",
-        "_movement", "_silence",
+        "_movement", "_silence", "levels",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, events: list[Event] | None = None) -> None:
@@ -78,6 +84,7 @@ class RepeatingErrors(StatefulBase):
         self._at, self._whole, self._largest, self._step = 0, False, 0.0, 0.0
         self._looked = slice(0, None, -(-lines.window // PLACES))
         self._movement = Movement(self._position[self._looked].size)
+        self.levels = DistortionLevels(settings)
         self._forget()
         self._now = np.full(len(lines), np.nan), np.zeros((len(_KINDS), len(lines)), dtype=np.bool_)
         self._silence = SilentHum(len(lines))
@@ -86,6 +93,7 @@ class RepeatingErrors(StatefulBase):
         self._events = [] if events is None else events
 
     def _forget(self) -> None:
+        self.levels.end_stretch()
         self._moments = PeriodMoments(1, len(self._bins), 1.0, own=True)
         self._output = np.zeros(self._mains.bins.size, dtype=np.complex128)
         self._periods = 0
@@ -97,6 +105,10 @@ class RepeatingErrors(StatefulBase):
         super()._load(state)
         self._now = state["distortion"], state["invalid"]
 
+    def _converted(self, state: dict[str, Any], version: int) -> dict[str, Any]:
+        """Version 1 has no levels."""
+        return {"levels": DistortionLevels(self._settings).snapshot()} | state if version < 2 else state
+
     def judged(self) -> dict[str, Any]:
         """For a record: the lines with a reason against them, and the newest distortion at each."""
         f = self._settings.lines.frequency_hz
@@ -106,7 +118,12 @@ class RepeatingErrors(StatefulBase):
             "distortion": known,
             "invalid_lines_hz": reasons,
             "mains_lines_hz": f[self._mains.lines.any(axis=0)].tolist(),
-        }
+        } | ({"levels": levels} if (levels := self.levels.plain()) else {})
+
+    def finish(self, sample: int, time_s: float) -> None:
+        """Report the levels of even and odd distortion, at the end of the samples."""
+        if message := self.levels.sentence():
+            self._events.append(Event("distortion-levels", sample, time_s, message))
 
     def restart(self, sample: int) -> None:
         """The next sample has this number and does not follow the previous one."""
@@ -184,6 +201,7 @@ class RepeatingErrors(StatefulBase):
         three = np.stack([spectra["output"], spectra[method.denominator], reference])[:, np.newaxis]
         powers = np.stack([power(reference), power(spectra["output"]), *2 * [np.zeros(len(self._bins))]])
         moments = self._moments.update(0, three, powers[:, np.newaxis], np.zeros((3, 1)), np.array([True]))
+        self.levels.take(every)
         self._periods += 1
         self._output += (output - self._output) / self._periods
         # Where the first period shows no step, few others do: the search takes as long as the rest of a period.

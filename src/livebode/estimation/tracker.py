@@ -70,6 +70,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._speed = RippleSpeed(settings.lines) if settings.ripple else None
         self._repeating = RepeatingErrors(settings, self._events) if repeating else None
         self._watch = InputStatistics(self._events, window)
+        self._end = 0, 0.0
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
@@ -98,6 +99,11 @@ class Tracker(StreamEstimator[InputStatistics]):
     def leave_out(self, samples: NDArray[np.int64]) -> None:
         """Numbers of samples, ascending: no window that contains one of them counts."""
         self._spectra.left_out = samples
+
+    def continue_levels(self, before: Tracker) -> None:
+        """Add what `before` found of even and odd distortion in an earlier recording."""
+        if self._repeating is not None and before._repeating is not None:
+            self._repeating.levels.add(before._repeating.levels)
 
     def process(self, block: Block, emit: Emit = ignore) -> Responses:
         """Responses at the hops of this Block, which follows the previous one.
@@ -129,5 +135,13 @@ class Tracker(StreamEstimator[InputStatistics]):
             ripple = ripple_power(s.ripple, s.lines, self._speed.at(schedule, rows.sample - block.start))
         responses = self._lines.process(rows, place, centre, block.channels, repeating, ripple)
         self._nothing = responses[0:0]
+        self._end = block.stop - 1, block.origin_s + (block.stop - 1) / block.rate_hz
         hand_over(self._events, emit)
         return responses
+
+    def finish(self, emit: Emit = ignore, /) -> Responses | None:
+        """An empty batch, None where no samples came; reports even and odd distortion, if the lines show them."""
+        if self._repeating is not None:
+            self._repeating.finish(*self._end)
+        hand_over(self._events, emit)
+        return super().finish()

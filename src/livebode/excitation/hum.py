@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.core.mains import MAINS_HZ, meets_mains
 from livebode.excitation.blocks import cut, spectra
+from livebode.excitation.doubtful import with_lines_beside
 from livebode.excitation.significance import BinClasses, find_lines
 
 Floats = NDArray[np.float64]
@@ -20,6 +21,8 @@ _NEAR_BINS = 0.1  # the period is a multiple of the hum's, otherwise the recordi
 _POWER_MAX, _LEVEL_MAX = 0.1, 0.5
 _WEAK = 0.1  # of the strongest line
 _ORDER_MAX = 2  # of the lowest hum: 50 Hz, or 100 Hz of a rectifier
+_BELOW_ORDER = 6.5  # hum begins there, at the sixth harmonic of a six-pulse rectifier, at the latest
+_BELOW_BESIDE = 0.125  # 18 dB below the lines on both sides: the amplitudes of a design are smooth
 _FAR_BELOW = 0.05  # 26 dB: few designs have lines that far apart, and then hardly at the mains alone
 
 
@@ -37,27 +40,32 @@ def without_mains(calm: Floats, period: int, rate_hz: float, step: float) -> int
     step
         The samples are multiples of it; 0 for none.
     """
-    found = find_lines(spectra(cut(calm, period)), step=step)
+    found = with_lines_beside(find_lines(spectra(cut(calm, period)), step=step), rate_hz / period)
     bins = np.flatnonzero(found.excited)
     level, resolution_hz = found.amplitude[bins], rate_hz / period
-    at_mains = [_at_harmonics(bins, resolution_hz, mains_hz) for mains_hz in MAINS_HZ]
+    at_mains = [(mains_hz, _at_harmonics(bins, resolution_hz, mains_hz)) for mains_hz in MAINS_HZ]
     for shorter in (divisor for divisor in range(1, period) if period % divisor == 0):
         on = bins % (period // shorter) == 0
         if on.all() and bins.size:
             return shorter
-        if on.any() and any(at[~on].all() for at in at_mains) and _weaker(level[~on], level[on]):
+        hum = [hz for hz, at in at_mains if at[~on].all() and np.min(bins[~on]) * resolution_hz < hz * _BELOW_ORDER]
+        if on.any() and hum and _weaker(level[~on], level[on]):
             return shorter
     return period
 
 
 def separate_hum(found: BinClasses, resolution_hz: float) -> BinClasses:
-    """Count weak lines at harmonics of the mains as distortion, if all other lines are much stronger."""
+    """Count weak lines at harmonics of the mains as distortion, if all lines, or those beside, are much stronger."""
     bins = np.flatnonzero(found.excited)
     level = found.amplitude[bins]
     for mains_hz in MAINS_HZ:
-        weak = _at_harmonics(bins, resolution_hz, mains_hz) & (level <= _FAR_BELOW * level.max())
+        at = _at_harmonics(bins, resolution_hz, mains_hz)
+        weak = at & (level <= _FAR_BELOW * level.max())
+        if weak.any() and level[weak].max() > _FAR_BELOW * level[~weak].min():
+            weak[:] = False
+        weak |= at & (level <= _BELOW_BESIDE * _beside(level, at))
         order = np.rint(bins[weak] * resolution_hz / mains_hz)
-        if np.any(order <= _ORDER_MAX) and level[weak].max() <= _FAR_BELOW * level[~weak].min():
+        if np.any(order <= _ORDER_MAX):
             hum = np.isin(np.arange(found.excited.size), bins[weak])
             return replace(found, excited=found.excited & ~hum, distortion=found.distortion | hum)
     return found
@@ -65,6 +73,16 @@ def separate_hum(found: BinClasses, resolution_hz: float) -> BinClasses:
 
 def _at_harmonics(bins: NDArray[np.intp], resolution_hz: float, mains_hz: float) -> NDArray[np.bool_]:
     return meets_mains(bins, resolution_hz, (mains_hz,), _NEAR_BINS + _MAINS_DRIFT * bins)
+
+
+def _beside(level: Floats, at: NDArray[np.bool_]) -> Floats:
+    """Of each line the weaker one of its neighbours that are not at the mains; 0 without one on both sides."""
+    others = np.flatnonzero(~at)
+    after = np.searchsorted(others, np.arange(level.size))
+    inside = (after > 0) & (after < others.size)
+    weaker = np.zeros(level.size)
+    weaker[inside] = np.minimum(level[others[after[inside] - 1]], level[others[after[inside]]])
+    return weaker
 
 
 def _weaker(hum: Floats, lines: Floats) -> bool:

@@ -13,6 +13,7 @@ from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.evidence import log_chance
 from livebode.excitation.extent import extent
 from livebode.excitation.hum import without_mains
+from livebode.excitation.longer import longer_period
 from livebode.excitation.prepare import clipped, whitened
 from livebode.excitation.repetition import LAG_MIN, ROUNDING, best_lag, difference
 from livebode.excitation.significance import FALSE_ALARM, find_lines
@@ -38,9 +39,9 @@ def find_period(x: Floats, rate_hz: float, step: float) -> tuple[int, int, int]:
     the shortest lag with the least difference. 3. Among its neighbours, select the one whose periods add up to the most
     power. 4. The version with the stronger evidence decides; reject it if a recording without a period would reach this
     with a probability above 1e-3 for all lags and both versions together. 5. Divide by the common factor of all excited
-    bins; multiply by 2 or 3 where that finds lines in between. 6. Reject it if the lines change more than noise
-    explains, or if the recording repeats better after more than its half. 7. Take the shortest divisor at whose
-    harmonics all lines are, except mains hum and the error of rounding.
+    bins; multiply where that finds lines in between, or makes a fractional period whole. 6. Reject it if the lines
+    change more than noise explains, or if the recording repeats better after more than its half. 7. Take the shortest
+    divisor at whose harmonics all lines are, except mains hum and the error of rounding.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def find_period(x: Floats, rate_hz: float, step: float) -> tuple[int, int, int]:
         )
     calm = clipped(x)
     calm -= calm.mean()
-    period = _fundamental_of(calm)
+    period = _fundamental_of(calm, rate_hz)
     start, stop = extent(calm, period)
     shorter = without_mains(calm[start:stop], period, rate_hz, step)
     if shorter < period:
@@ -80,12 +81,12 @@ def find_period(x: Floats, rate_hz: float, step: float) -> tuple[int, int, int]:
     return shorter, start, stop
 
 
-def _fundamental_of(calm: Floats) -> int:
+def _fundamental_of(calm: Floats, rate_hz: float) -> int:
     # Most periods are short compared with a long recording; a part in its middle finds them as well in less time.
     if calm.size > _PART:
         middle = calm[calm.size // 2 - _PART // 2 :][:_PART]
         try:
-            return _sharpened(calm, difference(calm), _fundamental_of(middle), 1)
+            return _sharpened(calm, difference(calm), _fundamental_of(middle, rate_hz), 1)
         except SignalError:
             pass
     flat, peaks = whitened(calm)
@@ -101,6 +102,7 @@ def _fundamental_of(calm: Floats) -> int:
     if evidence <= needed:
         start, stop = extent(view, period)
         fundamental = _fundamental(view[start:stop], period, (d, prominent))
+        fundamental = longer_period(view[start:stop], fundamental, rate_hz, d)
     if short := _too_short(flat, d, fundamental):
         raise short
     repeats = min(d[fundamental], prominent[fundamental]) <= _DIFFERENT_MAX

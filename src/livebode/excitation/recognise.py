@@ -11,6 +11,7 @@ from livebode.core import Lines, SignalError, UsageError
 from livebode.core.steps import step_of
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.crest import peak_and_rms
+from livebode.excitation.doubtful import refuse_if_doubtful, with_lines_beside, without_junk
 from livebode.excitation.extent import extent
 from livebode.excitation.hum import separate_hum
 from livebode.excitation.period import find_period
@@ -100,6 +101,7 @@ def recognise(
     *,
     floor_db: float = FLOOR_DB,
     gap_db: float = GAP_DB,
+    doubtful: bool = False,
 ) -> Excitation:
     """The period of an excitation, its lines, crest factor, transient periods, and the SNR at an output.
 
@@ -111,16 +113,20 @@ def recognise(
     rate_hz
         Samples per second.
     output
-        Signal to measure the SNR and the transient at, shape (samples,), the same samples.
+        Signal to measure the SNR and the transient at, shape (samples,), the same samples. Lines 26 dB below the others
+        that are below its noise count as distortion.
     floor_db, gap_db
         Level below the strongest line at which a bin counts as not excited, and step in the amplitudes that separates
         the lines from their distortion; see `find_lines`.
+    doubtful
+        Whether lines are accepted where another set explains the excitation equally well, because only its period
+        matters.
 
     Raises
     ------
     LivebodeError
         If a channel is empty, constant, not finite or of the wrong length, nothing repeats, less than two periods were
-        recorded, or no line exceeds the noise.
+        recorded, no line exceeds the noise, or two sets of lines explain it equally well.
 
     Examples
     --------
@@ -152,6 +158,12 @@ def recognise(
         strange = strange | also
     steady = ~strange if np.sum(~strange) >= 2 else np.ones(len(blocks), dtype=np.bool_)
     found = separate_hum(find_lines(spectra(blocks[steady]), floor_db, gap_db, step), rate_hz / period)
+    found = with_lines_beside(found, rate_hz / period)
+    ratio_db = None if replies is None else snr_db(spectra(replies[steady]))
+    if ratio_db is not None:
+        found = without_junk(found, ratio_db)
+    if not doubtful:
+        refuse_if_doubtful(found, period, rate_hz)
     if not found.excited.any():
         raise _no_line(period, len(blocks))
     peak, rms = peak_and_rms(blocks[steady].mean(axis=0))
@@ -168,7 +180,7 @@ def recognise(
         transient=tuple(range(ahead)),
         outlying=tuple(m for m in _numbers(strange) if m >= ahead),
         slips=slips,
-        snr_db=None if replies is None else snr_db(spectra(replies[steady])[:, found.excited]),
+        snr_db=None if ratio_db is None else ratio_db[found.excited],
     )
 
 

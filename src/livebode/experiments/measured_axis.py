@@ -7,13 +7,13 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from livebode.analysis.averaged import mean_of
 from livebode.configuration.axis import LoopSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import ConfigError, read_unit, split_plant_unit
 from livebode.experiment_design import Machine, MeasuredResponse, measured_machine
 from livebode.experiment_design.machine import MOTION_KEYS
 from livebode.experiment_design.measured import Output
-from livebode.fitting import mean_response
 from livebode.records import RunRecord
 
 Number = Annotated[float, Field(strict=True)]  # true is not a number
@@ -94,7 +94,7 @@ class MeasuredAxis:
         section, rate_hz = self._section, self._run.lines.rate_hz
         motion = {name: getattr(section, key) for name, key in MOTION_KEYS.items() if getattr(section, key) is not None}
         return measured_machine(
-            MeasuredResponse.of(mean_response(self._run.steady_batches())), self._loop.build(rate_hz), rate_hz,
+            MeasuredResponse.of(mean_of(self._run)), self._loop.build(rate_hz), rate_hz,
             output=self._output(), radius_m=section.radius_m, noise=section.noise, motion=motion,
             stroke_s=section.stroke_s, notes=self._notes(), encoder_counts_per_turn=section.encoder_counts_per_turn,
         )  # fmt: skip

@@ -9,12 +9,14 @@ from livebode.fitting.once import Fit, best_of, fit, fit_of
 from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel
 from livebode.fitting.rational import fit_rational
 from livebode.fitting.rational_model import Rational, rational_of
+from livebode.fitting.recordings import Between, RecordingsMean
 from livebode.fitting.three_mass import ThreeMass
 from livebode.fitting.unknown_gain import TwoMassGain
 
 __all__ = [
     "MODELS",
     "POLE_MODELS",
+    "Between",
     "CommonPoles",
     "EvaluationGrid",
     "Fit",
@@ -22,6 +24,7 @@ __all__ = [
     "Parameter",
     "PhysicalModel",
     "Rational",
+    "RecordingsMean",
     "Rigid",
     "RunningMean",
     "ThreeMass",

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Responses, SignalError
+from livebode.core import Response, Responses, SignalError
 from livebode.fitting.drift import DriftTest
 from livebode.fitting.line_verdicts import LineVerdicts
 
@@ -150,13 +150,32 @@ class RunningMean:
             )
         return _without(newest, ~valid) if self.averages else self._mean_of_all(newest, verdict.distortion, valid)
 
-    def _mean_of_all(self, newest: Responses, distortion: Floats, valid: NDArray[np.bool_]) -> Responses:
+    def without_distortion(self) -> tuple[Response, Complex]:
+        """The present mean with the sigma and the degrees of freedom of its noise alone, and its weight, (lines,).
+
+        Sigma is NaN at a line with fewer than two windows.
+        """
+        one = self.response()[0]
+        if self.averages:
+            of_noise = np.sqrt(np.maximum(one.sigma**2 - np.nan_to_num(one.distortion, posinf=0.0) ** 2, 0.0))
+            return replace(one, sigma=of_noise), one.weight
+        scatter, windows = self._scatter(one.valid)
+        several = windows >= 2
+        dof = float(np.min(windows - 1, where=several, initial=np.inf))
+        return replace(one, sigma=np.where(several, scatter, np.nan), dof=dof), self._pair.denominator
+
+    def _scatter(self, valid: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+        """Standard deviation of the mean by the scatter of the responses, and the number of windows without overlap."""
         pair = self._pair
         count = np.where(valid, pair.count, np.nan)
         with np.errstate(invalid="ignore", divide="ignore"):
             windows = count**2 / self._overlap.total()
-            scatter = np.sqrt(pair.unexplained() / count / (windows - 1)) / np.abs(pair.denominator)
-            value = pair.numerator / pair.denominator
+            return np.sqrt(pair.unexplained() / count / (windows - 1)) / np.abs(pair.denominator), windows
+
+    def _mean_of_all(self, newest: Responses, distortion: Floats, valid: NDArray[np.bool_]) -> Responses:
+        scatter, windows = self._scatter(valid)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            value = self._pair.numerator / self._pair.denominator
         several = windows >= 2
         single = np.where(np.isfinite(self._least), self._least, np.nan)
         added = np.where(np.isfinite(distortion) & valid, distortion, 0.0)
@@ -258,7 +277,8 @@ class _Overlap:
         self._advance(int(self._stop[-1]) - self._window)  # no later window begins before that
 
     def total(self) -> Floats:
-        self._advance(int(self._stop[-1]))
+        if self._stop.size:
+            self._advance(int(self._stop[-1]))
         return self._sum
 
     def _advance(self, until: int) -> None:

@@ -11,6 +11,16 @@ SENTENCES = (
     "the response drifts during the recording, most at {line} Hz: by {percent} % ± {bound} % from the beginning to the "
     "end",
     "the bound of a mean contains the drift",
+    "distortion at the detection lines, relative to the output at a line: even {even}, odd {odd}",
+    "noise of the mean over {periods} periods {noise} dB",
+    "best linear approximation of {count} realisations: stochastic distortion, relative to the output at a line, "
+    "{level}",
+    "noise of the mean {level}",
+    "the {count} recordings differ by more than their noise: by {level} dB relative to the output at a line",
+    "the bound of the mean contains the difference",
+    "in {recording}: {event}",
+    "{level} dB",
+    "below {level} dB",
     "{count} samples are missing before sample {sample}",
     "an unknown number of samples is missing before sample {sample}",
     "responses are invalid until a window of {window} samples is complete again",
@@ -210,6 +220,7 @@ SENTENCES = (
     "the moved mass and {rest}",
     "the belt's damping and {rest}",
     "the mean of {count} responses",
+    "the mean of {count} responses in {recordings} recordings",
     "the mean of {count} responses from {low} to {high} of the schedule, whose change is in the bounds",
     "the average up to {time} s",
     "the average up to {time} s from {low} to {high} of the schedule, whose change is in the bounds",
@@ -285,7 +296,8 @@ SENTENCES = (
 """Templates of sentences."""
 
 NAMES = (
-    ".", ";", "the belt's stiffness", "the moved mass", "the belt's damping", "the motor's inertia",
+    ".", ";", "not measurable", "not significant", "not known",
+    "the belt's stiffness", "the moved mass", "the belt's damping", "the motor's inertia",
     "belt's stiffness", "moved mass", "belt's damping", "motor's inertia", "mode", "mode damping",
     "residual compliance", "mode gain", "lag", "rad/s² per unit of input", "deg", "none", "before", "after",
     "samples were lost", "friction, backlash or sensor steps; increase the excitation, or move the axis",
@@ -301,8 +313,10 @@ NAMES = (
     "resonance 1 q", "resonance 2 q", "antiresonance 1 q", "antiresonance 2 q", "gain may rise by",
     "gain may fall by", "peak sensitivity Ms", "gain margin", "gain reduction", "phase margin", "delay margin",
     "peak sensitivity", "bandwidth", "acknowledged", "backlog", "backlog-cleared", "baseline-unknown", "change",
+    "best-linear-approximation", "recordings-differ",
     "change-cleared", "change-corrected", "clock-jump", "computer-clock", "configuration-applied",
-    "configuration-postponed", "configuration-refused", "connected", "disconnected", "distorted", "doubtful", "drift",
+    "configuration-postponed", "configuration-refused", "connected", "disconnected", "distorted",
+    "distortion-levels", "doubtful", "drift",
     "fit-failed", "fit-resumed", "foreign", "gap", "held", "hum", "hum-gone", "implausible", "layout-changed", "loss",
     "malformed", "missing", "noise-from-detection-lines", "non-finite", "not-periodic", "not-whole",
     "outlying-periods", "overflow", "phase-slip", "phase-slips", "record-closed", "record-continued",

@@ -166,7 +166,7 @@ def inspect(
             w = beginning(log, excitation)
             found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
         except LivebodeError as error:
-            if quiet is None and error.code not in _NOT_REPEATING:
+            if quiet is None and error.code not in (*_NOT_REPEATING, "signal.lines-ambiguous"):
                 raise
             unrecognised, repeats = str(error), error.code not in _NOT_REPEATING
     return Inspection(log, contents, found, quiet, unrecognised, without_rate, repeats)
@@ -191,5 +191,5 @@ def _periods_in(log: Log, excitation: str | None) -> tuple[int, int]:
             "name the excitation, or give the limit in seconds or samples",
             argument="excitation",
         )
-    found = recognise(beginning(log, excitation), log.rate_hz)
+    found = recognise(beginning(log, excitation), log.rate_hz, doubtful=True)
     return log.first + found.start, found.period

@@ -206,8 +206,9 @@ def make_lines(axis: Axis, log: Log) -> Lines:
     samples = beginning(log, reference)
     if window != "auto":
         return lines_of_window(samples, window, log.rate_hz)
-    found = recognise(samples, log.rate_hz)
-    return found.lines if frequencies == "auto" else Lines.parse(frequencies, log.rate_hz, found.period)
+    if frequencies == "auto":
+        return recognise(samples, log.rate_hz, beginning(log, axis.signals.output)).lines
+    return Lines.parse(frequencies, log.rate_hz, recognise(samples, log.rate_hz, doubtful=True).period)
 
 
 def beginning(log: Log, channel: str, samples: int = SEARCHED) -> np.ndarray:

@@ -36,7 +36,7 @@ def divided_window(samples: np.ndarray, settings: Settings) -> list[Event]:
 
     window = settings.lines.window
     try:
-        period = recognise(samples, settings.lines.rate_hz).period
+        period = recognise(samples, settings.lines.rate_hz, doubtful=True).period
     except LivebodeError:  # the person knows better
         return []
     longest = max(window, period)

@@ -33,6 +33,12 @@ class _Samples(_Part):
     stop: Count | None
 
 
+class _Recording(_Part):
+    file: Text
+    first: Count
+    stop: Count
+
+
 class _Found(_Part):
     rate_hz: Annotated[float, Field(gt=0)]
     window: Positive
@@ -48,6 +54,8 @@ class _Found(_Part):
     format: Text | None = None
     rate_from: Text | None = None
     part: _Samples | None = None
+    recordings: list[_Recording] = []
+    realisations: bool = False
 
 
 class _Speed(_Part):
@@ -83,6 +91,7 @@ class _Summary(_Part):
     loop: Section | None = None
     monitoring: Section | None = None
     drift: Section | None = None
+    between: Section | None = None
     record: _Record | None = None
     left_out_samples: Count | None = None
     clock: list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None = None

@@ -6,7 +6,7 @@ from typing import Any
 
 from livebode.core.document import Paragraph, Section
 from livebode.language import listed, marked, number, recognised, tr, trn
-from livebode.reporting.report_data import ReportData
+from livebode.reporting.report_data import ReportData, recordings
 from livebode.reporting.wording import duration, pairs
 
 _ESTIMATOR = {
@@ -42,7 +42,7 @@ def how(of: ReportData) -> Section:
     f = of.run.lines.frequency_hz
     source = of.configuration.get("source", {})
     rows = [
-        (tr("source"), str(source.get("log") or source.get("url") or "")),
+        (tr("source"), listed(recordings(source)) or str(source.get("url") or "")),
         (tr("format"), str(found.get("format", ""))),
         *((recognised(_ROLES[role]), of.channels[role]) for role in _ROLES if role in of.channels),
         (tr("rate"), f"{number(found['rate_hz'], 'g')} Hz" + _rate_from(found)),

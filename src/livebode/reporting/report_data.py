@@ -71,7 +71,10 @@ class ReportData:
     def title(self) -> str:
         """Name of the recording or source, for titles."""
         source = self.configuration.get("source", {})
-        name = Path(source["log"]).name if "log" in source else source.get("url", "")
+        files = recordings(source)
+        name = source.get("url", "") if not files else Path(files[0]).name
+        if len(files) > 1:
+            name = tr("{file} and {count} more", file=name, count=len(files) - 1)
         if "demo" in self.configuration:
             name = tr("simulated belt axis")
         return str(name or self.run.path.name)
@@ -133,6 +136,12 @@ def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple
     except LivebodeError as error:
         return None, tr("No margins: {why}.", why=recognised(str(error)))
     return replace(found, responses=Responses.of(of.response)), ""
+
+
+def recordings(source: dict[str, Any]) -> list[str]:
+    """The recordings in a [source]."""
+    files = source.get("log") or []
+    return files if isinstance(files, list) else [files]
 
 
 def written(path: Path) -> str:

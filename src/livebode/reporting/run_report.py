@@ -9,14 +9,15 @@ from livebode.core.clock import date_and_time, moment
 from livebode.core.document import Document, Paragraph, Section
 from livebode.language import tr
 from livebode.reporting import sections
+from livebode.reporting.distortion import distortion
 from livebode.reporting.measured import how
-from livebode.reporting.report_data import Judged, ReportData, read, written
+from livebode.reporting.report_data import Judged, ReportData, read, recordings, written
 from livebode.reporting.verdict import verdict
 from livebode.reporting.wording import duration
 
 _SECTIONS = (
-    how, sections.response, sections.tracking, sections.parameters, sections.motion, sections.margins, sections.events,
-    sections.quality, sections.validation, sections.settings, sections.versions,
+    how, sections.response, distortion, sections.tracking, sections.parameters, sections.motion, sections.margins,
+    sections.events, sections.quality, sections.validation, sections.settings, sections.versions,
 )  # fmt: skip
 
 
@@ -58,18 +59,24 @@ def run_report(directory: Path, judged: Judged | None = None, *, made: datetime)
 def facts(of: ReportData, made: datetime) -> tuple[tuple[str, str], ...]:
     """The title block."""
     source = of.configuration.get("source", {})
-    log, first_s, last_s = source.get("log"), *of.of.spans_s
+    files, first_s, last_s = recordings(source), *of.of.spans_s
     begun = (of.run.summary.get("source") or {}).get("clock_offset_s")
     rows = (
         (tr("machine"), of.title),
-        (tr("source"), str(source.get("url", "")) if "url" in source else tr("a recording") if log else ""),
+        (tr("source"), str(source.get("url", "")) if "url" in source else _kind(files)),
         (tr("run"), of.run.path.resolve().name),
         (tr("run's clock"), f"{moment(first_s, 2)} … {moment(last_s, 2)}"),
         (tr("started"), date_and_time(float(begun)) if begun is not None else ""),
         (tr("duration"), duration(of.samples / of.run.lines.rate_hz)),
-        (tr("recording written"), written(Path(log)) if log else ""),
+        (tr("recording written"), written(Path(files[-1])) if files else ""),
         (tr("run written"), written(of.run.path / "run.json")),
         (tr("report written"), date_and_time(made.timestamp())),
         ("livebode", str(of.run.summary.get("versions", {}).get("livebode", ""))),
     )
     return tuple((name, value) for name, value in rows if value)
+
+
+def _kind(files: list[str]) -> str:
+    if len(files) > 1:
+        return tr("{count} recordings", count=len(files))
+    return tr("a recording") if files else ""

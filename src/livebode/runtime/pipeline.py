@@ -9,6 +9,7 @@ from livebode.configuration.axis import Axis
 from livebode.core import Channel, LivebodeError, SignalError, Stateful, nearest_name
 from livebode.estimation import plant_kinds
 from livebode.estimation.stream_estimator import Follower
+from livebode.fitting import RecordingsMean
 from livebode.fitting.drift import DriftTest
 from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection, change_detection
@@ -32,6 +33,8 @@ class Pipeline:
         Detects changes, or reports that it cannot.
     drift
         Tests whether the machine drifts within a recording.
+    recordings
+        The mean of several recordings.
     """
 
     follower: Follower
@@ -39,6 +42,7 @@ class Pipeline:
     detection: ChangeDetection | None = None
     axis: Axis | None = None
     drift: DriftTest | None = None
+    recordings: RecordingsMean | None = None
 
     @classmethod
     def of(cls, axis: Axis, follower: Follower, channels: Sequence[Channel], *, samples: bool = True) -> Pipeline:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 from livebode.configuration.axis import Axis
 from livebode.configuration.recording import open_recording
@@ -22,6 +23,7 @@ from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
+from livebode.sources import Log
 
 
 def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
@@ -32,7 +34,31 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     log = log.naming([name for name in axis.signals.model_dump().values() if name])
     pipeline = Pipeline.of(axis, follower, log.channels)
     log = log.naming(pipeline.channels)  # with the covariates of a baseline
+    of = examined(axis, log, pipeline.follower)
     settings = pipeline.follower.settings
+    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": of.found}
+    if settings.quantity == "plant" and settings.periodic and not settings.average:
+        pipeline = replace(pipeline, drift=DriftTest(settings.lines))
+    loop = RunLoop(
+        of.source, pipeline, to, about=about, segments=axis.record, started=started, control=control,
+        noticed=of.noticed,
+    )  # fmt: skip
+    with moments_by(RunClock.of_kind(log.clock_kind)):
+        return loop.run()
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A recording as it is tracked, events about the whole of it, and entries of run.json."""
+
+    source: AlignedLog
+    noticed: list[Event]
+    found: dict[str, Any]
+
+
+def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examined:
+    """Examine a recording as a whole; the follower is told what to leave out, at the file's numbers plus `shift`."""
+    settings = follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
     noticed += window_in_doubt(axis, log, settings)
     slips = slips_of(log, settings)
@@ -40,30 +66,23 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
         noticed.append(slip_event(slips, settings))
     source = AlignedLog(log, slips, log.first)
     if settings.periodic and not axis.tracking.all_periods and axis.motion is None:
-        source = _steady(source, pipeline.follower, noticed)
-    if isinstance(pipeline.follower, Tracker):
-        pipeline.follower.know_spikes(early_spikes(source, settings))
+        source = _steady(source, follower, noticed, shift)
+    if isinstance(follower, Tracker):
+        follower.know_spikes(early_spikes(source, settings) + shift)
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
     found |= {"left_out_samples": source.first - log.first, "clock": log.clock_kind}
     if log.is_part:
         found["part"] = {"first": log.first, "stop": log.stop}
-    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": found}
-    if settings.quantity == "plant" and settings.periodic and not settings.average:
-        pipeline = replace(pipeline, drift=DriftTest(settings.lines))
-    loop = RunLoop(
-        source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed
-    )
-    with moments_by(RunClock.of_kind(log.clock_kind)):
-        return loop.run()
+    return Examined(source, noticed, found)
 
 
-def _steady(source: AlignedLog, follower: Follower, noticed: list[Event]) -> AlignedLog:
+def _steady(source: AlignedLog, follower: Follower, noticed: list[Event], shift: int) -> AlignedLog:
     """The recording after its transient, whose outlying periods the follower leaves out; events for both."""
     settings, window, begins = follower.settings, follower.settings.lines.window, source.first
     if transient := leading_transient(source, settings):
         noticed.append(replace(transient_event(transient, settings), sample=begins))
     outlying = [m for m in outlying_periods(source, settings) if m >= transient]
     if outlying and isinstance(follower, Tracker):
-        follower.leave_out(outlying_samples(outlying, window, begins))
+        follower.leave_out(outlying_samples(outlying, window, begins + shift))
         noticed.append(outlying_event(outlying, settings, begins))
     return replace(source, first=begins + transient * window)

@@ -6,12 +6,13 @@ from livebode.configuration.axis import Axis
 from livebode.runtime.destination import Destination
 from livebode.runtime.live import run_live
 from livebode.runtime.recording import run_recording
+from livebode.runtime.recordings import run_recordings
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome
 
 
 def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outcome:
-    """Track a recording, or a machine while it works, and write a run directory.
+    """Track a recording or several, or a machine while it works, and write a run directory.
 
     A recording is written in one piece, or in segments if the axis has a [record]. A live source is always recorded in
     segments, and ends with its sender or when `control` requests it; all received samples are then recorded. The same
@@ -28,5 +29,6 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
     StoppedError
         If `control` ends a recording before its end; the directory is as for an error.
     """
-    job = run_live if axis.source.live else run_recording
+    recording = run_recordings if len(axis.source.logs) > 1 else run_recording
+    job = run_live if axis.source.live else recording
     return job(axis, to, control or RunControl())

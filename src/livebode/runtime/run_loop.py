@@ -19,6 +19,7 @@ from livebode.fitting import Fit
 from livebode.preparation.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.runtime import summary
 from livebode.runtime.ahead import LossesAhead
+from livebode.runtime.between_event import between_events
 from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition
 from livebode.runtime.destination import Destination
@@ -213,6 +214,8 @@ class RunLoop:
             self._stream.publish(responses)
         if self.pipeline.drift is not None:
             self.pipeline.drift.add(responses)
+        if self.pipeline.recordings is not None:
+            self.pipeline.recordings.add(responses)
         parameters = self._fit(responses)
         detection = self.pipeline.detection
         if detection is not None and (self._shedding is None or self._shedding.to_monitor(responses)):
@@ -339,6 +342,9 @@ class RunLoop:
             found = self.pipeline.drift.result()
             self._done["drift"] = summary.of_drift(found, self._follower.settings.lines)
             self._stream.publish_all(drift_events(self._done["drift"], *self.position))
+        if self.pipeline.recordings is not None:
+            self._done["between"] = summary.of_recordings(self.pipeline.recordings)
+            self._stream.publish_all(between_events(self._done["between"], *self.position))
         self._stream.finish_groups()
         self._done |= self._found_on_the_way
         if continued_in is not None:

@@ -14,7 +14,7 @@ from livebode.analysis.loop_report import loop_report
 from livebode.core import Lines, PlantKinds, Responses
 from livebode.core.clock import moment
 from livebode.estimation.stream_estimator import Follower
-from livebode.fitting import Fit
+from livebode.fitting import Fit, RecordingsMean
 from livebode.fitting.drift import Drift
 from livebode.kernel import instruction_set
 from livebode.runtime.fits import Fits
@@ -73,6 +73,20 @@ def of_drift(drift: Drift, lines: Lines) -> dict[str, Any]:
         for i in np.flatnonzero(shown)
     ]
     return {"found": True, "lines": rows}
+
+
+def of_recordings(mean: RecordingsMean) -> dict[str, Any]:
+    """Entries on the scatter between several recordings; at lines where something is not known it is null."""
+    found = mean.result()[1]
+    of_line = {"noise_sigma": found.noise, "total_sigma": found.total, "distortion": found.distortion}
+    of_all = {"chance": found.chance, "distortion_db": found.distortion_db, "noise_db": found.noise_db}
+    return {
+        "recordings": found.recordings,
+        "realisations": mean.realisations,
+        "differs": found.differs,
+        **{name: value if np.isfinite(value) else None for name, value in of_all.items()},
+        **{name: [v if np.isfinite(v) else None for v in values.tolist()] for name, values in of_line.items()},
+    }
 
 
 def fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[str, Any]:

@@ -24,6 +24,8 @@ DELIMITERS = "\t", ";", ",", "|", " ", ""
 SEPARATOR = re.compile(r"sep=.\s*$", re.IGNORECASE)
 """Line that Excel writes above a table; it is skipped, because the table itself is more reliable."""
 COMMENT = re.compile(r"^[ \t]*[#%]", re.MULTILINE)
+BLANK_CELL = re.compile(r"(\S+| )(?: |$)")
+"""A cell of a ragged table in which a blank is the delimiter and also an empty cell, as TwinCAT Scope writes it."""
 BLANK = " \t\r\n\v\f\x1a"
 """Characters of a line without content."""
 END_BYTES = 64
@@ -47,7 +49,7 @@ class Dialect:
     untidy
         True if there are comments between the rows, or a blank or Ctrl-Z at the end.
     ragged
-        True if a line may lack its last cells.
+        True if a line may lack its last cells, and the last line may be EOF; between blanks, an empty cell is a blank.
     """
 
     delimiter: str
@@ -77,7 +79,7 @@ class Dialect:
     def split(self, line: str) -> list[str]:
         """Cells of a line."""
         if self.spaced:
-            return line.split()
+            return BLANK_CELL.findall(line) if self.ragged else line.split()
         if not self.delimiter:
             return [line.strip().strip('"')]
         return [cell.strip() for cell in next(csv.reader([line], delimiter=self.delimiter), [])]
@@ -164,7 +166,8 @@ def find_dialect(path: Path) -> Dialect:
         )
     above = sample.text[: best.start.at]
     dialect = best.dialect if best.score[1] else with_comment_header(best.dialect, above)
-    return sample.placed(dialect, best.start)
+    ends_by_word = not dialect.spaced and sample.end.rstrip().endswith(b"\nEOF")
+    return sample.placed(replace(dialect, ragged=ends_by_word), best.start)
 
 
 def ends_blank(end: bytes) -> bool:

@@ -1,8 +1,9 @@
-"""The error of a recording whose package is not installed."""
+"""Packages that read a format: the error of one that is not installed, and what damaged files let them print."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 
 from livebode.core import ExtraError
 
@@ -16,3 +17,16 @@ def missing(path: Path, package: str, extra: str) -> ExtraError:
         extra=extra,
         path=str(path),
     )
+
+
+def silence(*modules: ModuleType) -> None:
+    """Let modules of a library print nothing about damaged files; the error that follows has what matters.
+
+    To redirect standard output would also swallow what other threads print.
+    """
+    for module in modules:
+        module.print = _nothing  # type: ignore[attr-defined]
+
+
+def _nothing(*_: object, **__: object) -> None:
+    """What a silenced module calls as print."""

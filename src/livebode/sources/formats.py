@@ -10,8 +10,10 @@ from importlib import import_module
 from pathlib import Path
 
 from livebode.core import LivebodeError, RecordingError
+from livebode.sources.bag import parts_of
 from livebode.sources.dbc import no_frames
 from livebode.sources.recording import Recording, contained
+from livebode.sources.svdxdata import is_project
 
 HEAD_BYTES = 1024
 MDF_MAGIC = b"MDF     ", b"UnFinMF "
@@ -24,7 +26,8 @@ class Format:
     """A format: its file name endings, a test of its first bytes, and the class that reads it.
 
     The class is named by module so that h5py and the like are imported only for the files that need them. With
-    `takes_dbc` it is called with the file that defines the signals in CAN frames.
+    `takes_dbc` it is called with the file that defines the signals in CAN frames, with `takes_directory` with the
+    directory of a bag whose first file it matches.
     """
 
     title: str
@@ -32,6 +35,7 @@ class Format:
     matches: Callable[[bytes], bool]
     module: str
     takes_dbc: bool = False
+    takes_directory: bool = False
 
     def open(self, path: Path, dbc: Path | None = None) -> Recording:
         reader: Callable[..., Recording] = import_module(f"livebode.sources.{self.module}").READER
@@ -57,7 +61,14 @@ def is_xml(head: bytes) -> bool:
     return head.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<")
 
 
-TWINCAT = re.compile(rb"(?:\xef\xbb\xbf)?Name[\t;,|][^\r\n]*\r?\nFile[\t;,|]")
+TWINCAT = re.compile(
+    rb"(?:\xef\xbb\xbf)?Name([\t;,|: ])[^\r\n]*\r?\n"
+    rb"(?:File|SymbolComment|Data-Type|SampleTime\[ms\]|NetI[dD]|SymbolName)\1"
+)
+"""First two lines of a TwinCAT export: of its file, or of its channels where the file's own lines were left out."""
+
+
+CODESYS = re.compile(rb"(?:\xef\xbb\xbf)?\[key\];[ \t]*\[value\]\s*\n")
 
 
 def is_wav(head: bytes) -> bool:
@@ -81,12 +92,14 @@ FORMATS = (
     Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith(MDF_MAGIC), "mdf", takes_dbc=True),
     Format("ULog", (".ulg", ".ulog"), lambda head: head.startswith(ULOG_MAGIC), "ulog"),
     Format("WAV", (".wav",), is_wav, "wav"),
-    Format("MCAP", (".mcap",), lambda head: head.startswith(b"\x89MCAP0\r\n"), "mcap"),
-    Format("ROS 2 bag", (".db3",), lambda head: head.startswith(b"SQLite format 3\0"), "rosbag"),
+    Format("MCAP", (".mcap",), lambda head: head.startswith(b"\x89MCAP0\r\n"), "mcap", takes_directory=True),
+    Format("ROS 2 bag", (".db3",), lambda head: head.startswith(b"SQLite format 3\0"), "rosbag", takes_directory=True),
     Format("BLF", (".blf",), lambda head: head.startswith(b"LOGG"), "blf", takes_dbc=True),
     Format("ASC", (".asc",), lambda head: ASC_HEAD.match(head) is not None, "asc", takes_dbc=True),
+    Format("TwinCAT Scope project", (".svdx",), is_project, "svdx"),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
     Format("TwinCAT Scope export", (".csv", ".txt"), lambda head: TWINCAT.match(head) is not None, "twincat"),
+    Format("CODESYS trace", (".csv", ".txt"), lambda head: CODESYS.match(head) is not None, "codesys"),
     Format("LabVIEW LVM", (".lvm",), lambda head: head.startswith(b"LabVIEW Measurement"), "lvm"),
     Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, "delimited"),
 )  # fmt: skip
@@ -104,10 +117,11 @@ def open_recording(path: Path, dbc: Path | None = None) -> Recording:
     ExtraError
         Where the package that reads its format is not installed.
     """
-    head = read_head(path)
+    first, head = read_head(path)
     for format_ in FORMATS:
-        if format_.matches(head):
+        if format_.matches(head) and (format_.takes_directory or first == path):
             return checked(format_.open(path, dbc))
+    path = first
     suffix = path.suffix.lower()
     named = [format_.title for format_ in FORMATS if suffix in format_.suffixes]
     if named:
@@ -130,10 +144,10 @@ def open_recording(path: Path, dbc: Path | None = None) -> Recording:
     )
 
 
-def read_head(path: Path) -> bytes:
+def read_head(path: Path) -> tuple[Path, bytes]:
+    """The file, of a bag its first one, and its first bytes."""
     try:
-        if path.is_dir():
-            raise RecordingError("not-a-file", f"{path} is a directory", "name the file in it", path=str(path))
+        path, *_ = parts_of(path)
         if path.exists() and not path.is_file():
             raise RecordingError(
                 "not-a-file", f"{path} is not a regular file", "write the recording to a file first", path=str(path)
@@ -151,7 +165,7 @@ def read_head(path: Path) -> bytes:
         ) from None
     if not head:
         raise RecordingError("empty", f"{path} is empty", "check that the recording is complete", path=str(path))
-    return head
+    return path, head
 
 
 def checked(recording: Recording) -> Recording:

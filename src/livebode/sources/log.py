@@ -14,7 +14,7 @@ from livebode.core import Block, Channel, QuantityKind, RecordingError, UsageErr
 from livebode.core.clock import ClockKind
 from livebode.sources.computed import computed_blocks
 from livebode.sources.expressions import Expression
-from livebode.sources.naming import found_channel, resolve
+from livebode.sources.naming import explained, found_channel, resolve
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
 
@@ -262,7 +262,7 @@ class Log:
         return chosen
 
     def _found(self, names: Sequence[str]) -> dict[str, Column | Expression]:
-        with located(self.path):
+        with located(self.path), explained(self._recording.skipped):
             return {name: found_channel(name, self._columns, self._recording.columns) for name in names}
 
     def _labels(self, found: Mapping[str, Column | Expression]) -> tuple[Channel, ...]:

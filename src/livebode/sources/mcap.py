@@ -7,6 +7,7 @@ import struct
 import sys
 import zlib
 from collections.abc import Iterator
+from pathlib import Path
 from typing import IO, ClassVar
 
 from livebode.sources.damage import damaged, oversized, truncated
@@ -27,11 +28,11 @@ class McapRecording(RosRecording):
 
     format: ClassVar[str] = "mcap"
 
-    def _messages(self) -> Iterator[tuple[Topic, int, bytes]]:
+    def _messages_in(self, part: Path) -> Iterator[tuple[Topic, int, bytes]]:
         schemas: dict[int, tuple[str, str, str]] = {}
         topics: dict[int, Topic] = {}
-        with self.path.open("rb") as file:
-            for kind, record in flat_records(file, self.path.stat().st_size):
+        with part.open("rb") as file:
+            for kind, record in flat_records(file, part.stat().st_size):
                 if kind == MESSAGE:
                     number, _, time_ns, _ = struct.unpack_from("<HIQQ", record)
                     if number not in topics:

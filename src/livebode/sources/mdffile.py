@@ -8,15 +8,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from livebode.sources.extras import missing
+from livebode.sources.extras import missing, silence
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
     try:
-        from asammdf import MDF
+        from asammdf import MDF, mdf
+        from asammdf.blocks import mdf_v3, mdf_v4, v4_blocks
     except ImportError:
         raise missing(path, "asammdf", "mdf") from None
+    silence(mdf, mdf_v3, mdf_v4, v4_blocks)
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its messages are in the error that follows
     with path.open("rb") as raw:  # a path would be mapped; if a mapped file shrinks, the process is killed
         try:

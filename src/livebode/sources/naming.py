@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from livebode.core import RecordingError, nearest_name
 from livebode.sources.expressions import Expression, ExpressionSyntaxError, parse_expression
-from livebode.sources.recording import Column
+from livebode.sources.recording import Column, Skipped
+from livebode.sources.units import split_unit
 
 _WORD = re.compile(r"[\w.]+")  # without anything that computes
 
@@ -50,6 +52,20 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
     raise RecordingError(
         "channel-unknown", f"there is no channel {name!r}", nearest_name(name, names), channel=name, channels=names
     )
+
+
+@contextmanager
+def explained(skipped: Sequence[Skipped]) -> Iterator[None]:
+    """Errors of unknown channels inside it say why the channel was left out, where it is in the file."""
+    try:
+        yield
+    except RecordingError as error:
+        name = str(error.facts.get("channel", ""))
+        reasons = [one.reason for one in skipped if one.name in (name, split_unit(name)[0])]
+        if error.code != "recording.channel-unknown" or not reasons:
+            raise
+        message = f"channel {name!r} was left out: {reasons[0]}"
+        raise RecordingError("channel-unknown", message, "name a channel of numbers", **error.facts) from None
 
 
 def found_channel(name: str, columns: Sequence[Column], everything: Sequence[Column]) -> Column | Expression:

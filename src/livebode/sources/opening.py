@@ -14,7 +14,7 @@ from livebode.core import QuantityKind, RecordingError, UsageError
 from livebode.core.clock import ClockKind
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log, checked_block_samples
-from livebode.sources.naming import in_file, resolve
+from livebode.sources.naming import explained, in_file, resolve
 from livebode.sources.recording import Column, Recording, guarded, located
 from livebode.sources.timing import Clock, clock_from_time, find_time, rate_column, rate_in_column, rate_in_file
 from livebode.sources.units import split_unit
@@ -88,7 +88,7 @@ def open_log(
         )
     checked_block_samples(block_samples)
     recording = open_recording(Path(path), None if dbc is None else Path(dbc))
-    with located(recording.path):
+    with located(recording.path), explained(recording.skipped):
         log = log_of(recording, rate_hz, time, channels, block_samples, kinds or {}, clock)
     _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)
     return log

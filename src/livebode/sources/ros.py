@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from livebode.sources.bag import parts_of
 from livebode.sources.damage import oversized
 from livebode.sources.extras import missing
-from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped, located
 from livebode.sources.rostypes import SEQUENCES, Topic, store_of, unknown_type
 
 WIDTH_MAX = 64
@@ -26,7 +27,9 @@ NS_PER_S = 1_000_000_000
 
 
 class RosRecording(Recording):
-    """A recording of ROS 2. A channel is topic.field, with nested fields after dots and elements of arrays as [0].
+    """A recording of ROS 2: a file, or the directory of a bag.
+
+    A channel is topic.field, with nested fields after dots and elements of arrays as [0].
 
     Every topic has a clock of its own: `topic.header.stamp` where its messages have one that is set, otherwise
     `topic.logged`, the time at which the message was recorded.
@@ -35,6 +38,7 @@ class RosRecording(Recording):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         import_rosbags(path)
+        self._parts = parts_of(path)
         count: Counter[Topic] = Counter()
         first: dict[Topic, bytes] = {}
         last: dict[Topic, bytes] = {}
@@ -53,9 +57,15 @@ class RosRecording(Recording):
                 raise oversized(f"{path} has more than {COLUMNS_MAX} fields", COLUMNS_MAX)
         self.columns, self.skipped = tuple(columns), tuple(skipped)
 
-    @abstractmethod
     def _messages(self) -> Iterator[tuple[Topic, int, bytes]]:
-        """Topic, time of recording in ns, and content of each message."""
+        """Topic, time of recording in ns, and content of each message, file by file."""
+        for part in self._parts:
+            with located(part):
+                yield from self._messages_in(part)
+
+    @abstractmethod
+    def _messages_in(self, part: Path) -> Iterator[tuple[Topic, int, bytes]]:
+        """The messages of one file."""
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         topic = columns[0].key[0]

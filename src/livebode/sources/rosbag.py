@@ -18,19 +18,11 @@ class RosbagRecording(RosRecording):
 
     format: ClassVar[str] = "rosbag"
 
-    def __init__(self, path: Path) -> None:
-        with path.open("rb") as file:
-            head = file.read(32).ljust(32, b"\0")
-        page_bytes, pages = int.from_bytes(head[16:18], "big"), int.from_bytes(head[28:32], "big")
-        declared = (65536 if page_bytes == 1 else page_bytes) * pages
-        if declared > path.stat().st_size:
-            raise truncated(f"the database declares {declared} bytes, more than there are", declared=declared)
-        super().__init__(path)
-
-    def _messages(self) -> Iterator[tuple[Topic, int, bytes]]:
+    def _messages_in(self, part: Path) -> Iterator[tuple[Topic, int, bytes]]:
         from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
-        reader = Sqlite3Reader(self.path)
+        check_size(part)
+        reader = Sqlite3Reader(part)
         reader.open()
         try:
             topics = {}
@@ -43,6 +35,16 @@ class RosbagRecording(RosRecording):
                 yield topics[connection.id], time_ns, raw
         finally:
             reader.close()
+
+
+def check_size(part: Path) -> None:
+    """RecordingError if the database declares more than the file has."""
+    with part.open("rb") as file:
+        head = file.read(32).ljust(32, b"\0")
+    page_bytes, pages = int.from_bytes(head[16:18], "big"), int.from_bytes(head[28:32], "big")
+    declared = (65536 if page_bytes == 1 else page_bytes) * pages
+    if declared > part.stat().st_size:
+        raise truncated(f"the database declares {declared} bytes, more than there are", declared=declared)
 
 
 READER = RosbagRecording

@@ -17,8 +17,13 @@ TOKEN_BYTES_MAX = 1 << 20
 _PIECE_BYTES = 1 << 16
 
 
-def parse(path: Path) -> Element:
+def parse(path: Path, first: int = 0, length: int | None = None) -> Element:
     """Root element of the document.
+
+    Parameters
+    ----------
+    path, first, length
+        The file, and the bytes of the document in it. Default: all of them.
 
     Raises
     ------
@@ -26,7 +31,8 @@ def parse(path: Path) -> Element:
         For a document type or entity declaration (they can expand without bound or name other files), for more than
         256 MiB, 64 levels, a million elements or 1 MiB in one tag, and for text that is not XML.
     """
-    if (size := path.stat().st_size) > BYTES_MAX:
+    size = path.stat().st_size - first if length is None else length
+    if size > BYTES_MAX:
         raise oversized(f"{path} has {size} bytes of XML, more than {BYTES_MAX}", BYTES_MAX, path=str(path), bytes=size)
     builder, depth, elements = TreeBuilder(), 0, 0
 
@@ -57,9 +63,10 @@ def parse(path: Path) -> Element:
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
     with path.open("rb") as file:
-        while piece := file.read(_PIECE_BYTES):
+        file.seek(first)
+        while piece := file.read(min(_PIECE_BYTES, first + size - file.tell())):
             parser.Parse(piece)
-            if file.tell() - parser.CurrentByteIndex > TOKEN_BYTES_MAX:
+            if file.tell() - first - parser.CurrentByteIndex > TOKEN_BYTES_MAX:
                 at = parser.CurrentByteIndex
                 raise oversized(
                     f"{path} has a tag or comment of more than {TOKEN_BYTES_MAX} bytes at byte {at}",

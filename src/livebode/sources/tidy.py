@@ -63,10 +63,12 @@ class Tidied(io.RawIOBase):
         if self._dialect.ragged:
             lines = (line.rstrip("\r") for line in text.split("\n"))
             text = "".join(self._filled(line) for line in lines if line.strip() not in ("", "EOF"))
-        if self._dialect.spaced:
+        elif self._dialect.spaced:
             text = BLANKS.sub("\t", MARGINS.sub("", text))
         self._ready = text.encode("utf-8")
 
     def _filled(self, line: str) -> str:
+        if self._dialect.spaced:
+            line = "\t".join(self._dialect.split(line))
         missing = self._dialect.width - 1 - line.count(self._dialect.delimiter)
         return f"{line}{self._dialect.delimiter * missing}\n"

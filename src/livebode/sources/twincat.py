@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from livebode.sources.delimited import DelimitedRecording
 from livebode.sources.dialect import Dialect, Sample
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.timed import TimedColumns, as_columns, merged, trimmed
+from livebode.sources.twincatwords import properties_of_words, unique_names
 
 ROW = re.compile(r'[\s"]*[-+.\d]')
 """A row of values; each row above the table begins with the name of a property."""
@@ -37,14 +37,15 @@ class TwinCatRecording(DelimitedRecording):
         """The dialect as the export defines it: the delimiter behind "Name", one column for each cell of that row."""
         sample = Sample.of(path)
         start = next((at for at, line in enumerate(sample.lines) if ROW.match(line.text)), None)
-        plain = Dialect(sample.text[4], False, ".", ragged=True)
-        rows = [plain.split(line.text) for line in sample.lines[:start]]
-        self._properties = {cells[0]: cells for cells in rows if cells and cells[0]}
+        mark = sample.text[4]
+        plain = Dialect("\t" if mark == " " else mark, mark == " ", ".", ragged=True)
+        above = [line.text for line in sample.lines[:start]]
+        self._properties = properties_of_words(above) if plain.spaced else properties_of_cells(above, plain)
         names = self._properties.get("Name", [])
         if start is None or len(names) < 2:
             raise sample.without_table()
         cells = [cell for line in sample.lines[start:] for cell in plain.split(line.text)]
-        comma = plain.delimiter != "," and any(is_number(cell, ",") and not is_number(cell) for cell in cells)
+        comma = mark != "," and any(is_number(cell, ",") and not is_number(cell) for cell in cells)
         dialect = replace(plain, decimal="," if comma else ".").with_headings(names)
         return sample.placed(dialect, sample.lines[start])
 
@@ -63,18 +64,24 @@ def timed_columns(properties: dict[str, list[str]]) -> list[TimedColumns]:
     """
     names = properties["Name"]
     symbols, units = (padded(properties.get(name, []), len(names)) for name in ("SymbolName", "Unit"))
-    count = Counter(names)
+    own = [at > 0 and name != "Name" for at, name in enumerate(names)]
+    unique = unique_names([name if is_own else "" for name, is_own in zip(names, own)], symbols)
     groups: list[TimedColumns] = []
-    for at, name in enumerate(names):
-        if at == 0 or name == "Name":
+    for at, is_channel in enumerate(own):
+        if not is_channel:
             groups.append(TimedColumns(Column(TIME, "ms", key=at), ()))
             continue
         symbol, unit = symbols[at], QUANTITY.sub("", units[at])
-        unique = symbol if count[name] > 1 and symbol else name
-        if unique:  # older exports end each row with a delimiter
-            column = Column(unique, unit, aliases=(symbol,) if symbol not in ("", unique) else (), key=at)
+        if name := unique[at]:  # older exports end each row with a delimiter
+            column = Column(name, unit, aliases=(symbol,) if symbol not in ("", name) else (), key=at)
             groups[-1] = TimedColumns(groups[-1].time, (*groups[-1].channels, column))
     return [group for group in groups if group.channels]
+
+
+def properties_of_cells(lines: list[str], dialect: Dialect) -> dict[str, list[str]]:
+    """The cells of each property by its name, which is also the first cell."""
+    rows = [dialect.split(line) for line in lines]
+    return {cells[0]: cells for cells in rows if cells and cells[0]}
 
 
 def padded(cells: list[str], width: int) -> list[str]:

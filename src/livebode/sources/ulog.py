@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar
 
 from livebode.sources.damage import damaged
-from livebode.sources.extras import missing
+from livebode.sources.extras import missing, silence
 from livebode.sources.recording import Chunk, Column, Recording, Skipped
 from livebode.sources.ulogcheck import check
 
@@ -65,8 +63,7 @@ def parsed(path: Path) -> Any:
     with path.open("rb") as file:
         check(file, path.stat().st_size, pyulog.ULog)
         file.seek(0)
-        with contextlib.redirect_stdout(io.StringIO()):  # its messages are in the error that follows
-            log = pyulog.ULog(file)
+        log = pyulog.ULog(file)
     if log.file_corruption:
         raise damaged("a message contradicts its definition")
     return log
@@ -75,8 +72,10 @@ def parsed(path: Path) -> Any:
 def import_pyulog(path: Path) -> ModuleType:
     try:
         import pyulog
+        import pyulog.core
     except ImportError:
         raise missing(path, "pyulog", "ulog") from None
+    silence(pyulog.core)
     return pyulog  # type: ignore[no-any-return]
 
 

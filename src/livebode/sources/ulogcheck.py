@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import struct
 from typing import IO, Any
@@ -33,8 +32,7 @@ def check(file: IO[bytes], size: int, ulog: Any) -> None:
     """
     file.seek(0)
     definitions, topics = walk(file, size)
-    with contextlib.redirect_stdout(io.StringIO()):
-        formats = ulog(io.BytesIO(definitions), parse_header_only=True).message_formats
+    formats = ulog(io.BytesIO(definitions), parse_header_only=True).message_formats
     width: dict[str, int] = {}
     total = 0
     for name in topics:

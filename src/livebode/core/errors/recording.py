@@ -46,6 +46,8 @@ class RecordingError(LivebodeError):
         "rate-conflict": "The given sampling rate contradicts the file.",
         "rate-implausible": "The time column gives a sampling rate that no recording has.",
         "rate-missing": "Neither the file nor the call gives the sampling rate.",
+        "recording-repeated": "Two recordings of one run have the same content.",
+        "recordings-differ": "Recordings of one run differ in their rate, units, window or lines.",
         "table-missing": "The file is text without rows of numbers.",
         "time-irregular": "The time column is not regular apart from whole missing samples, or has too many gaps.",
         "time-jitter": "The time column jitters too much for a spectrum.",

@@ -33,6 +33,7 @@ class SignalError(LivebodeError):
         "empty": "There are no samples.",
         "layout-differs": "The spectra that the drive sends do not fit the settings of the tracker.",
         "line-not-excited": "The excitation has no power at a line.",
+        "lines-ambiguous": "More than one set of lines explains the excitation equally well.",
         "no-clean-samples": "There is no stretch without gaps and non-finite samples that is long enough.",
         "no-excitation": "The channel is a straight line, so it carries no excitation.",
         "no-line-above-noise": "The excitation repeats, but none of its lines exceeds the noise.",

@@ -74,8 +74,7 @@ class FollowSource(LiveSource):
         self._sequencer.schema.rate_hz = self.settings.rate_hz or position.rate_hz
 
     def _receive(self) -> bool:
-        assert self.settings.log is not None
-        path = self.settings.log
+        (path,) = self.settings.logs
         if path.is_dir():
             self._follow_directory(path)
             return False

@@ -41,7 +41,7 @@ def make_source(settings: SourceSettings) -> LiveSource:
     """The same, not yet opened; raises the errors of `open_source` for settings and missing packages."""
     if settings.url is None:
         check_keys(settings, "log")
-        if settings.log is None or not settings.follow:
+        if len(settings.logs) != 1 or not settings.follow:
             raise ConfigError(
                 "key-missing",
                 "[source] names no live source",
@@ -49,7 +49,7 @@ def make_source(settings: SourceSettings) -> LiveSource:
                 key="source",
                 keys=["url"],
             )
-        return FollowSource(settings, Address("follow", path=str(settings.log)))
+        return FollowSource(settings, Address("follow", path=str(settings.logs[0])))
     address = checked_address(settings.url, settings)
     kind: type[LiveSource] = import_module(f"livebode.sources.live.{MODULES[address.scheme]}").SOURCE
     return kind(settings, address)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -28,6 +28,8 @@ TAKEN: dict[str, set[str]] = {
 """Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
 EVERY = {"timeout_s", "kinds"}
+RECORDINGS_MAX = 1000
+"""In one run."""
 PART = {"from_": "from", "to": "to", "skip_periods": "skip_periods"}
 """Keys that choose a part of a finished recording."""
 
@@ -46,7 +48,8 @@ class SourceSettings(BaseModel):
     Parameters
     ----------
     log
-        The recording, relative to this file.
+        The recording, relative to this file. Several, as ["a.mat", "b.mat"], are tracked one after the other, and their
+        means are averaged.
     time
         Time column of the recording, with its unit if the file does not state it: "clock [us]". "none" ignores it.
         Default: found by name.
@@ -117,7 +120,7 @@ class SourceSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-    log: File | None = None
+    log: File | Annotated[list[File], Field(min_length=1, max_length=RECORDINGS_MAX)] | None = None
     time: str | None = None
     clock: ClockKind | None = None
     from_: Limit | None = Field(default=None, alias="from")
@@ -158,13 +161,25 @@ class SourceSettings(BaseModel):
     @property
     def title(self) -> str:
         """Name of the source in a picture."""
-        return self.log.name if self.log is not None else self.url or ""
+        if not self.logs:
+            return self.url or ""
+        more = len(self.logs) - 1
+        return f"{self.logs[0].name} and {more} more" if more else self.logs[0].name
+
+    @property
+    def logs(self) -> tuple[Path, ...]:
+        """The recordings; none for a live source."""
+        if self.log is None:
+            return ()
+        return tuple(self.log) if isinstance(self.log, list) else (self.log,)
 
     def beside(self, folder: Path) -> SourceSettings:
         """The same with relative paths from `folder`."""
-        files = {
+        files: dict[str, Any] = {
             name: folder / value for name in self.model_fields_set if isinstance(value := getattr(self, name), Path)
         }
+        if isinstance(self.log, list):
+            files["log"] = [folder / path for path in self.log]
         return self.model_copy(update=files)
 
 
