@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from livebode.analysis.difference import ALPHA, Difference, compare
 from livebode.core import PER_LINE, Block, Lines, Responses
@@ -130,6 +131,27 @@ def test_runs_of_another_unit_or_quantity_or_without_common_lines_are_refused(tm
     done = livebode("compare", usual, fewer, "--json")
     assert [line["frequency_hz"] for line in json.loads(done.out)["lines"]] == [20, 40, 60]
     assert "3 of 7 and 3 lines in common" in " ".join(json.loads(done.out)["warnings"])
+
+
+@pytest.mark.parametrize(("size", "differing"), [("0.5dB", 0), ("5.5%", 0), ("0.1 dB", 7), ("2%", 7)])
+def test_a_certain_change_smaller_than_matters_is_ignored(tmp_path: Path, size: str, differing: int) -> None:
+    """All lines are 4 % higher (0.34 dB), at a hundred times their uncertainty."""
+    one = write_run(tmp_path / "a", measured(400, 1, noise=1e-3))
+    other = measured(400, 2, noise=1e-3)
+    two = write_run(tmp_path / "b", replace(other, value=1.04 * other.value))
+    done = livebode("compare", one, two, "--ignore-below", size, "--json")
+    assert done.code == 0, done.err
+    lines = json.loads(done.out)["lines"]
+    assert [sum(line[key] for line in lines) for key in ("differs", "ignored")] == [differing, 7 - differing]
+    words = " ".join(json.loads(done.out)["sentences"])
+    assert ("7 lines of 7 differ by less than" in words) == (differing == 0)
+
+
+@pytest.mark.parametrize("size", ["0.5", "much", "-1dB", "1 sigma"])
+def test_a_size_without_a_unit_is_refused(tmp_path: Path, size: str) -> None:
+    one = write_run(tmp_path / "a", measured(50, 1))
+    done = livebode("compare", one, one, f"--ignore-below={size}")
+    assert (done.code, "is not a number of dB or %" in done.err) == (2, True)
 
 
 def _first_lines(of: Responses, n: int) -> Responses:

@@ -127,10 +127,16 @@ def test_bad_input_is_one_sentence(log: Path, tmp_path: Path, options: tuple[obj
     assert not (tmp_path / "run").exists()
 
 
-def test_several_outputs_and_a_band_need_an_output_only_run(log: Path) -> None:
-    done = livebode("run", log, "--output", "a", "--output", "b")
+def test_a_band_needs_an_output_only_run(log: Path) -> None:
+    done = livebode("run", log, "--output", "a", "--band", "2:20")
     assert done.code == 2
-    assert "more than one output, and a band, belong to an output-only run; give one output" in done.err
+    assert "a band belongs to an output-only run; remove it, or add --output-only" in done.err
+
+
+def test_several_recordings_cannot_be_one_output_only_run(log: Path) -> None:
+    done = livebode("run", log, log, "--output-only", "--output", "a")
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert "[output_only] (option --output-only) does not apply to several recordings in one run" in done.err
 
 
 def test_a_live_source_and_several_axes_are_refused_by_one_sentence(log: Path, tmp_path: Path) -> None:

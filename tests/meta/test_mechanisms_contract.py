@@ -17,7 +17,10 @@ SOURCE = Path(__file__).parents[2] / "src/livebode"
         # The journal of a damaged segment is only set aside.
         (r"os\.(replace|rename)\(|\w\.rename\(|mk[sd]temp\(", {"core/files.py", "records/segments/journal.py"}),
         # Data that is sent from a file, or read back at once, has no place.
-        (r"(TemporaryDirectory|NamedTemporaryFile)\(", {"dashboard/app.py", "export/universal.py"}),
+        (
+            r"(TemporaryDirectory|NamedTemporaryFile)\(",
+            {"cli/validate_command.py", "dashboard/app.py", "export/universal.py"},
+        ),
         (r"\bfsync\(", {"core/files.py", "doctor/disk.py"}),
         # A record that is paused at its end raises without an error of the system.
         (r'"not-written",\n', {"records/segments/store.py"}),

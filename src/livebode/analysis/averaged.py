@@ -33,7 +33,7 @@ class Averaged:
     incomplete
         Number of responses with an invalid line.
     spans_s, spans
-        The first and last time; lowest and highest schedule at a valid response, NaN without one.
+        The first and last time, and the lowest and highest schedule, at a valid response; NaN without one.
     moved
         Whether the machine moved at a valid response, as `Movement` finds it.
     """
@@ -121,9 +121,10 @@ class _Counted:
         self.rows += len(part)
         self.valid += np.count_nonzero(part.valid, axis=0)
         self.incomplete += int(np.count_nonzero(~part.valid.all(axis=1)))
-        self.spans_s = _wider(self.spans_s, part.time_s)
         rows = np.flatnonzero(part.valid.any(axis=1))
         if rows.size:
+            # The windows of the first responses begin before the recording, and so may their effective times.
+            self.spans_s = _wider(self.spans_s, part.time_s[rows])
             self.spans = _wider(self.spans, part.schedule[rows])
             self._follow(part.sample[rows], part.schedule[rows])
 

@@ -46,6 +46,8 @@ class Difference:
         The smallest relative change at each line that is detected with a probability of 95 %, (lines,).
     m
         Number of lines that are tested together.
+    ignore_below
+        Smallest |G₂/G₁ − 1| that matters: a line that differs by less is not listed.
     """
 
     before: Response
@@ -55,14 +57,24 @@ class Difference:
     p: Floats
     seen: Floats
     m: int
+    ignore_below: float = 0.0
 
     @property
     def differs(self) -> NDArray[np.bool_]:
-        """Mask of the lines that differ, (lines,)."""
+        """Mask of the lines that differ, and by an amount that matters, (lines,)."""
+        return np.asarray(self._significant & (np.abs(self.ratio - 1) >= self.ignore_below))
+
+    @property
+    def ignored(self) -> NDArray[np.bool_]:
+        """Mask of the lines that differ by less than matters, (lines,)."""
+        return np.asarray(self._significant & ~self.differs)
+
+    @property
+    def _significant(self) -> NDArray[np.bool_]:
         return np.asarray(self.p < ALPHA / self.m)
 
     @classmethod
-    def of(cls, before: Response, after: Response, m: int | None = None) -> Difference:
+    def of(cls, before: Response, after: Response, m: int | None = None, *, ignore_below: float = 0.0) -> Difference:
         """The difference of two mean responses on the same lines; `m` if they are tested together with others."""
         known = before.valid & after.valid & np.isfinite(before.sigma) & np.isfinite(after.sigma)
         m = m or max(int(np.count_nonzero(known)), 1)
@@ -75,7 +87,7 @@ class Difference:
             p = np.where(known, np.where(np.isinf(dof), np.exp(-away), (1 + away / dof) ** -dof), np.nan)
             sigma = np.sqrt(variance) / np.abs(before.value)
             bound = np.where(known, widened(sigma, dof, float(np.sqrt(log(m / ALPHA)))), np.nan)
-        return cls(before, after, ratio, bound, np.asarray(p), bound + _ALONG * sigma, m)
+        return cls(before, after, ratio, bound, np.asarray(p), bound + _ALONG * sigma, m, ignore_below)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +123,8 @@ class Compared:
     warnings: tuple[str, ...]
 
 
-def compare(before: RunRecord, after: RunRecord) -> Compared:
-    """Compare two runs.
+def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0) -> Compared:
+    """Compare two runs; lines whose |G₂/G₁ − 1| is less than `ignore_below` do not count as different.
 
     Raises
     ------
@@ -138,17 +150,20 @@ def compare(before: RunRecord, after: RunRecord) -> Compared:
     shared = sorted(means[0].keys() & means[1].keys()) if means else []
     if not shared:
         one, other = (_on(a.response, common, i) for a, i in zip(both, at))
-        return Compared((before, after), both, Difference.of(one, other), (), tuple(warnings))
+        return Compared(
+            (before, after), both, Difference.of(one, other, ignore_below=ignore_below), (), tuple(warnings)
+        )
     pairs = [tuple(_on(m[key][0], common, i) for m, i in zip(means, at)) for key in shared]
     known = [_known(a) & _known(b) for a, b in pairs]
     m = max(int(np.sum(known)), 1)
     edges = np.linspace(*span, _PLACES + 1)
     places = tuple(
-        ComparedPlace(float(edges[i]), float(edges[i + 1]), back, Difference.of(a, b, m))
+        ComparedPlace(float(edges[i]), float(edges[i + 1]), back, Difference.of(a, b, m, ignore_below=ignore_below))
         for (i, back), (a, b) in zip(shared, pairs)
     )
     together = [_together([pair[i] for pair in pairs], np.array(known)) for i in (0, 1)]
-    return Compared((before, after), both, Difference.of(together[0], together[1]), places, tuple(warnings))
+    overall = Difference.of(together[0], together[1], ignore_below=ignore_below)
+    return Compared((before, after), both, overall, places, tuple(warnings))
 
 
 def _refuse(before: RunRecord, after: RunRecord) -> None:

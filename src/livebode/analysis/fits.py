@@ -18,13 +18,15 @@ from livebode.fitting.unknown_gain import TwoMassGain
 from livebode.records import RunRecord
 from livebode.sources.expressions import negated
 
+_WRONG = 0.3  # of |G|: the model error from which a finished run's fit is refused
+
 
 def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
     """A model fitted to a finished run, and a description of what it was fitted to.
 
     For a run that averages, the newest valid response; else the mean of all. If the run has no units, and its
     configuration does not specify whether the output is a velocity or a position, the one with the smaller misfit is
-    used.
+    used. A fit whose model error is 30 % of |G| or more is refused.
     """
     return fit_averaged(averaged(RunRecord.open(directory)), section)
 
@@ -43,7 +45,20 @@ def _best(of: Averaged, section: FitSection) -> Fit:
     if section.output == "auto" and of.kinds.output is None:
         sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]
     found = [fit(of.response, chosen_model(one, of.kinds), **fit_settings(one)) for one in sections]
-    return min(found, key=lambda one: one.epsilon if one.status == "ok" else np.inf)
+    best = min(found, key=lambda one: one.epsilon if one.status == "ok" else np.inf)
+    if best.status != "ok" or best.epsilon < _WRONG:
+        return best
+    taken = _taken(best)
+    return best.refused(
+        f"as a {taken} the output differs from the {best.model.name} model by {100 * best.epsilon:.0f} % of |G| (limit "
+        f"{100 * _WRONG:.0f} %), so its parameters have no meaning: specify the kind, or fit another model"
+    )
+
+
+def _taken(found: Fit) -> str:
+    """Quantity for which the output was taken."""
+    assert isinstance(found.asked, Chain | TwoMassGain)  # `chosen_model` gives no other
+    return found.asked.output
 
 
 def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, live: bool = False) -> list[str]:
@@ -59,8 +74,7 @@ def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, l
         taken = "velocity" if of.kinds.output == "velocity" else "position"
         why = f"by its unit {unit}" if read_unit(unit).kind == of.kinds.output else "as source.kinds declares"
     else:
-        assert isinstance(found.asked, Chain | TwoMassGain)  # `chosen_model` gives no other
-        taken = found.asked.output
+        taken = _taken(found)
         why = "because neither a unit nor a kind is known"
         why = f"which has the smaller misfit, {why}" if found.status == "ok" else why
     remarks = [f"the output {output!r} is fitted as a {taken}, {why}"]
@@ -73,6 +87,8 @@ def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, l
                 f"the model fits with the other sign (model error {100 * other.epsilon:.2g} %): output or input is "
                 f"inverted; {'change the sign in the drive' if live else remedy}"
             )
+        else:
+            remarks.append("for a machine that is not such a drive, fit its modes: --model modal, or --model rational")
     return remarks
 
 
@@ -84,6 +100,8 @@ def plain_fit(found: Fit) -> dict[str, Any]:
     for name, quantity in quantities.items():
         if (limit := found.at_most(name)) is not None:
             quantity["at_most"] = limit
+        if quantity["bound_95"] == 0:
+            quantity["fixed"] = True
     return {
         "model": found.asked.name if found.asked is not None else found.model.name,
         "status": found.status,

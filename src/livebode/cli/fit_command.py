@@ -3,25 +3,41 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
 from livebode.cli.band import parsed_band
 from livebode.cli.options import Json
-from livebode.cli.pictures import show_fit
+from livebode.cli.pictures import show_fit, show_poles
 from livebode.configuration import Axis
+from livebode.configuration.axis import FitSection
+from livebode.configuration.recorded import recorded_configuration
 from livebode.core import UsageError
+from livebode.fitting import POLE_MODELS
+from livebode.fitting.pole_search import Kind
 from livebode.records import RunRecord, to_json
+
+_OPTIONS = {"radius_m": "radius", "inertia_ratio": "ratio", "fixed": "fix"}
 
 
 def fit_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
+    directories: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN...", help="Run directory; several, of one input and different outputs, for common poles."
+        ),
+    ],
     model: Annotated[
         str | None,
         typer.Option(
-            help="rigid, two-mass, three-mass, two-mass-gain or auto (two-mass if the input is a torque in N m)."
+            help="rigid, two-mass, three-mass, two-mass-gain or auto (two-mass if the input is a torque in N m); for "
+            "any machine modal (modes) or rational (poles)."
         ),
+    ] = None,
+    order: Annotated[
+        int | None,
+        typer.Option(help="Of modal: number of modes; of rational: of poles without integrators. \\[default: by BIC]"),
     ] = None,
     output: Annotated[
         str | None,
@@ -46,12 +62,9 @@ def fit_command(
 ) -> None:
     """Fit a model to the response of a run, and print its parameters with bounds.
 
-    Defaults are from the run's \\[fit] section. Exit code 3 if no model fits.
+    With modal or rational the outputs of several runs have their poles in common. Defaults are from the run's \\[fit]
+    section. Exit code 3 if no model fits.
     """
-    from livebode.analysis.averaged import averaged
-    from livebode.analysis.fits import fit_averaged, fit_remarks, plain_fit
-    from livebode.configuration.recorded import recorded_configuration
-
     given: dict[str, Any] = {
         "model": model,
         "output": output,
@@ -63,12 +76,28 @@ def fit_command(
         "band_hz": parsed_band(band),
         "hold": hold,
     }
-    data = {"source": {"log": str(directory)}, "signals": {"output": "y"}}
-    run = RunRecord.open(directory)
+    specified = {name: value for name, value in given.items() if value is not None}
+    if model in POLE_MODELS:
+        _fit_poles(directories, cast(Kind, model), specified, order, as_json)
+    else:
+        _fit_physical(directories, specified, order, as_json)
+
+
+def _fit_physical(directories: list[Path], specified: dict[str, Any], order: int | None, as_json: bool) -> None:
+    from livebode.analysis.averaged import averaged
+    from livebode.analysis.fits import fit_averaged, fit_remarks, plain_fit
+
+    if len(directories) > 1 or order is not None:
+        what = "several runs" if len(directories) > 1 else "--order"
+        raise UsageError(
+            "conflict",
+            f"{what} cannot be combined with a physical model",
+            "add --model modal or --model rational",
+            argument="RUN" if len(directories) > 1 else "order",
+        )
+    run = RunRecord.open(directories[0])
     configuration = recorded_configuration(run.summary)
-    own = configuration.get("fit", {})
-    section = Axis.of(data | {"fit": own | {k: v for k, v in given.items() if v is not None}}, "the options").fit
-    assert section is not None
+    section = _section(directories[0], configuration.get("fit", {}) | specified)
     average = averaged(run)
     found, words = fit_averaged(average, section)
     source, signals = (configuration.get(name, {}) for name in ("source", "signals"))
@@ -82,6 +111,41 @@ def fit_command(
             print(f"  {remark}")
     if found.status != "ok":
         raise typer.Exit(3)
+
+
+def _fit_poles(
+    directories: list[Path], model: Kind, specified: dict[str, Any], order: int | None,
+    as_json: bool,
+) -> None:  # fmt: skip
+    from livebode.analysis.poles import fit_poles, plain_poles
+
+    if other := sorted(specified.keys() - {"model", "band_hz", "hold"}):
+        raise UsageError(
+            "conflict",
+            f"the model {model!r} has no option {_OPTIONS.get(other[0], other[0])!r}",
+            "leave it out",
+            argument=other[0],
+            model=model,
+        )
+    own = recorded_configuration(RunRecord.open(directories[0]).summary).get("fit", {})
+    kept = {name: own[name] for name in ("band_hz", "hold") if name in own}
+    section = _section(directories[0], kept | {name: specified[name] for name in specified if name != "model"})
+    found, remarks = fit_poles(directories, model, section, order)
+    if as_json:
+        print(to_json(plain_poles(found, remarks)))
+    else:
+        show_poles(found)
+        for remark in remarks:
+            print(f"  {remark}")
+    if found.status != "ok":
+        raise typer.Exit(3)
+
+
+def _section(directory: Path, values: dict[str, Any]) -> FitSection:
+    data = {"source": {"log": str(directory)}, "signals": {"output": "y"}, "fit": values}
+    section = Axis.of(data, "the options").fit
+    assert section is not None
+    return section
 
 
 def _pair(text: str) -> tuple[str, float]:

@@ -24,8 +24,7 @@ Outputs = Annotated[
     typer.Option(
         "--output",
         metavar="CHANNEL",
-        help="Channel of the measured output y, or an expression: -y, pos + 0.35*angle, diff(pos). With --output-only "
-        "also several.",
+        help="Channel of the measured output y, or an expression: -y, pos + 0.35*angle, diff(pos); repeat for several.",
     ),
 ]
 Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Sample rate, if the recording does not contain it.")]

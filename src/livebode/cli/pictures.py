@@ -14,6 +14,7 @@ from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.core import Model, Responses, counted
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.fitting import Fit
+from livebode.fitting.common_poles import CommonPoles
 from livebode.runtime import Draw, Outcome
 
 _ALARMS_SHOWN = 8
@@ -162,7 +163,24 @@ def show_fit(found: Fit, of: str) -> None:
         if (limit := found.at_most(name)) is not None:
             print(f"  {name:22}{'≤':>3}{limit:>9.2g}   {'':10}{unit}")
             continue
-        print(f"  {name:22}{value:>12.5g} ± {bound:<10.2g}{unit}")
+        around = f"± {bound:<10.2g}" if bound else f"{'fixed':12}"
+        print(f"  {name:22}{value:>12.5g} {around}{unit}")
     chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} from sigma alone"
     print(f"  {found.about_bounds}")
     print(f"  model error ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
+
+
+def show_poles(found: CommonPoles) -> None:
+    """Print modes, poles and the weights at each output with bounds."""
+    f, outputs = found.grid.frequency_hz, counted(len(found.outputs), "output")
+    print(f"{found.model} model of {outputs}; {counted(f.size, 'line')}, {f[0]:g} … {f[-1]:g} Hz")
+    if found.status != "ok":
+        print(f"  no parameters ({found.status}): {found.sentence}")
+        return
+    print(f"  {found.about_order}")
+    for name, value, bound, unit in found.rows():
+        print(f"  {name:28}{value:>12.5g} ± {bound:<10.2g}{unit}")
+    print(f"  {found.about_bounds}")
+    for name, epsilon, chi2 in zip(found.outputs, found.epsilon, found.chi2):
+        words = "" if isnan(chi2) else f"; reduced chi² {chi2:.3g} from sigma alone"
+        print(f"  {name}: model error ε = {100 * epsilon:.2g} % of |G|{words}")

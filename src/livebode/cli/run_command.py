@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -126,7 +127,8 @@ def run_command(
 ) -> None:
     """Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.
 
-    Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png.
+    Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png; with several
+    --output one for each in --out, which livebode fit takes together.
     """
     given: dict[str, dict[str, Any]] = {
         "source": {
@@ -175,8 +177,16 @@ def run_command(
             "list the recordings in its source.log",
             argument="log",
         )
+    each = [] if output_only else output or []
     file = ConfigurationFile(target, over) if target.suffix.lower() == ".toml" else None
-    axes = {"": _axis(targets, over)} if file is None else file.read()
+    if file is not None and len(each) > 1:
+        raise UsageError(
+            "conflict",
+            "several --output cannot be combined with a configuration",
+            "write an axis for each in [axes]",
+            argument="output",
+        )
+    axes: Axes = _axes(targets, over, each) if file is None else file.read()
     directory = out or Path("runs") / target.stem
     live = any(axis.source.live for axis in axes.values())
     if (alone := axes.get("")) is not None and alone.output_only is not None:
@@ -191,15 +201,15 @@ def run_command(
 
 def _output_only(chosen: bool, outputs: list[str], band: str | None) -> dict[str, Any]:
     """The section from the options; UsageError for an option that only an output-only run has."""
-    others, band_hz = outputs[1:], parsed_band(band)
-    if not chosen and (others or band_hz):
+    band_hz = parsed_band(band)
+    if band_hz and not chosen:
         raise UsageError(
             "conflict",
-            "more than one output, and a band, belong to an output-only run",
-            "give one output, or add --output-only",
-            options=["--output", "--band"],
+            "a band belongs to an output-only run",
+            "remove it, or add --output-only",
+            options=["--band"],
         )
-    return {"others": others or None, "band_hz": band_hz}
+    return {"others": outputs[1:] or None, "band_hz": band_hz}
 
 
 def _serving(axes: Axes) -> ServeSection:
@@ -215,6 +225,20 @@ def _serving(axes: Axes) -> ServeSection:
                 axes=[name, other],
             )
     return first.serve
+
+
+def _axes(recordings: list[Path], specified: dict[str, dict[str, Any]], outputs: list[str]) -> Axes:
+    """The configuration of recordings; of several outputs one axis for each, with a name that a directory can have."""
+    if len(outputs) < 2:
+        return {"": _axis(recordings, specified)}
+    found: dict[str, Axis] = {}
+    for number, output in enumerate(outputs, 1):
+        name = re.sub(r"[^A-Za-z0-9_]+", "_", output).strip("_")[:48] or "output"
+        if name.casefold() in map(str.casefold, found):
+            name = f"{name}_{number}"
+        signals = specified.get("signals", {}) | {"output": output}
+        found[name] = _axis(recordings, specified | {"signals": signals})
+    return found
 
 
 def _axis(recordings: list[Path], specified: dict[str, dict[str, Any]]) -> Axis:

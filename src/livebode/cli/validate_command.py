@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from livebode.cli.options import Excitation, Json, Output
-from livebode.core import RecordError
+from livebode.configuration import Axis
+from livebode.core import LivebodeError, RecordError
 from livebode.core.writing import writing
+from livebode.fitting import POLE_MODELS
 from livebode.records import RunRecord, to_json
+from livebode.runtime import Destination, run
 
 if TYPE_CHECKING:
-    from livebode.validation import Validation
+    from livebode.configuration.axis import FitSection
+    from livebode.validation import LineValidation, Validation
+
+Channels = dict[str, str | None]
 
 
 def validate_command(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
-    on: Annotated[Path, typer.Option("--on", metavar="LOG", help="A recording that the run does not contain.")],
+    on: Annotated[
+        Path, typer.Option("--on", metavar="LOG|RUN", help="A recording that the run does not contain, or another run.")
+    ],
     model: Annotated[
-        list[str] | None, typer.Option(help="rigid, two-mass, …; repeat to compare. \\[default: the run's \\[fit]]")
+        list[str] | None,
+        typer.Option(help="rigid, two-mass, … modal; repeat to compare. \\[default: the run's \\[fit]]"),
     ] = None,
     radius: Annotated[
         float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
@@ -30,17 +40,20 @@ def validate_command(
     output: Output = None,
     input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
     excitation: Excitation = None,
+    at_lines: Annotated[
+        bool,
+        typer.Option("--at-lines", help="Track LOG and compare at the lines. \\[default: if no simulation can judge]"),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Simulate the fitted model with another recording and test whether the residual correlates with the signals.
 
     Writes validation.png to the run directory. The parameters are constant: the mean over the run, also for a
-    machine whose plant changes with position. The channels default to those of the run.
+    machine whose plant changes with position. The channels default to those of the run. A model whose simulation is
+    not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was.
     """
-    from livebode.analysis.validation import validate_run
     from livebode.configuration.axis import FitSection
     from livebode.configuration.recorded import recorded_configuration
-    from livebode.report import save_validation_picture
 
     base = recorded_configuration(RunRecord.open(directory).summary).get("fit", {}) | (
         {} if radius is None else {"radius_m": radius}
@@ -48,17 +61,82 @@ def validate_command(
     named = [{"model": name} for name in model or []] or [{}]
     sections = [FitSection.model_validate(base | one) for one in named]
     channels = {"output": output, "input": input, "excitation": excitation}
-    found, notes = validate_run(directory, on, sections, lags=lags, samples=samples, channels=channels)
-    with writing(directory, RecordError):
-        picture = save_validation_picture(found, directory, title=f"{directory.name} on {on.name}")
+    reasons = [_reason(section, on, at_lines) for section in sections]
+    simulated = [section for section, reason in zip(sections, reasons) if not reason]
+    found: list[Validation] = []
+    notes: list[str] = []
+    picture: Path | None = None
+    if simulated:
+        found, notes, picture = _simulated(directory, on, simulated, lags, samples, channels)
+    drifting = {v.model: v.why_lines for v in found if v.drifts}
+    wanted = [(section, reason) for section, reason in zip(sections, reasons) if reason or drifting]
+    at: list[LineValidation] = []
+    if wanted:
+        at, more = _at_lines(directory, on, wanted, drifting, channels)
+        notes = list(dict.fromkeys([*notes, *more]))
     if as_json:
-        print(to_json({"models": [v.plain() for v in found], "notes": notes}))
+        print(to_json({"models": [v.plain() for v in found] + [one.plain() for one in at], "notes": notes}))
         return
     for validation in found:
         show_validation(validation)
+    for one in at:
+        show_line_validation(one)
     for sentence in notes:
         print(sentence)
-    print(f"\n{picture}")
+    if picture is not None:
+        print(f"\n{picture}")
+
+
+def _reason(section: FitSection, on: Path, at_lines: bool) -> str:
+    """Why a model is judged at the lines from the beginning; empty for one that is simulated."""
+    if at_lines:
+        return "--at-lines asks for it"
+    if (on / "run.json").exists():
+        return f"{on.name} is a run, not a recording"
+    return f"a {section.model} model is not simulated" if section.model in POLE_MODELS else ""
+
+
+def _simulated(
+    directory: Path, on: Path, sections: list[FitSection], lags: int, samples: int | None, channels: Channels
+) -> tuple[list[Validation], list[str], Path]:
+    from livebode.analysis.validation import validate_run
+    from livebode.report import save_validation_picture
+
+    found, notes = validate_run(directory, on, sections, lags=lags, samples=samples, channels=channels)
+    with writing(directory, RecordError):
+        picture = save_validation_picture(found, directory, title=f"{directory.name} on {on.name}")
+    return found, notes, picture
+
+
+def _at_lines(
+    directory: Path, on: Path, sections: list[tuple[FitSection, str]], drifting: dict[str, str], channels: Channels
+) -> tuple[list[LineValidation], list[str]]:
+    """On another run; a recording is tracked as the run was, in a directory that is removed."""
+    from livebode.analysis.line_validation import validate_run_at_lines
+
+    if (on / "run.json").exists():
+        return validate_run_at_lines(directory, on, sections, drifting)
+    with TemporaryDirectory() as there:
+        other = Path(there) / on.stem
+        try:
+            run(_tracked_alike(directory, on, channels), Destination(other, lambda *_: None))
+        except LivebodeError as error:
+            if all(reason for _, reason in sections):
+                raise
+            return [], [f"{on.name} cannot be tracked, so the model cannot be judged at the lines: {error}"]
+        return validate_run_at_lines(directory, other, sections, drifting)
+
+
+def _tracked_alike(directory: Path, on: Path, channels: Channels) -> Axis:
+    """The configuration of the run for another recording."""
+    from livebode.configuration.recorded import recorded_configuration
+
+    own = recorded_configuration(RunRecord.open(directory).summary)
+    data = {name: own[name] for name in ("signals", "lines", "tracking", "loop") if name in own}
+    of_source = own.get("source", {})
+    source = {name: of_source[name] for name in ("rate_hz", "time", "dbc", "kinds") if name in of_source}
+    signals = data.get("signals", {}) | {role: name for role, name in channels.items() if name}
+    return Axis.of(data | {"source": source | {"log": on}, "signals": signals}, str(directory))
 
 
 def show_validation(found: Validation) -> None:
@@ -74,3 +152,13 @@ def show_validation(found: Validation) -> None:
             f"  with {c.name}, {lags}: {100 * c.share:.0f} % inside the limit, {100 * c.white_share:.0f} % inside "
             f"2.17/√L = {c.white_limit:.3g}; largest {c.largest:.3g}, together p = {c.p:.2g}; {counts}"
         )
+
+
+def show_line_validation(found: LineValidation) -> None:
+    """Print the verdict and the numbers behind it."""
+    print(found.sentence)
+    at_hz, sigmas = found.worst
+    print(
+        f"  chi² {found.chi2:.3g} per degree of freedom by both uncertainties (p = {found.p:.2g}); worst line "
+        f"{at_hz:g} Hz, {sigmas:.2g} sigma"
+    )

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from livebode.configuration.axis import FitSection
 from livebode.core import ConfigError, PlantKinds
-from livebode.fitting import Fitter, PhysicalModel, model_named
+from livebode.fitting import POLE_MODELS, Fitter, PhysicalModel, model_named
 
 
 def fitter_of(section: FitSection, kinds: PlantKinds) -> Fitter:
@@ -29,10 +29,18 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
     Raises
     ------
     ConfigError
-        If the section does not specify the output, and its kind is neither a velocity nor a position; or if it
-        specifies a model in SI units and a unit is not one.
+        If the section specifies modes or poles; if it does not specify the output, and its kind is neither a velocity
+        nor a position; or if it specifies a model in SI units and a unit is not one.
     """
     name = section.model
+    if name in POLE_MODELS:
+        raise ConfigError(
+            "value-invalid",
+            f"fit.model = {name!r} is fitted to finished runs only, not to every response",
+            "fit the finished run with this model (livebode fit), or choose a model of a drive here",
+            key="fit.model",
+            value=name,
+        )
     if name == "auto":
         name = "two-mass" if kinds.si and (kinds.input == "torque" or section.radius_m) else "two-mass-gain"
     elif name != "two-mass-gain" and not kinds.si:
@@ -49,7 +57,9 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
     output = section.output
     if output == "auto":
         output = _output_of(kinds)
-    options = {"side": section.side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
+    # The gain model is of the motor's side only: naming it is no conflict.
+    side = None if name == "two-mass-gain" and section.side == "motor" else section.side
+    options = {"side": side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
     return model_named(name, output=output, **options)
 
 

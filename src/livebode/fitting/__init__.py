@@ -1,6 +1,7 @@
 """From responses to models of the machine: physical parameters and rational models, with covariance."""
 
 from livebode.fitting.chains import Rigid, TwoMass
+from livebode.fitting.common_poles import POLE_MODELS, CommonPoles, fit_common_poles
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import RunningMean, mean_response
 from livebode.fitting.models import MODELS, model_named
@@ -14,7 +15,9 @@ from livebode.fitting.unknown_gain import TwoMassGain
 
 __all__ = [
     "MODELS",
+    "POLE_MODELS",
     "Between",
+    "CommonPoles",
     "EvaluationGrid",
     "Fit",
     "Fitter",
@@ -29,6 +32,7 @@ __all__ = [
     "TwoMassGain",
     "best_of",
     "fit",
+    "fit_common_poles",
     "fit_of",
     "fit_rational",
     "mean_response",

@@ -18,7 +18,9 @@ from livebode.fitting.mean import mean_response
 from livebode.fitting.patterns import correlation, covariance, follows_pattern
 from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured
-from livebode.fitting.rows import SENTENCES, fit_rows
+from livebode.fitting.rows import NO_FIT, SENTENCES, fit_rows
+
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +48,8 @@ class Fit:
         compliance". Values, bounds, response and margins include them.
     correlation
         Correlation of the residuals of neighbouring lines, if they follow a pattern that no model explains; else None.
+    refusal
+        Why a fit whose search ended well has no numbers; see `refused`.
 
     Examples
     --------
@@ -67,6 +71,7 @@ class Fit:
     asked: PhysicalModel | None = None
     taken: tuple[str, ...] = ()
     correlation: float | None = None
+    refusal: str = ""
 
     def __repr__(self) -> str:
         band = f"{self.lines} lines, {self.band_hz[0]:g} … {self.band_hz[1]:g} Hz"
@@ -83,7 +88,22 @@ class Fit:
     @property
     def sentence(self) -> str:
         """The status for people."""
-        return SENTENCES[self.status]
+        return self.refusal or SENTENCES[self.status]
+
+    def refused(self, reason: str) -> Fit:
+        """The same without numbers, for a reason that is its sentence."""
+        part = self.parameters
+        status = np.full(1, NO_FIT, dtype=part.status.dtype)
+        blank = [
+            replace(
+                one,
+                value=np.full_like(one.value, np.nan),
+                covariance=np.full_like(one.covariance, np.nan),
+                status=status,
+            )
+            for one in (part, self.derived)
+        ]
+        return replace(self, parameters=blank[0], derived=blank[1], refusal=reason)
 
     @property
     def complete(self) -> bool:
@@ -176,13 +196,15 @@ class Fit:
         return control.tf(transfer.numerator, below)
 
     def rows(self, probability: float = 0.95) -> list[tuple[str, float, float, str]]:
-        """Name, value, half-width and unit of all fitted and derived quantities."""
+        """Name, value, half-width and unit of all fitted and derived quantities; 0 where fixed values determine it."""
         found = []
         for part in (self.parameters, self.derived):
             bound = part.bound(probability)[0]
             for i, name in enumerate(part.names):
                 if name not in self.held:
-                    found.append((name, float(part.value[0, i]), float(bound[i]), part.units[i]))
+                    value, half = float(part.value[0, i]), float(bound[i])
+                    # What follows from fixed values alone has the rounding of its slopes as a bound.
+                    found.append((name, value, 0.0 if half <= _ROUNDING * abs(value) else half, part.units[i]))
         return found
 
     def _values(self) -> NDArray[np.float64]:

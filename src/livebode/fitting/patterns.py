@@ -16,9 +16,10 @@ Complex = NDArray[np.complex128]
 
 LACKS = 10.0
 """Decrease of −2·ln(likelihood) by an ε from which noise alone does not explain the residuals."""
+RUNS = 2.6
+"""Sigma of the correlation of neighbours from which residuals follow a pattern: once in 200 fits by chance."""
 
 _ROUNDING = 1e-8
-_RUNS = 2.6  # sigma: once in 200 fits by chance
 _FEW = 16  # lines, too few for the pattern to show
 _LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # lines
 _SIZES = (0.5, 1.0, 2.0, 4.0, 8.0)  # of ε
@@ -29,7 +30,11 @@ def correlation(measured: Measured, fitted: FittedRows) -> float:
     """Correlation of neighbouring lines' weighted residuals, −1 … 1, of one row."""
     used = measured.use[0]
     weight = weights(measured.sigma, np.abs(fitted.response), fitted.epsilon)[0, used]
-    rest = weight * (measured.value - fitted.response)[0, used]
+    return neighbours(weight * (measured.value - fitted.response)[0, used])
+
+
+def neighbours(rest: Complex) -> float:
+    """Correlation of neighbours among weighted residuals (lines,); its deviation by chance is 1/√(2·lines)."""
     power = float(np.sum(np.abs(rest) ** 2))
     return float(np.sum((rest[1:] * rest[:-1].conj()).real) / power) if power > 0 else 0.0
 
@@ -44,7 +49,7 @@ def follows_pattern(measured: Measured, fitted: FittedRows, noise_dof: Floats) -
     rest, size = (np.abs(x)[measured.use].max() for x in (measured.value - fitted.response, fitted.response))
     if rest < _ROUNDING * size:
         return False  # residual of the iteration for exact data
-    if correlation(measured, fitted) * np.sqrt(2 * lines) > _RUNS:
+    if correlation(measured, fitted) * np.sqrt(2 * lines) > RUNS:
         return True
     known = replace(measured, use=measured.use & (measured.sigma > 0))
     if lines >= _FEW or not known.use.any():

@@ -69,11 +69,16 @@ def misfit(measured: Measured, response: Complex, dof: Floats, noise_dof: Floats
     """
     rest, noise, size = squares(measured, response)
     variance = noise + epsilon_for(rest, noise, size, dof)[:, np.newaxis] ** 2 * size
+    return misfit_by(rest, noise, variance, noise_dof, measured.use)
+
+
+def misfit_by(rest: Floats, noise: Floats, variance: Floats, noise_dof: Floats, use: NDArray[np.bool_]) -> Floats:
+    """The same from |residual|², the share of noise in v, and v, (rows, lines)."""
     with np.errstate(all="ignore"):
         n = np.minimum(noise_dof[:, np.newaxis] / (noise / variance) ** 2, _MANY)
         n = np.where(np.isfinite(n), n, _MANY)
         each = 2 * (n + 1) * np.log1p(rest / (n * variance)) + 2 * np.log(variance)
-        return np.asarray(np.sum(np.where(measured.use, each, 0.0), axis=-1))
+        return np.asarray(np.sum(np.where(use, each, 0.0), axis=-1))
 
 
 def lacks_more_than(epsilon: float, measured: Measured, response: Complex, dof: Floats) -> NDArray[np.bool_]:

@@ -36,9 +36,9 @@ class Comparison:
     changes: Changes
 
     @classmethod
-    def of(cls, before: Path, after: Path) -> Comparison:
+    def of(cls, before: Path, after: Path, *, ignore_below: float = 0.0) -> Comparison:
         """Read and compare two runs; raises the errors of `compare`."""
-        found = compare(RunRecord.open(before), RunRecord.open(after))
+        found = compare(RunRecord.open(before), RunRecord.open(after), ignore_below=ignore_below)
         return cls(found, changes(found))
 
     @property
@@ -75,6 +75,7 @@ class Comparison:
             "unit": self.found.overall.before.unit,
             "alpha": ALPHA,
             "tested_together": self.found.overall.m,
+            "ignore_below": self.found.overall.ignore_below,
             "lines": _lines(self.found.overall)["lines"],
             "places": places,
             "parameters": [_plain_change(c) for c in self.changes.parameters],
@@ -251,6 +252,7 @@ def _lines(d: Difference) -> dict[str, Any]:
             "frequency_hz": float(f[i]), "ratio_db": decibels(abs(d.ratio[i])),
             "ratio_deg": float(np.degrees(np.angle(d.ratio[i]))), "ratio_bound": float(d.bound[i]),
             "p": float(d.p[i]), "differs": bool(d.differs[i]),
+            "ignored": bool(d.ignored[i]),
         }
         for i in range(len(f))
     ]  # fmt: skip

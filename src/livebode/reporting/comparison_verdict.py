@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import isfinite
+from math import isfinite, log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ def _alarms(found: Compared) -> Iterator[Finding]:
 def _overall(d: Difference) -> Finding:
     if not np.isfinite(d.p).any():
         return Finding("open", tr("There is no line at which both runs have a valid mean with a known sigma."))
+    if not d.differs.any() and d.ignored.any():
+        return Finding("ok", _ignored(d))
     if not d.differs.any():
         text = tr("No line differs by more than chance ({m} tested together; {seen}).", m=d.m, seen=_seen([d]))
         return Finding("ok", text)
@@ -57,7 +59,17 @@ def _overall(d: Difference) -> Finding:
         "Most certain at {at:g} Hz: {db} ± {around} dB, {deg} ± {turned}°.",
         at=f[worst], db=signed(db), around=around, deg=signed(deg), turned=turned,
     )  # fmt: skip
-    return Finding("differs", words)
+    return Finding("differs", f"{words} {_ignored(d)}" if d.ignored.any() else words)
+
+
+def _ignored(d: Difference) -> str:
+    """Lines whose difference is certain, but smaller than matters."""
+    size = 100 * d.ignore_below
+    return trn(
+        "{n:,} line of {m} differs by less than the {size:.2g} % ({db:.2g} dB) that matter, and is ignored.",
+        "{n:,} lines of {m} differ by less than the {size:.2g} % ({db:.2g} dB) that matter, and are ignored.",
+        int(d.ignored.sum()), m=d.m, size=size, db=20 * log10(1 + d.ignore_below),
+    )  # fmt: skip
 
 
 def _by_place(places: tuple[ComparedPlace, ...]) -> Iterator[Finding]:

@@ -1,6 +1,17 @@
 """Validation of fitted models on independent data."""
 
 from livebode.validation.correlation import LIMIT, SMALL, Correlation
+from livebode.validation.lines import FittedModel, LineValidation, fitted_model, validate_at_lines
 from livebode.validation.validate import Validation, validate
 
-__all__ = ["LIMIT", "SMALL", "Correlation", "Validation", "validate"]
+__all__ = [
+    "LIMIT",
+    "SMALL",
+    "Correlation",
+    "FittedModel",
+    "LineValidation",
+    "Validation",
+    "fitted_model",
+    "validate",
+    "validate_at_lines",
+]

@@ -41,6 +41,8 @@ class Validation:
         Names of the correlations that decide the verdict.
     simulated, measured, rate_hz, output
         For the picture; `output` is the channel's name with its unit.
+    integrators
+        Of the model.
     """
 
     model: str
@@ -54,6 +56,18 @@ class Validation:
     measured: Floats
     rate_hz: float
     output: str
+    integrators: int = 0
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the simulation cannot judge the model, because the residual is not smaller than the output."""
+        return self.fit_percent <= 0
+
+    @property
+    def why_lines(self) -> str:
+        """Why such a model is judged at the lines, as text."""
+        words = {0: "", 1: " of an integrator", 2: " of two integrators"}[self.integrators]
+        return f"the simulation{words} drifts from the recording (fit {self.fit_percent:.0f} %)"
 
     @property
     def verdict(self) -> Verdict:
@@ -229,6 +243,7 @@ def validate(
         simulated=found,
         measured=signals["output"],
         rate_hz=block.rate_hz,
+        integrators=fit.model.continuous(fit.parameters.value[0]).integrators,
         output=f"{output} in {unit}" if (unit := next(c.unit for c in block.channels if c.name == output)) else output,
     )
 

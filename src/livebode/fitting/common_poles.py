@@ -1,0 +1,355 @@
+"""Modes and poles that several outputs of one input have in common, fitted to their responses, with bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.core import FitError, GridError, Parameters, Response, Responses, UsageError, counted
+from livebode.core.parameters import OK
+from livebode.fitting.fitter import measured_of
+from livebode.fitting.mean import mean_response
+from livebode.fitting.partial_fractions import PartialFractions
+from livebode.fitting.patterns import RUNS, neighbours
+from livebode.fitting.physical import EvaluationGrid, Hold
+from livebode.fitting.pole_quantities import PoleQuantities
+from livebode.fitting.pole_search import ORDER_MAX, Kind, possible, search
+from livebode.fitting.problem import Measured
+from livebode.fitting.rows import EPSILON_MAX, NO_FIT, NO_RESPONSE, NOT_CONVERGED, NOT_SEEN, SENTENCES
+from livebode.fitting.separable import Outputs, Separated, whole_covariance
+from livebode.fitting.weighing import chi_squared, squares
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+POLE_MODELS = ("modal", "rational")
+_UNCERTAIN = 0.5  # of a frequency
+
+
+@dataclass(frozen=True, eq=False)
+class CommonPoles:
+    """Poles common to all outputs, and the weights of their partial fractions at each; see `fit_common_poles`.
+
+    Attributes
+    ----------
+    model
+        "modal" or "rational".
+    outputs, units
+        Name and unit of the response of each output.
+    found
+        The fitted partial fractions; None if there are too few lines.
+    grid
+        Lines, rate and hold.
+    tried
+        Order and cost of each of the best fits, by increasing cost.
+    parameters
+        One row: frequency and damping ratio of each mode, corner frequency of each real pole (positive if stable), and
+        for each output residues as size and phase, gains of the integrators, delay; with their covariance.
+    epsilon, chi2, correlation
+        Of each output: model error as a share of |G|, reduced chi² by sigma alone, and the correlation of the residuals
+        of neighbouring lines.
+    patterned
+        Outputs whose residuals follow a pattern over the lines.
+    specified
+        Whether the order was specified.
+    raw_covariance
+        Of the coefficients of `found`: those of the poles and delays, then the weights of each output.
+    """
+
+    model: Kind
+    outputs: tuple[str, ...]
+    units: tuple[str, ...]
+    found: Separated | None
+    grid: EvaluationGrid
+    unit: float
+    tried: tuple[tuple[int, float], ...]
+    parameters: Parameters
+    epsilon: Floats
+    chi2: Floats
+    correlation: Floats
+    patterned: tuple[str, ...]
+    specified: bool
+    raw_covariance: Floats
+
+    @property
+    def status(self) -> str:
+        """ "ok", or the reason why there are no numbers."""
+        return str(self.parameters.status[0])
+
+    @property
+    def sentence(self) -> str:
+        """The status for people."""
+        if self.status == NOT_SEEN and self.order == 0:
+            return "the lines show neither a pole nor an integrator above their noise"
+        if self.status == NOT_SEEN:
+            return "the lines do not determine so many modes or poles; specify a lower order"
+        return SENTENCES[self.status]
+
+    @property
+    def raw(self) -> Floats:
+        """Coefficients of `found`, in the order of `raw_covariance`."""
+        return np.empty(0) if self.found is None else np.concatenate([self.found.theta, self.found.linear.ravel()])
+
+    def moved(self, raw: Floats, frequency_hz: Floats) -> Complex:
+        """Response of the first output for other coefficients, (lines,)."""
+        assert self.found is not None
+        of = self.found.structure
+        found = replace(
+            self.found, theta=raw[: of.nonlinear], linear=raw[of.nonlinear :].reshape(of.outputs, of.linear)
+        )
+        return np.asarray(response_of(found, self.grid._replace(frequency_hz=frequency_hz), self.unit)[0])
+
+    @property
+    def order(self) -> int:
+        """Number of modes, or of poles without integrators."""
+        return 0 if self.found is None else _order(self.found, self.model)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the bounds are 95 % bounds: no pattern is visible in the residuals."""
+        return not self.patterned
+
+    @property
+    def about_order(self) -> str:
+        """How the order was chosen, as text."""
+        what = counted(self.order, "mode" if self.model == "modal" else "pole")
+        if self.specified:
+            return f"{what}, as specified"
+        rest = "".join(f"; {order} costs {cost - self.tried[0][1]:.0f} more" for order, cost in self.tried[1:4])
+        return f"{what}, by −2·ln(likelihood) + ln(values) for each parameter (BIC){rest}"
+
+    @property
+    def about_bounds(self) -> str:
+        """What the bounds cover, as text."""
+        if self.complete:
+            return "the residuals are white over the lines; ± covers 95 %"
+        return (
+            f"the residuals of {', '.join(self.patterned)} follow a pattern over the lines, which further poles do "
+            "not explain; ± is not a 95 % bound"
+        )
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.parameters[name][0])
+
+    def bound(self, name: str, probability: float = 0.95) -> float:
+        """Half-width of its interval; see `Parameters.bound`."""
+        return float(self.parameters.bound(probability)[0, self.parameters.index(name)])
+
+    def rows(self, probability: float = 0.95) -> list[tuple[str, float, float, str]]:
+        """Name, value, half-width and unit of all quantities."""
+        of = self.parameters
+        return list(zip(of.names, of.value[0].tolist(), of.bound(probability)[0].tolist(), of.units))
+
+    def response(self, frequency_hz: ArrayLike) -> Complex:
+        """Fitted response of each output behind hold and delay, (outputs, lines).
+
+        Raises
+        ------
+        FitError
+            If the fit failed.
+        """
+        if self.status != OK or self.found is None:
+            raise FitError(
+                "not-fitted",
+                f"there is no fit to evaluate: {self.sentence}",
+                "give a fit that is valid",
+                status=self.status,
+            )
+        f = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        return response_of(self.found, self.grid._replace(frequency_hz=f), self.unit)
+
+
+def response_of(found: Separated, grid: EvaluationGrid, unit: float) -> Complex:
+    """Response of each output, (outputs, lines)."""
+    shapes = PartialFractions(found.structure, grid, unit)
+    delays = found.structure.delays_of(found.theta)
+    return np.array([shapes.columns(found.theta, float(late)) @ c for late, c in zip(delays, found.linear)])
+
+
+def fit_common_poles(
+    measured: Sequence[Response | Responses],
+    model: Kind = "modal",
+    *,
+    outputs: Sequence[str] | None = None,
+    order: int | None = None,
+    band_hz: tuple[float, float] | None = None,
+    hold: Hold = "zero-order",
+) -> CommonPoles:
+    """Fit poles that several outputs of one input have in common; also of a single output.
+
+    G_k(s) = e^(−s·τ_k)·(Σ_r (b1·s + b0)/(s² + a1·s + a0) + c1/s + c2/s² + d), with a1 and a0 common to all outputs, is
+    sampled behind the hold and fitted by weighted least squares (variable projection, Golub and Pereyra 1973). "modal"
+    has complex pairs between the lines only, and up to two direct terms for the modes above them; "rational" has
+    complex and real poles and a direct term. Integrators, direct terms and delays are taken where they lower the cost.
+
+    Poles are added where they lower chi² most, and all are fitted again. The order has the smallest cost, −2·ln
+    (likelihood) + ln(values) for each parameter (Schwarz 1978). The variance of a line is sigma² + (ε|Ĝ|)², with ε ≥ 0
+    of each output such that its reduced chi² is 1.
+
+    Bias: none to first order where order and noise are right. The bounds do not contain the choice of the order, and
+    take the noise of different outputs as independent.
+
+    Parameters
+    ----------
+    measured
+        One Response, or Responses whose mean is taken, for each output, at the same lines.
+    model
+        "modal" or "rational".
+    outputs
+        Their names; y1, y2 … by default.
+    order
+        Number of modes, or of poles without integrators; by default the best one.
+    band_hz
+        Lowest and highest frequency of the lines used.
+    hold
+        Hold of the input.
+
+    Raises
+    ------
+    UsageError, GridError, FitError
+        If order or band are invalid, the lines differ, or the responses are not of a plant. A fit that fails is not an
+        error: its status gives the reason.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> found = fit_common_poles([livebode.example_responses()])
+    >>> found.order, round(found["frequency_1"], 1), found["damping_1"] < 0.1
+    (1, 59.4, True)
+    """
+    _check(model, order)
+    batches = [mean_response(one) if isinstance(one, Responses) else Responses.of(one) for one in measured]
+    names = tuple(outputs or (f"y{k + 1}" for k in range(len(batches))))
+    outs = _outputs(batches, names, band_hz, hold)
+    best = search(outs, model, order)
+    found = best[0] if best else None
+    blank = _Blank(model, names, batches)
+    if found is None:
+        return blank.without_fit(outs)
+    raw = np.concatenate([found.theta, found.linear.ravel()])
+    quantities = PoleQuantities(found.structure, outs.unit, names, blank.units, raw)
+    covariance = whole_covariance(outs, found)
+    parameters = blank.parameters(quantities, outs, found, covariance)
+    rest = np.where(outs.measured.use, outs.measured.value - found.response, 0.0) * found.weight
+    correlated = np.array([neighbours(one[use]) for one, use in zip(rest, outs.measured.use)])
+    limit = RUNS / np.sqrt(2 * np.count_nonzero(outs.measured.use, axis=1))
+    return CommonPoles(
+        model, names, blank.units, found, outs.grid, outs.unit, tuple((_order(one, model), one.cost) for one in best),
+        parameters, found.epsilon, _reduced_chi2(outs, found), correlated,
+        tuple(name for name, one in zip(names, correlated > limit) if one), order is not None, covariance,
+    )  # fmt: skip
+
+
+def _order(found: Separated, model: Kind) -> int:
+    return found.structure.pairs if model == "modal" else found.structure.poles
+
+
+def _check(model: str, order: int | None) -> None:
+    if model not in POLE_MODELS:
+        raise UsageError(
+            "not-one-of", f"{model=} is not supported", "choose 'modal' or 'rational'", argument="model", value=model,
+            allowed=list(POLE_MODELS),
+        )  # fmt: skip
+    if order is not None and not 0 <= order <= ORDER_MAX[model]:
+        raise UsageError(
+            "out-of-range", f"{order=} is not between 0 and {ORDER_MAX[model]}", "choose one in this range",
+            argument="order", value=order,
+        )  # fmt: skip
+
+
+def _outputs(
+    batches: list[Responses], names: tuple[str, ...], band_hz: tuple[float, float] | None, hold: Hold
+) -> Outputs:
+    lines = batches[0].lines
+    for name, one in zip(names, batches):
+        if one.lines.rate_hz != lines.rate_hz or not np.array_equal(one.lines.frequency_hz, lines.frequency_hz):
+            raise GridError(
+                "not-alike",
+                f"{name!r} and {names[0]!r} have different lines or rates, so their poles cannot be fitted together",
+                "track both at the same lines of one recording",
+                outputs=[names[0], name],
+            )
+    low, high = band_hz or (0.0, np.inf)
+    inside = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
+    if not inside.any():
+        raise FitError(
+            "too-few-lines", f"the band {low:g} … {high:g} Hz has no lines", "choose a band with lines", lines=0
+        )
+    parts = [measured_of(one, inside) for one in batches]
+    whole = Measured(*(np.concatenate([getattr(part, of) for part, _ in parts]) for of in ("value", "sigma", "use")))
+    dof = np.concatenate([np.asarray(dof) for _, dof in parts])
+    grid = EvaluationGrid(lines.frequency_hz[inside], lines.rate_hz, hold)
+    return Outputs(whole, np.where(np.isnan(dof), np.inf, dof), grid)
+
+
+def _reduced_chi2(outs: Outputs, found: Separated) -> Floats:
+    rest, noise, _ = squares(outs.measured, found.response)
+    values = 2.0 * np.count_nonzero(outs.measured.use, axis=1)
+    return np.asarray(chi_squared(rest, noise) / np.maximum(values - found.structure.size / len(values), 1.0))
+
+
+class _Blank:
+    """What a result has whether or not the fit is valid."""
+
+    def __init__(self, model: Kind, names: tuple[str, ...], batches: list[Responses]) -> None:
+        self._model, self._names, self._first = model, names, batches[0]
+        self.units = tuple(one.unit for one in batches)
+
+    def without_fit(self, outs: Outputs) -> CommonPoles:
+        nan = np.full(len(self._names), np.nan)
+        parameters = self._row((), (), np.empty(0), np.empty((0, 0)), NO_RESPONSE, nan, nan, np.nan)
+        return CommonPoles(
+            self._model,
+            self._names,
+            self.units,
+            None,
+            outs.grid,
+            outs.unit,
+            (),
+            parameters,
+            nan,
+            nan,
+            nan,
+            (),
+            False,
+            np.empty((0, 0)),
+        )
+
+    def parameters(self, quantities: PoleQuantities, outs: Outputs, found: Separated, covariance: Floats) -> Parameters:
+        raw = np.concatenate([found.theta, found.linear.ravel()])
+        names = tuple(f"x{i}" for i in range(len(raw)))
+        status = OK
+        terms = found.structure.poles + found.structure.integrators
+        if not terms or not np.isfinite(covariance).all() or not possible(outs, found, self._model):
+            status = NOT_SEEN
+        elif (found.epsilon > EPSILON_MAX).any():
+            status = NO_FIT
+        elif not found.settled:
+            status = NOT_CONVERGED
+        rest, noise, _ = squares(outs.measured, found.response)
+        chi2, dof = chi_squared(rest, noise), outs.count - found.structure.size
+        row = self._row(names, ("",) * len(raw), raw, covariance, status, found.epsilon, chi2, float(dof))
+        shown = row.derived(quantities.names, quantities.units, quantities.of)
+        if status == OK and (shown.sigma[0] > _UNCERTAIN * np.abs(shown.value[0]))[quantities.certain].any():
+            return self._row(
+                shown.names, shown.units, shown.value[0], shown.covariance[0], NOT_SEEN, found.epsilon, chi2,
+                float(dof),
+            )  # fmt: skip
+        return shown
+
+    def _row(
+        self, names: tuple[str, ...], units: tuple[str, ...], value: Floats, covariance: Floats, status: str,
+        epsilon: Floats, chi2: Any, dof: float,
+    ) -> Parameters:  # fmt: skip
+        if status != OK:
+            value, covariance = np.full_like(value, np.nan), np.full_like(covariance, np.nan)
+        of = self._first
+        return Parameters(
+            model=self._model, names=names, units=units, value=value[np.newaxis], covariance=covariance[np.newaxis],
+            status=np.array([status], dtype="<U20"), epsilon=np.array([np.max(epsilon)]), chi2=np.array([np.sum(chi2)]),
+            dof=np.array([dof]), sample=of.sample, time_s=of.time_s, schedule=of.schedule,
+        )  # fmt: skip

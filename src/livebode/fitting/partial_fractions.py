@@ -1,0 +1,152 @@
+"""A response as a sum of partial fractions: pairs of poles, a real pole, integrators and direct terms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.physical import EvaluationGrid
+from livebode.fitting.transfer import Transfer, roots
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_STEP = 1e-6  # of a frequency, for slopes
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Number of the terms that the outputs have in common, and whether each output has a delay.
+
+    The nonlinear parameters are a1, a0 of each pair s² + a1·s + a0, a of a real pole s + a, and the delays. A pair may
+    be complex or real, so that a search can pass from one to the other. The linear ones, for each output, are two for a
+    pair, b1·s + b0, one for a real pole and for each of the integrators 1/s and 1/s², and the direct terms: 1 and one
+    tick's delay of it behind a hold, else 1 and s. They are the effect of modes above the lines.
+    """
+
+    outputs: int
+    pairs: int = 0
+    single: int = 0
+    integrators: int = 0
+    direct: int = 0
+    delays: bool = False
+
+    @property
+    def nonlinear(self) -> int:
+        return 2 * self.pairs + self.single + self.outputs * self.delays
+
+    @property
+    def linear(self) -> int:
+        """Of each output."""
+        return 2 * self.pairs + self.single + self.integrators + self.direct
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return self.nonlinear + self.outputs * self.linear
+
+    @property
+    def poles(self) -> int:
+        """Number of poles without the integrators."""
+        return 2 * self.pairs + self.single
+
+    def pairs_of(self, theta: Floats) -> Floats:
+        """a1 and a0, shape (..., pairs, 2)."""
+        return theta[..., : 2 * self.pairs].reshape(*theta.shape[:-1], self.pairs, 2)
+
+    def delays_of(self, theta: Floats) -> Floats:
+        """Delay of each output in seconds, shape (..., outputs)."""
+        if not self.delays:
+            return np.zeros((*theta.shape[:-1], self.outputs))
+        return theta[..., -self.outputs :]
+
+
+def poles_of(structure: Structure, theta: Floats) -> Complex:
+    """Poles without the integrators, those of a pair after each other, (..., poles)."""
+    pairs = structure.pairs_of(theta)
+    both = roots(np.concatenate([np.ones_like(pairs[..., :1]), pairs], axis=-1))
+    single = -theta[..., 2 * structure.pairs : structure.poles].astype(np.complex128)
+    return np.concatenate([both.reshape(*theta.shape[:-1], 2 * structure.pairs), single], axis=-1)
+
+
+class PartialFractions:
+    """The columns of a structure at some lines: a response is their sum with real weights.
+
+    Parameters
+    ----------
+    structure, grid
+        Terms, and where they are evaluated.
+    unit
+        ω in rad/s by which s is divided in each column, so that the weights have the unit of the response.
+    """
+
+    def __init__(self, structure: Structure, grid: EvaluationGrid, unit: float) -> None:
+        self.structure, self.grid, self.unit = structure, grid, unit
+        self._s = np.asarray(2j * np.pi * grid.frequency_hz, dtype=np.complex128)
+
+    def columns(self, theta: Floats, delay_s: float) -> Complex:
+        """Shape (lines, linear)."""
+        of, unit = self.structure, self.unit
+        pairs = of.pairs_of(theta)
+        parts = [self.pairs(pairs[:, 0], pairs[:, 1], delay_s).reshape(2 * of.pairs, self._s.size)]
+        if of.single:
+            parts.append(self.real(theta[2 * of.pairs : 2 * of.pairs + 1], delay_s))
+        parts += [
+            self._at(Transfer.of([unit**order], [1.0] + [0.0] * order), delay_s)[np.newaxis]
+            for order in range(1, of.integrators + 1)
+        ]
+        parts += [(self._direct(order) * np.exp(-self._s * delay_s))[np.newaxis] for order in range(of.direct)]
+        return np.concatenate(parts).T
+
+    def moves(self, theta: Floats, delay_s: float) -> tuple[Complex, Complex]:
+        """Derivatives of the columns by the parameters of their own poles, by central differences.
+
+        Of a pair's two columns by a1 and a0, (2, pairs, 2, lines), and of a real pole's, (single, lines).
+        """
+        of = self.structure
+        pairs, step = of.pairs_of(theta), self._steps(theta)
+        by = step[: 2 * of.pairs].reshape(-1, 2)
+        moved = pairs + np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])[:, np.newaxis] * by
+        columns = self.pairs(moved[..., 0], moved[..., 1], delay_s)
+        change = (columns[:2] - columns[2:]) / (2 * by.T[..., np.newaxis, np.newaxis])
+        real, step = theta[2 * of.pairs : of.poles], step[2 * of.pairs :]
+        later, earlier = (self.real(real + way * step, delay_s) for way in (1, -1))
+        return change, (later - earlier) / (2 * step[:, np.newaxis])
+
+    def slopes(self, moves: tuple[Complex, Complex], weights: Floats) -> Complex:
+        """Derivative of the response with these weights by each nonlinear parameter but delays, (lines, poles)."""
+        of = self.structure
+        of_pairs = np.einsum("ipcl,pc->lpi", moves[0], weights[: 2 * of.pairs].reshape(of.pairs, 2))
+        of_real = weights[2 * of.pairs : of.poles] * moves[1].T
+        return np.concatenate([of_pairs.reshape(self._s.size, 2 * of.pairs), of_real], axis=1)
+
+    def pairs(self, a1: Floats, a0: Floats, delay_s: float = 0.0) -> Complex:
+        """Both columns of pairs (...), shape (..., 2, lines)."""
+        none, one, unit = np.zeros_like(a1), np.ones_like(a1), self.unit
+        above = [np.stack(part, axis=-1) for part in ((none, unit * one), (unit**2 * one, none))]
+        below = [np.stack([part, part], axis=-1) for part in (one, a1, a0)]
+        return self._at(Transfer.of(above, below), delay_s)
+
+    def real(self, a: Floats, delay_s: float = 0.0) -> Complex:
+        """The column of each real pole, shape (poles, lines)."""
+        return self._at(Transfer.of([self.unit + np.zeros_like(a)], [np.ones_like(a), a]), delay_s)
+
+    def _at(self, transfer: Transfer, delay_s: float) -> Complex:
+        if self.grid.hold == "none":
+            return np.asarray(transfer.response(self._s) * np.exp(-self._s * delay_s))
+        return transfer.sampled(np.exp(self._s / self.grid.rate_hz), self.grid.rate_hz, delay_s)
+
+    def _direct(self, order: int) -> Complex:
+        """Term 0 or 1."""
+        if self.grid.hold == "none":
+            return (self._s / self.unit) ** order
+        return np.asarray(np.exp(-order * self._s / self.grid.rate_hz))
+
+    def _steps(self, theta: Floats) -> Floats:
+        pairs = self.structure.pairs_of(theta)
+        size = np.sqrt(np.abs(pairs[:, 1])) + 1e-9 * self.unit
+        both = np.stack([_STEP * size, _STEP * size**2], axis=-1).ravel()
+        rest = theta[2 * self.structure.pairs : self.structure.poles]
+        return np.concatenate([both, _STEP * (np.abs(rest) + 1e-3 * self.unit)])

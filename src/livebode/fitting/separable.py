@@ -1,0 +1,236 @@
+"""Partial fractions fitted to responses of several outputs: the weights are linear, the common poles are not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.partial_fractions import PartialFractions, Structure
+from livebode.fitting.physical import EvaluationGrid
+from livebode.fitting.problem import Measured, Solution
+from livebode.fitting.rows import covariance
+from livebode.fitting.weighing import epsilon_for, misfit_by, squares, weights
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_FIRST_EPSILON = 0.1
+_SAME = 0.01
+_TICK_STEP = 1e-4  # of a tick, for the slope by a delay
+_ERROR_PRICE = 0.15  # of a pole for each value whose error is the model's: a pair has to lower ε by 14 %
+_LEFT_OVER = 4  # real values more than parameters
+_TOLERANCE = 1e-8
+_EVALUATIONS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Outputs:
+    """Responses of several outputs to one input, (outputs, lines), and the degrees of freedom of their sigmas."""
+
+    measured: Measured
+    noise_dof: Floats
+    grid: EvaluationGrid
+
+    @property
+    def unit(self) -> float:
+        """Geometric mean of the lines, in rad/s."""
+        return float(2 * np.pi * np.exp(np.mean(np.log(self.grid.frequency_hz))))
+
+    @property
+    def count(self) -> int:
+        """Number of measured real values."""
+        return 2 * int(np.count_nonzero(self.measured.use))
+
+    def enough_for(self, structure: Structure) -> bool:
+        lines = np.count_nonzero(self.measured.use, axis=1)
+        return bool(self.count >= structure.size + _LEFT_OVER and (2 * lines > structure.linear).all())
+
+
+@dataclass(frozen=True, eq=False)
+class Separated:
+    """A structure fitted: the nonlinear parameters, the weights of the columns, and what they give.
+
+    Attributes
+    ----------
+    theta, linear
+        (nonlinear,) and (outputs, linear).
+    response, weight
+        Of the model, and by which the residuals were multiplied, (outputs, lines).
+    epsilon
+        Model error of each output as a share of its measured |G|, (outputs,).
+    cost
+        −2·ln(likelihood) plus ln(values) for each parameter, the criterion of Bayes and Schwarz (BIC); and for each
+        pole ln(lines), and 0.15 for each value whose error is the model's, not noise.
+    settled
+        Whether the search converged.
+    """
+
+    structure: Structure
+    theta: Floats
+    linear: Floats
+    response: Complex
+    weight: Floats
+    epsilon: Floats
+    cost: float
+    settled: bool
+
+
+def solve(
+    outputs: Outputs, structure: Structure, start: Floats, *, rounds: int, evaluations: int = _EVALUATIONS
+) -> Separated:
+    """Fit from a start, and again with the ε of the residuals, at most `rounds` times."""
+    measured = outputs.measured
+    epsilon = np.full(structure.outputs, _FIRST_EPSILON)
+    theta, dof = start, _dof(outputs, structure)
+    for _ in range(rounds):
+        problem = _Weighted(outputs, structure, _weights(measured, epsilon))
+        theta, settled = problem.minimised(theta, evaluations)
+        linear, response = problem.at(theta)
+        rest, noise, _ = squares(measured, response)
+        size = np.where(measured.use, np.abs(measured.value), 0.0) ** 2
+        before, epsilon = epsilon, epsilon_for(rest, noise, size, dof)
+        if (np.abs(epsilon - before) <= _SAME * epsilon).all():
+            break
+    variance = noise + epsilon[:, np.newaxis] ** 2 * size
+    likely = float(np.sum(misfit_by(rest, noise, variance, outputs.noise_dof, measured.use)))
+    # Errors of an incomplete model are alike at neighbouring lines and in all outputs: they are fewer than lines.
+    erring = 2 * float(np.sum(1 - (noise / np.where(variance > 0, variance, 1.0))[measured.use]))
+    # A pole is searched for over all lines, so the largest of as many random values is found.
+    each_pole = np.log(outputs.grid.frequency_hz.size) + _ERROR_PRICE * erring
+    cost = likely + structure.size * np.log(outputs.count) + structure.poles * each_pole
+    return Separated(structure, theta, linear, response, problem.weight, epsilon, cost, settled)
+
+
+def whole_covariance(outputs: Outputs, of: Separated) -> Floats:
+    """Covariance of the nonlinear parameters and then the weights of each output; not finite where it is singular.
+
+    The noise of different outputs is taken as independent.
+    """
+    problem = _Weighted(outputs, of.structure, of.weight)
+    slope = problem.slopes(of.theta, of.linear)
+    measured = outputs.measured
+    sigma = np.where(measured.sigma > 0, measured.sigma, 0.0)
+    epsilon = np.where(_unknown(measured) & (of.epsilon == 0), 1.0, of.epsilon)
+    total = np.sqrt(sigma**2 + (epsilon[:, np.newaxis] * np.abs(measured.value)) ** 2)
+    # As noise alone: what part of it is sigma, with few degrees of freedom, is in `noise_dof` of the whole.
+    flat = Measured(measured.value.reshape(1, -1), total.reshape(1, -1), measured.use.reshape(1, -1))
+    found = Solution(of.theta[np.newaxis], of.response.reshape(1, -1), slope[np.newaxis], np.ones(1, dtype=bool))
+    share = np.where(measured.use, sigma / np.where(total > 0, total, 1.0), 0.0) ** 2
+    dof = outputs.noise_dof / np.maximum(np.mean(share, axis=1, where=measured.use) ** 2, 1e-12)
+    return np.asarray(covariance(flat, found, np.zeros(1), np.array([np.min(dof)]))[0])
+
+
+def left_over(outputs: Outputs, of: Separated) -> tuple[Floats, list[Floats]]:
+    """Weighted residuals, real above imaginary parts, (outputs, 2·lines), and the basis of each output's columns."""
+    problem = _Weighted(outputs, of.structure, of.weight)
+    rest = of.weight * np.where(outputs.measured.use, outputs.measured.value - of.response, 0.0)
+    return stacked(rest.T).T, [q for q, *_ in problem.factors(of.theta)]
+
+
+def stacked(values: NDArray[Any]) -> Floats:
+    """Real above imaginary parts, along the first axis."""
+    return np.concatenate([values.real, values.imag])
+
+
+class _Weighted:
+    """The least squares of one structure with given weights, and its solution at the last poles."""
+
+    def __init__(self, outputs: Outputs, structure: Structure, weight: Floats) -> None:
+        self.structure, self.weight = structure, weight
+        self._shapes = PartialFractions(structure, outputs.grid, outputs.unit)
+        self._rate_hz, value = outputs.grid.rate_hz, outputs.measured.value
+        self._right = [stacked(w * np.where(w > 0, y, 0.0)) for w, y in zip(weight, value)]
+        self._last: tuple[Floats, list[Any]] | None = None
+        self._moves: tuple[Floats, tuple[Complex, Complex]] | None = None
+
+    def minimised(self, start: Floats, evaluations: int) -> tuple[Floats, bool]:
+        from scipy.optimize import least_squares
+
+        if not start.size:
+            return start, True
+        with np.errstate(all="ignore"):
+            found = least_squares(
+                self._residual, start, self._jacobian, method="lm", x_scale="jac", max_nfev=evaluations,
+                xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=_TOLERANCE,
+            )  # fmt: skip
+        return np.asarray(found.x), bool(found.success)
+
+    def at(self, theta: Floats) -> tuple[Floats, Complex]:
+        """Weights (outputs, linear) and response (outputs, lines)."""
+        found = self.factors(theta)
+        return np.array([c for _, c, _, _ in found]), np.array([columns @ c for _, c, columns, _ in found])
+
+    def factors(self, theta: Floats) -> list[Any]:
+        """Orthonormal basis of the weighted columns, their weights, the columns, and the residual, of each output."""
+        if self._last is not None and np.array_equal(self._last[0], theta):
+            return self._last[1]
+        found = []
+        delays, columns = self.structure.delays_of(theta), None
+        for weight, right, delay_s in zip(self.weight, self._right, delays):
+            if columns is None or self.structure.delays:
+                columns = np.nan_to_num(self._shapes.columns(theta, float(delay_s)), posinf=0.0, neginf=0.0)
+            left = stacked(weight[:, np.newaxis] * columns)
+            scale = np.linalg.norm(left, axis=0) + 1e-300
+            q, r = np.linalg.qr(left / scale)
+            across = q.T @ right
+            linear = np.linalg.lstsq(r, across, rcond=1e-13)[0] / scale
+            found.append((q, linear, columns, right - q @ across))
+        self._last = (np.array(theta), found)
+        return found
+
+    def slopes(self, theta: Floats, linear: Floats) -> Complex:
+        """Derivatives of all responses by all parameters, (outputs·lines, size), without weights."""
+        of, lines = self.structure, self.weight.shape[1]
+        whole = np.zeros((of.outputs, lines, of.size), dtype=np.complex128)
+        for k, (_, _, columns, _) in enumerate(self.factors(theta)):
+            whole[k, :, : of.nonlinear] = self._moved(theta, linear[k], k)
+            begin = of.nonlinear + k * of.linear
+            whole[k, :, begin : begin + of.linear] = columns
+        return whole.reshape(of.outputs * lines, of.size)
+
+    def _residual(self, theta: Floats) -> Floats:
+        return np.concatenate([rest for *_, rest in self.factors(theta)])
+
+    def _jacobian(self, theta: Floats) -> Floats:
+        """Kaufman's: the slopes at fixed weights, without what the weights can follow."""
+        parts = []
+        for k, (q, linear, _, _) in enumerate(self.factors(theta)):
+            moved = stacked(self.weight[k][:, np.newaxis] * self._moved(theta, linear, k))
+            parts.append(q @ (q.T @ moved) - moved)
+        return np.asarray(np.nan_to_num(np.concatenate(parts)))
+
+    def _moved(self, theta: Floats, linear: Floats, k: int) -> Complex:
+        """Derivative of the response of output k by the nonlinear parameters, (lines, nonlinear)."""
+        of, delay_s = self.structure, float(self.structure.delays_of(theta)[k])
+        if of.delays or self._moves is None or not np.array_equal(self._moves[0], theta):
+            self._moves = (np.array(theta), self._shapes.moves(theta, delay_s))
+        found = self._shapes.slopes(self._moves[1], linear)
+        if not of.delays:
+            return found
+        step = _TICK_STEP / self._rate_hz
+        later, earlier = (self._shapes.columns(theta, delay_s + way * step) @ linear for way in (1, -1))
+        by_delay = np.zeros((len(found), of.outputs), dtype=np.complex128)
+        by_delay[:, k] = (later - earlier) / (2 * step)
+        return np.concatenate([found, by_delay], axis=1)
+
+
+def _unknown(measured: Measured) -> Any:
+    return ~((measured.sigma > 0) & measured.use).any(axis=1)
+
+
+def _weights(measured: Measured, epsilon: Floats) -> Floats:
+    """Of each line; by its size where neither noise nor ε is known.
+
+    The size is the measured one: that of a model with too few poles is wrong by orders of magnitude between them.
+    """
+    known = np.where(_unknown(measured) & (epsilon == 0), 1.0, epsilon)
+    return np.where(measured.use, weights(measured.sigma, np.abs(measured.value), known), 0.0)
+
+
+def _dof(outputs: Outputs, structure: Structure) -> Floats:
+    """Degrees of freedom of each output's residuals, with an equal share of the common parameters."""
+    values = 2.0 * np.count_nonzero(outputs.measured.use, axis=1)
+    return np.asarray(np.maximum(values - structure.size / structure.outputs, 1.0))
