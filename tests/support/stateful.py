@@ -212,7 +212,7 @@ def stages_in(root: object, place: tuple[object, ...] = ()) -> Iterator[tuple[tu
 
 
 def every_class() -> set[type]:
-    """Every class of the package with `snapshot` and `restore` that others do not derive from."""
+    """Every class of the package with `snapshot` and `restore` that has a stage, or that others do not derive from."""
     names = [module.name for module in pkgutil.walk_packages(livebode.__path__, "livebode.")]
     for name in names:
         importlib.import_module(name)
@@ -223,4 +223,5 @@ def every_class() -> set[type]:
         if inspect.isclass(one) and one.__module__.startswith("livebode") and not getattr(one, "_is_protocol", False)
         if hasattr(one, "snapshot") and hasattr(one, "restore")
     }
-    return {one for one in found if not any(other is not one and issubclass(other, one) for other in found)}
+    bases = {one for one in found if any(other is not one and issubclass(other, one) for other in found)}
+    return {one for one in found if one not in bases or "_stage" in vars(one)}

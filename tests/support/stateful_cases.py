@@ -14,6 +14,7 @@ from livebode.configuration.axis import FitSection
 from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
 from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.estimation.successive import SuccessiveTrackers
+from livebode.estimation.uneven_tracker import UnevenTracker
 from livebode.excitation import multisine
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.fitting.drift import DriftTest
@@ -130,6 +131,16 @@ def spectra_tracker() -> Case:
         lambda: SpectraTracker(settings, LAYOUT),
         processed(list(spectra())),
         [lambda: SpectraTracker(other, LAYOUT)],
+    )
+
+
+def uneven_tracker() -> Case:
+    settings = Settings(lines=LINES, excitation="w", input="u", output="y", schedule="x", hop=10)
+    other = replace(settings, average=True)
+    return Case(
+        lambda: UnevenTracker(settings, LAYOUT),
+        processed(list(spectra())),
+        [lambda: UnevenTracker(other, LAYOUT)],
     )
 
 
@@ -281,7 +292,7 @@ CASES = {
     case.__name__: case
     for case in (
         tracker, direct_tracker, successive_trackers, local_polynomial, welch_average, spectra_tracker,
-        motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits, run_counts,
-        stream_position,
+        uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
+        run_counts, stream_position,
     )
 }  # fmt: skip

@@ -14,21 +14,19 @@ Band = Annotated[
 ]
 
 
-def parsed_band(text: str | None) -> list[float] | None:
+def parsed_band(text: str) -> list[float]:
     """Both limits in Hz; UsageError if the text has another form.
 
     >>> parsed_band("20:60")
     [20.0, 60.0]
     """
-    if text is None:
-        return None
     try:
         low, high = (float(part) for part in text.split(":"))
     except ValueError:
         raise UsageError(
             "unreadable",
             f"the band {text!r} is not LOW:HIGH in Hz",
-            "write for example 30:120",
+            "write for example 20:140",
             argument="band",
             value=text,
         ) from None

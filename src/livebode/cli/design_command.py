@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from livebode.cli import terminal
+from livebode.cli.band import parsed_band
 from livebode.cli.options import Json
-from livebode.core import UsageError, counted
+from livebode.core import counted
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def design_command(
 
     over: dict[str, Any] = {
         "resolution_hz": resolution, "amplitude_n_m": amplitude, "accuracy": accuracy, "seed": seed,
-        "band_hz": None if band is None else _band(band),
+        "band_hz": None if band is None else parsed_band(band),
     }  # fmt: skip
     asked = Experiment.read(experiment, {key: value for key, value in over.items() if value is not None})
     with _working():
@@ -69,20 +70,6 @@ def _working() -> AbstractContextManager[object]:
     """A spinner on a terminal: thousands of lines take time."""
 
     return terminal.console(stderr=True).status("choosing")
-
-
-def _band(text: str) -> list[float]:
-    try:
-        low, high = (float(part) for part in text.split(":"))
-    except ValueError:
-        raise UsageError(
-            "unreadable",
-            f"the band {text!r} is not LOW:HIGH in Hz",
-            "write for example 20:140",
-            argument="band",
-            value=text,
-        ) from None
-    return [low, high]
 
 
 def _draw(design: Design, path: Path) -> None:

@@ -73,7 +73,7 @@ def fit_command(
         "inertia_ratio": ratio,
         "fixed": dict(_pair(text) for text in fix) if fix else None,
         "free": free or None,
-        "band_hz": parsed_band(band),
+        "band_hz": parsed_band(band) if band else None,
         "hold": hold,
     }
     specified = {name: value for name, value in given.items() if value is not None}

@@ -165,10 +165,9 @@ def run_command(
             "covariates": covariate or None,
         },
     }
-    given["output_only"] = _output_only(output_only, output or [], band)
     specified = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
     over = {section: values for section, values in specified.items() if values} | ({"record": {}} if go_on else {})
-    over |= {"output_only": specified["output_only"]} if output_only else {}
+    over |= _output_only(output_only, output or [], band)
     target = targets[0]
     if len(targets) > 1 and any(path.suffix.lower() == ".toml" for path in targets):
         raise UsageError(
@@ -200,16 +199,18 @@ def run_command(
 
 
 def _output_only(chosen: bool, outputs: list[str], band: str | None) -> dict[str, Any]:
-    """The section from the options; UsageError for an option that only an output-only run has."""
-    band_hz = parsed_band(band)
-    if band_hz and not chosen:
+    """The section of an output-only run; nothing for another one, and UsageError if that has a band."""
+    if chosen:
+        others = {"others": outputs[1:]} if outputs[1:] else {}
+        return {"output_only": others | ({"band_hz": parsed_band(band)} if band else {})}
+    if band:
         raise UsageError(
             "conflict",
             "a band belongs to an output-only run",
             "remove it, or add --output-only",
             options=["--band"],
         )
-    return {"others": outputs[1:] or None, "band_hz": band_hz}
+    return {}
 
 
 def _serving(axes: Axes) -> ServeSection:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from livebode.configuration.axis import Axis
 from livebode.core import LivebodeError, RecordingError
 from livebode.sources import Log, open_log
@@ -10,17 +12,8 @@ from livebode.sources.uneven import UNEVEN, UnevenLog, open_uneven
 
 def open_recording(axis: Axis) -> Log:
     """Open the one recording in [source] at the clock of the output; LivebodeError if it cannot be read."""
-    source = axis.source
-    (path,) = source.logs
-    return open_log(
-        path,
-        rate_hz=source.rate_hz,
-        time=source.time,
-        kinds=source.kinds,
-        clock=source.clock,
-        dbc=source.dbc,
-        channels=[axis.signals.output],
-    )
+    (path,) = axis.source.logs
+    return open_log(path, **_reading(axis), channels=[axis.signals.output])
 
 
 def open_even_or_uneven(axis: Axis) -> Log | UnevenLog:
@@ -39,15 +32,18 @@ def open_even_or_uneven(axis: Axis) -> Log | UnevenLog:
     except RecordingError as error:
         if error.code not in UNEVEN or source.time == "none":
             raise
-    return open_uneven(
-        path,
-        names,
-        rate_hz=source.rate_hz,
-        time=source.time,
-        kinds=source.kinds,
-        clock=source.clock,
-        dbc=source.dbc,
-    )
+    return open_uneven(path, names, **_reading(axis))
+
+
+def _reading(axis: Axis) -> dict[str, Any]:
+    source = axis.source
+    return {
+        "rate_hz": source.rate_hz,
+        "time": source.time,
+        "kinds": source.kinds,
+        "clock": source.clock,
+        "dbc": source.dbc,
+    }
 
 
 def _check_clock(log: Log, name: str) -> None:

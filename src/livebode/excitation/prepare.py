@@ -63,8 +63,7 @@ def checked(samples: ArrayLike, name: str) -> Floats:
         raise SignalError(
             "channel-constant",
             f"the {name} is constant at {known[0]:g}",
-            "choose the channel that carries the excitation; for hum in a recording "
-            "without excitation, inspect it with lines",
+            "choose the channel with the signal; for hum in a recording without excitation, inspect it with lines",
             role=name,
             value=float(known[0]),
         )
@@ -75,7 +74,7 @@ def checked(samples: ArrayLike, name: str) -> Floats:
         raise SignalError(
             "no-excitation",
             f"the {name} is a straight line",
-            "choose the channel that carries the excitation",
+            "choose the channel with the signal",
             role=name,
         )
     return x

@@ -208,7 +208,10 @@ def make_lines(axis: Axis, log: Log) -> Lines:
     if window != "auto":
         return lines_of_window(samples, window, log.rate_hz)
     if frequencies == "auto":
-        return recognise(samples, log.rate_hz, beginning(log, axis.signals.output)).lines
+        answer = beginning(log, axis.signals.output)
+        known = answer[np.isfinite(answer)]
+        # A constant output is refused with its name when all of it has been read.
+        return recognise(samples, log.rate_hz, answer if known.size and np.ptp(known) else None).lines
     return Lines.parse(frequencies, log.rate_hz, recognise(samples, log.rate_hz, doubtful=True).period)
 
 
