@@ -50,6 +50,17 @@ print(sorted(heavy & set(sys.modules)))
     assert done.stdout.splitlines() == ["[]", "['numpy']"]
 
 
+def test_the_command_line_starts_without_what_most_commands_do_not_need() -> None:
+    code = """
+import sys, livebode.cli.app
+heavy = {'matplotlib', 'pandas', 'uvicorn'}
+heavy |= {f'scipy.{name}' for name in ('linalg', 'optimize', 'signal', 'special', 'stats')}
+print(sorted(heavy & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split("\n")[0] == "[]"
+
+
 @pytest.mark.parametrize("name", [n for n in livebode.__all__ if inspect.isclass(getattr(livebode, n))])
 def test_every_documented_parameter_exists(name: str) -> None:
     thing = getattr(livebode, name)

@@ -107,8 +107,8 @@ def test_an_edit_that_cannot_be_applied_is_refused_once_and_the_run_continues(tm
             running.file.write_text(one(machine).replace(before, after))
             until(lambda count=count: len(reported(running.out / "x")) >= count, message)
             assert message in reported(running.out / "x")[-1].message
-            at = numbers(running.out / "x").size
-            running.tracked("x", at + 2500)  # more than a look at the file
+        at = numbers(running.out / "x").size
+        running.tracked("x", at + 2500)  # more than a look at the file
         code, _, err = running.end()
     assert code == 0
     assert [event.kind for event in reported(running.out / "x")] == ["connected", *["configuration-refused"] * 4]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import gcd
 
 import numpy as np
+import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
-from scipy.special import fdtri
 
 from livebode.core import Lines
 from livebode.estimation.bounds import power
@@ -130,4 +130,4 @@ def _by_chance(known: int, dof: float) -> float:
     Of as many detection lines as the noise is averaged over; the mean over more of them exceeds it less often.
     """
     independent = 2 * min(known, _SMOOTH.size)
-    return float(fdtri(independent, independent * dof, 1 - _CHANCE))
+    return float(scipy.special.fdtri(independent, independent * dof, 1 - _CHANCE))

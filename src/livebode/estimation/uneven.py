@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotri
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -163,10 +163,10 @@ class UnevenSpectra:
         normal[0, 0] = one[0].real
         if trend:
             normal[0, 1], normal[1, 1] = sums[_U, 0].real, sums[_UU, 0].real
-        factor, singular = dpotrf(normal, lower=0)
+        factor, singular = scipy.linalg.lapack.dpotrf(normal, lower=0)
         if singular:
             return None
-        inverse, _ = dpotri(factor, lower=0)
+        inverse, _ = scipy.linalg.lapack.dpotri(factor, lower=0)
         return np.asarray(np.triu(inverse) + np.triu(inverse, 1).T)
 
     def _head(self, sums: Complex, trend: bool) -> Complex:

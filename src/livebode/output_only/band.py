@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from livebode.output_only.settings import OVERSAMPLING
 
@@ -27,7 +27,7 @@ def proposed_band(y: Floats, rate_hz: float) -> tuple[float, float]:
     """
     y = y - np.nanmean(np.where(np.isfinite(y), y, np.nan), axis=1, keepdims=True)
     y = np.where(np.isfinite(y), y, 0.0)
-    f, power = welch(y, rate_hz, nperseg=min(_SEGMENT, y.shape[1]), axis=1)
+    f, power = scipy.signal.welch(y, rate_hz, nperseg=min(_SEGMENT, y.shape[1]), axis=1)
     above = np.maximum(power[:, 1:] - np.median(power[:, 1:], axis=1, keepdims=True), 0.0)
     share = (above / np.maximum(above.sum(axis=1, keepdims=True), np.finfo(float).tiny)).mean(axis=0)
     reached = int(np.searchsorted(np.cumsum(share), _POWER * share.sum()))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 Floats = NDArray[np.float64]
 
@@ -30,10 +30,10 @@ def hop_correlations(y: Floats, hop: int, lags: int) -> Floats:
     >>> hop_correlations(y, hop=2, lags=2)[:, 0, 0].round(6).tolist()
     [2.5, 4.0, 5.5]
     """
-    size = next_fast_len(hop + lags, real=True)
-    ahead, here = rfft(y, size), rfft(y[:, :hop], size)
+    size = scipy.fft.next_fast_len(hop + lags, real=True)
+    ahead, here = scipy.fft.rfft(y, size), scipy.fft.rfft(y[:, :hop], size)
     spectra = ahead[:, np.newaxis] * here[np.newaxis].conj()
-    return np.asarray(np.moveaxis(irfft(spectra, size)[..., : lags + 1], 2, 0) / hop)
+    return np.asarray(np.moveaxis(scipy.fft.irfft(spectra, size)[..., : lags + 1], 2, 0) / hop)
 
 
 def hankel(correlations: Floats, rows: int) -> Floats:

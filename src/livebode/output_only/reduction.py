@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
-from scipy.signal import butter, firwin, sosfilt, sosfilt_zi, upfirdn
 
 Floats = NDArray[np.float64]
 
@@ -37,8 +37,8 @@ class Reduction:
 
     def __init__(self, factor: int, highpass: float) -> None:
         self._factor = factor
-        self._taps = firwin(lost_samples(factor) + 1, _PASSED / factor) if factor > 1 else np.ones(1)
-        self._sections = np.repeat(butter(1, 2 * highpass, "highpass", output="sos"), 2, axis=0)
+        self._taps = scipy.signal.firwin(lost_samples(factor) + 1, _PASSED / factor) if factor > 1 else np.ones(1)
+        self._sections = np.repeat(scipy.signal.butter(1, 2 * highpass, "highpass", output="sos"), 2, axis=0)
         self._waiting: Floats | None = None
         self._state: Floats | None = None
         self._last: Floats | None = None
@@ -55,7 +55,11 @@ class Reduction:
         skipped = (len(self._taps) - 1) // self._factor
         if self._factor > 1:
             used = waiting[:, : (count - 1) * self._factor + len(self._taps)] if count else waiting[:, :0]
-            y = upfirdn(self._taps, used, 1, self._factor, axis=1)[:, skipped : skipped + count] if count else used
+            y = (
+                scipy.signal.upfirdn(self._taps, used, 1, self._factor, axis=1)[:, skipped : skipped + count]
+                if count
+                else used
+            )
         else:
             y = waiting[:, :count]
         self._waiting = waiting[:, count * self._factor :].copy()
@@ -79,6 +83,6 @@ class Reduction:
             return y, finite
         if self._state is None:  # as if the first value had always been there
             first = y[:, int(np.argmax(finite))]
-            self._state = sosfilt_zi(self._sections)[:, np.newaxis] * first[np.newaxis, :, np.newaxis]
-        filtered, self._state = sosfilt(self._sections, y, axis=1, zi=self._state)
+            self._state = scipy.signal.sosfilt_zi(self._sections)[:, np.newaxis] * first[np.newaxis, :, np.newaxis]
+        filtered, self._state = scipy.signal.sosfilt(self._sections, y, axis=1, zi=self._state)
         return filtered, finite
