@@ -256,4 +256,4 @@ def _show_excitation(found: Inspection, console: Console) -> None:
         table.add_row(f"{lines.frequency_hz[i]:.6g}", f"{excitation.amplitude[i]:.4g}", snr)
     console.print(table)
     if step > 1:
-        console.print(f"(every {step}th line is shown; --json has all)", style="dim")
+        console.print(f"(one line in {step} is shown; --json has all)", style="dim")

@@ -9,6 +9,7 @@ import numpy as np
 
 from livebode.configuration.axis import Axis
 from livebode.core import Block, ConfigError, Event, Lines, SpectraLayout
+from livebode.core.errors.signal import ANY_EXCITATION
 from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.estimation.local_polynomial import WINDOW_MIN
 from livebode.estimation.settings import nearest_hop
@@ -186,6 +187,20 @@ def reference_of(axis: Axis) -> str | None:
     return axis.signals.input if axis.tracking.estimator == "direct" else axis.signals.excitation
 
 
+def auto_reference(axis: Axis) -> str:
+    """The same for a window and lines that are 'auto'; ConfigError if it is not named."""
+    name = reference_of(axis)
+    if name is None:
+        key = "signals.input" if axis.tracking.estimator == "direct" else "signals.excitation"
+        raise ConfigError(
+            "auto-needs-recording",
+            f"lines or window are 'auto', but {key} is missing",
+            f"{ANY_EXCITATION}, otherwise name its channel",
+            key=key,
+        )
+    return name
+
+
 def make_lines(axis: Axis, log: Log) -> Lines:
     """The lines of the configuration, or those of the recording; LivebodeError if there are none."""
     frequencies, window = axis.lines.frequencies, axis.lines.window
@@ -193,14 +208,7 @@ def make_lines(axis: Axis, log: Log) -> Lines:
         check_length(log.samples, window)
     if frequencies != "auto" and window != "auto":
         return Lines.parse(frequencies, log.rate_hz, window)
-    reference = reference_of(axis)
-    if reference is None:
-        raise ConfigError(
-            "auto-needs-recording",
-            "lines or window are 'auto', but signals.excitation is missing",
-            "name its channel",
-            key="signals.input" if axis.tracking.estimator == "direct" else "signals.excitation",
-        )
+    reference = auto_reference(axis)
     # Its statistics take half a second to import; a run with known lines does not need them.
     from livebode.excitation import lines_of_window, recognise
 

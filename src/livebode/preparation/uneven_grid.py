@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.configuration.axis import Axis
-from livebode.core import ConfigError, Lines, SignalError
+from livebode.core import Lines, SignalError
 from livebode.core.lines import spacing_hz
 from livebode.estimation.settings import nearest_hop
 from livebode.preparation.part import chosen_part
-from livebode.preparation.plan import SEARCHED, beginning, reference_of
+from livebode.preparation.plan import SEARCHED, auto_reference, beginning
 from livebode.preparation.uneven_lines import excited_lines
 from livebode.sources.part_limit import part_limit
 from livebode.sources.rounding import exact_rate_hz
@@ -50,11 +50,11 @@ def uneven_grid(axis: Axis, log: UnevenLog) -> tuple[UnevenLog, Lines]:
     part, given = _fixed_part(axis, log), axis.source.rate_hz is not None
     spacing = None if frequencies == "auto" else spacing_hz(frequencies)
     if window == "auto":
-        window, rate_hz = measured_grid(part, _reference(axis), spacing, given=given)
+        window, rate_hz = measured_grid(part, auto_reference(axis), spacing, given=given)
     elif spacing is not None:
         rate_hz = log.rate_hz if given else _rate_of(spacing, log.rate_hz, window)
     else:
-        rate_hz = log.rate_hz if given else window / refined_period(part, _reference(axis), window / log.rate_hz)[0]
+        rate_hz = log.rate_hz if given else window / refined_period(part, auto_reference(axis), window / log.rate_hz)[0]
     grid = log.at_rate(rate_hz)
     lines = _lines(axis, grid, window)
     return grid, lines if axis.lines.window != "auto" else _longer(axis, grid, lines)
@@ -63,7 +63,7 @@ def uneven_grid(axis: Axis, log: UnevenLog) -> tuple[UnevenLog, Lines]:
 def _lines(axis: Axis, grid: UnevenLog, window: int) -> Lines:
     if axis.lines.frequencies != "auto":
         return Lines.parse(axis.lines.frequencies, grid.rate_hz, window)
-    lines = excited_lines(_fixed_part(axis, grid), _reference(axis), window)
+    lines = excited_lines(_fixed_part(axis, grid), auto_reference(axis), window)
     many = 1 if axis.lines.window == "auto" else window // lines.window
     return Lines.of_bins([many * k for k in lines.bins], many * lines.window, grid.rate_hz)
 
@@ -81,18 +81,6 @@ def _longer(axis: Axis, grid: UnevenLog, lines: Lines) -> Lines:
         return lines
     many = min(many, most)
     return Lines.of_bins([many * k for k in lines.bins], many * lines.window, lines.rate_hz)
-
-
-def _reference(axis: Axis) -> str:
-    name = reference_of(axis)
-    if name is None:
-        raise ConfigError(
-            "auto-needs-recording",
-            "lines or window are 'auto', but signals.excitation is missing",
-            "name its channel",
-            key="signals.input" if axis.tracking.estimator == "direct" else "signals.excitation",
-        )
-    return name
 
 
 def _fixed_part(axis: Axis, log: UnevenLog) -> UnevenLog:
