@@ -118,7 +118,7 @@ def until(condition: Callable[[], Any], what: str) -> Any:
             return found
         assert time.monotonic() < end, f"{what} did not happen within {PATIENCE_S} s"
         # What costs much is looked at less often: what is waited for needs the processor.
-        time.sleep(min(max(0.01, 3 * (time.monotonic() - began)), 0.2))
+        time.sleep(min(max(0.01, 8 * (time.monotonic() - began)), 0.25))
 
 
 def free_port(kind: int = socket.SOCK_STREAM) -> int:
