@@ -121,8 +121,7 @@ class DistortionLevels(StatefulBase):
         at = np.asarray(lines.bins)
         self._interpolation = Interpolation(at, self.bins)
         self._at, self._lines, self._beside = np.concatenate([at, self.bins]), len(at), slice(len(at), None)
-        differenced = np.array([settings.channel(role) in settings.differenced for role in settings.roles])
-        advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
+        differenced, advanced = np.array(settings.differenced_roles), np.array(settings.advanced_ticks)
         rows = [settings.roles.index(role) for role in ("output", method.denominator, method.reference)]
         self._after = after(self._at, lines.window, differenced, advanced)[rows]
         self._places = np.ix_(np.asarray(rows), self._at)

@@ -58,9 +58,8 @@ class NonPeriodicStage(StatefulBase):
         order = dict.fromkeys((method.reference, "output", method.denominator))
         self._order = [settings.roles.index(role) for role in order]  # the reference first
         self._divided = len(order) == 3  # by the response of the input
-        names = [settings.channel(settings.roles[at]) for at in self._order]
-        self._differenced = np.array([name in settings.differenced for name in names])
-        advanced = np.array([settings.loop.advance_ticks(settings.roles[at]) for at in self._order])
+        self._differenced = np.array(settings.differenced_roles)[self._order]
+        advanced = np.array(settings.advanced_ticks)[self._order]
         self._after = after(np.asarray(lines.bins), lines.window, self._differenced, advanced)
         places = -(-settings.span // settings.step) if settings.average else 0
         kind = LocalPolynomial if settings.estimator == "lpm" else WelchAverage

@@ -76,8 +76,7 @@ class RepeatingErrors(StatefulBase):
         beside = self._distortion.bins if self._distortion else np.zeros(0, dtype=np.int64)
         self._bins = np.concatenate([np.asarray(lines.bins), beside])
         self._lines, self._beside = slice(0, len(lines)), slice(len(lines), len(self._bins))
-        differenced = np.array([settings.channel(role) in settings.differenced for role in settings.roles])
-        advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
+        differenced, advanced = np.array(settings.differenced_roles), np.array(settings.advanced_ticks)
         self._differenced, self._after = differenced, after(self._bins, lines.window, differenced, advanced)
         self._samples = np.zeros((len(settings.roles), lines.window + 1))  # with the one before the period
         self._position = np.full(lines.window, np.nan)

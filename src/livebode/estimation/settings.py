@@ -242,15 +242,24 @@ class Settings:
         return self.method.roles
 
     @property
+    def differenced_roles(self) -> tuple[bool, ...]:
+        """Whether each of the roles' signals is differenced."""
+        return tuple(self.channel(role) in self.differenced for role in self.roles)
+
+    @property
+    def advanced_ticks(self) -> tuple[int, ...]:
+        """Samples by which each of the roles' signals is advanced, by the description of the loop."""
+        return tuple(self.loop.advance_ticks(role) for role in self.roles)
+
+    @property
     def identity(self) -> str:
         """All settings that a tracker's state depends on; trackers with the same identity can exchange snapshots.
 
         Not the controllers, which only convert the measured response into that of the plant.
         """
-        logged = tuple(self.loop.advance_ticks(role) for role in self.roles)
         names = ("lines", "output", "input", "excitation", "schedule", "estimator", "hop", "average", "forgetting")
         options = ("noise", "differenced", "hann", "spikes", "dtype", "ripple")
-        return repr((*(getattr(self, name) for name in names + options), logged))
+        return repr((*(getattr(self, name) for name in names + options), self.advanced_ticks))
 
     def channel(self, role: Role) -> str | None:
         """Channel name of a signal."""

@@ -79,8 +79,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
         bins = self._lines.bins
         why = "a Hann window needs" if settings.hann else "the noise needs"
         self._columns = layout.columns([int(k) for k in bins], why)
-        advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
-        differenced = np.array(layout.differenced)[self._signals]
+        advanced, differenced = np.array(settings.advanced_ticks), np.array(layout.differenced)[self._signals]
         self._after = after(bins, layout.window, differenced, advanced)[:, np.newaxis]
         self._watch = SpectraInputStatistics(self._events, layout.window, self._sentences)
         self._range = PlausibleRange(len(self._signals), max(1, layout.window // layout.hop))

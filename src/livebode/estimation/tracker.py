@@ -61,9 +61,9 @@ class Tracker(StreamEstimator[InputStatistics]):
             window,
             self._lines.bins,
             settings.step,
-            self._named(settings.differenced),
-            np.array([settings.loop.advance_ticks(role) for role in self._roles]),
-            SpikeGate(self._named(settings.spikes), window) if settings.spikes else None,
+            np.array(settings.differenced_roles),
+            np.array(settings.advanced_ticks),
+            SpikeGate(self._checked_for_spikes(), window) if settings.spikes else None,
             settings.dtype,
         )
         self._centre = Centre(window)
@@ -85,8 +85,8 @@ class Tracker(StreamEstimator[InputStatistics]):
         found = super().found()
         return found | {"judged": found["judged"] | (self._repeating.judged() if self._repeating else {})}
 
-    def _named(self, channels: tuple[str, ...]) -> NDArray[np.bool_]:
-        return np.array([self.settings.channel(role) in channels for role in self._roles])
+    def _checked_for_spikes(self) -> NDArray[np.bool_]:
+        return np.array([self.settings.channel(role) in self.settings.spikes for role in self._roles])
 
     @property
     def _identity(self) -> str:

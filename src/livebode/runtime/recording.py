@@ -15,10 +15,9 @@ from livebode.estimation.stream_estimator import Follower
 from livebode.fitting.drift import DriftTest
 from livebode.preparation.aligned import AlignedLog, slip_event, slips_of
 from livebode.preparation.early_spikes import early_spikes
-from livebode.preparation.outlying import outlying_event, outlying_periods, outlying_samples
 from livebode.preparation.part import configured_part
 from livebode.preparation.plan import make_follower, roles_in_doubt, window_in_doubt
-from livebode.preparation.transients import leading_transient, transient_event
+from livebode.preparation.steady import steady
 from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.run_control import RunControl
@@ -62,7 +61,7 @@ class Examined:
 
 
 def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examined:
-    """Examine a recording as a whole; the follower is told what to leave out, at the file's numbers plus `shift`."""
+    """Examine a recording as a whole; the follower leaves out what does not fit, at the file's numbers plus `shift`."""
     settings = follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
     noticed += window_in_doubt(axis, log, settings)
@@ -71,7 +70,10 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
         noticed.append(slip_event(slips, settings))
     source = AlignedLog(log, slips, log.first)
     if settings.periodic and not axis.tracking.all_periods and axis.motion is None:
-        source = _steady(source, follower, noticed, shift)
+        kept = steady(source, settings)
+        source, noticed = replace(source, first=kept.first), noticed + kept.noticed
+        if kept.left_out.size and isinstance(follower, Tracker):
+            follower.leave_out(kept.left_out + shift)
     if isinstance(follower, Tracker):
         follower.know_spikes(early_spikes(source, settings) + shift)
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
@@ -79,15 +81,3 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     if log.is_part:
         found["part"] = {"first": log.first, "stop": log.stop}
     return Examined(source, noticed, found)
-
-
-def _steady(source: AlignedLog, follower: Follower, noticed: list[Event], shift: int) -> AlignedLog:
-    """The recording after its transient, whose outlying periods the follower leaves out; events for both."""
-    settings, window, begins = follower.settings, follower.settings.lines.window, source.first
-    if transient := leading_transient(source, settings):
-        noticed.append(replace(transient_event(transient, settings), sample=begins))
-    outlying = [m for m in outlying_periods(source, settings) if m >= transient]
-    if outlying and isinstance(follower, Tracker):
-        follower.leave_out(outlying_samples(outlying, window, begins + shift))
-        noticed.append(outlying_event(outlying, settings, begins))
-    return replace(source, first=begins + transient * window)

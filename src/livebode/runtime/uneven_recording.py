@@ -10,10 +10,9 @@ from livebode.core.clock import RunClock, moments_by
 from livebode.estimation.uneven_tracker import UnevenTracker
 from livebode.fitting.drift import DriftTest
 from livebode.preparation.aligned import AlignedLog
-from livebode.preparation.outlying import outlying_event, outlying_periods, outlying_samples
 from livebode.preparation.part import configured_part
 from livebode.preparation.plan import roles_in_doubt
-from livebode.preparation.transients import leading_transient, transient_event
+from livebode.preparation.steady import steady
 from livebode.preparation.uneven_grid import uneven_grid
 from livebode.preparation.uneven_plan import check_uneven, clock_facts, uneven_event, uneven_settings
 from livebode.preparation.uneven_spectra import UnevenSource
@@ -39,7 +38,8 @@ def run_uneven(axis: Axis, log: UnevenLog, to: Destination, control: RunControl,
     noticed = [uneven_event(part, signals, lines)]
     noticed += [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, part, settings)]
     if not axis.tracking.all_periods:
-        _leave_out(source, part, follower, noticed)
+        kept = steady(AlignedLog(part, (), part.first), settings)
+        source.first, source.left_out, noticed = kept.first, kept.left_out, noticed + kept.noticed
     found = {"format": part.format, "rate_from": part.rate_origin, "phase_slips": 0, "clock": part.clock_kind}
     found |= {"left_out_samples": source.first - part.first, "clocks": clock_facts(part, signals)}
     if part.is_part:
@@ -61,16 +61,3 @@ def _covariates(axis: Axis) -> tuple[str, ...]:
     from livebode.monitoring import Baseline  # with the simulation
 
     return tuple(Baseline.load(axis.monitoring.baseline).covariates)
-
-
-def _leave_out(source: UnevenSource, part: UnevenLog, follower: UnevenTracker, noticed: list[Event]) -> None:
-    """Leave out the transient and outlying periods of the recording; events for both."""
-    settings, window, begins = follower.settings, follower.settings.lines.window, part.first
-    periods = AlignedLog(part, (), begins)
-    if transient := leading_transient(periods, settings):
-        noticed.append(replace(transient_event(transient, settings), sample=begins))
-    outlying = [m for m in outlying_periods(periods, settings) if m >= transient]
-    if outlying:
-        source.left_out = outlying_samples(outlying, window, begins)
-        noticed.append(outlying_event(outlying, settings, begins))
-    source.first = begins + transient * window
