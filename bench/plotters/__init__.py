@@ -1,0 +1,1 @@
+"""Plotting libraries for the dashboard, compared for the page of a hall."""
