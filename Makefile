@@ -9,18 +9,19 @@ export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature fuzz crash damage soak attacks system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature fuzz crash damage soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
 
 $(VENV)/.installed: requirements-dev.lock
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-dev.lock
+	@$(BIN)/python tools/install.py requirements-dev.lock
 	touch $@
 
 $(BUILT): $(VENV)/.installed pyproject.toml $(NATIVE)
-	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@echo "Compiling livebode: about a minute"
+	@PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 
 # Node.js is from PyPI; the lock file has the hashes of the packages.
@@ -32,8 +33,16 @@ $(NODE): $(VENV)/.installed package.json package-lock.json
 demo: $(BUILT)   ## track a simulated machine, live
 	$(BIN)/livebode demo
 
-test: $(BUILT) lint  ## lint, types, import contract and every test
-	$(BIN)/python -m pytest -n auto --dist worksteal  # neighbouring tests share what they compute once
+test: $(BUILT) $(NODE)  ## lint, types, import contract and every test
+	$(MAKE) --no-print-directory --jobs=2 lint pytest  # what checks the types has one thread
+
+# Python compiles the tests once; else each of the processes below would.
+$(VENV)/.compiled: $(BUILT)
+	-@$(BIN)/python -m pytest --collect-only -q >/dev/null
+	touch $@
+
+pytest: $(BUILT) $(NODE) $(VENV)/.compiled
+	@$(BIN)/python -m pytest -n auto --dist worksteal  # neighbouring tests share what they compute once
 
 $(VENV)/.docs: $(BUILT) requirements-docs.lock
 	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-docs.lock
@@ -65,7 +74,9 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.live
 	$(BIN)/python -m bench.overload
 	$(BIN)/python -m bench.segments
+	$(BIN)/python -m bench.start
 	$(BIN)/python -m bench.dashboard
+	$(BIN)/python -m bench.runs
 
 BASE ?=
 bench-compare: $(BUILT)  ## the speed of this version and of another commit, alternately (BASE=REV; default: newest tag or stored result)
@@ -129,9 +140,12 @@ soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth
 attacks: $(BUILT)  ## attack the dashboard, 45 s for each kind, and print what the owner and the record notice
 	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/dashboard/test_attacks_fault.py
 
+screenshots: $(BUILT)  ## pictures of dashboard and report in every state (light, phone, alarm, lost server …) in build/screenshots (5 min)
+	$(BIN)/python -m examples.screenshots
+
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends chromium clang gcc-arm-none-eabi mosquitto qemu-system-arm
+	apt-get install -y -qq --no-install-recommends chromium clang fonts-wqy-microhei gcc-arm-none-eabi mosquitto poppler-utils qemu-system-arm
 
 catalogues: $(BUILT)  ## after a change of a sentence of report or dashboard: update the catalogues, list what lacks a translation
 	$(BIN)/python -m tools.catalogues
@@ -142,7 +156,7 @@ lock:            ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --all-extras --group dev -o requirements-dev.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group bench -o requirements-bench.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group docs -o requirements-docs.lock
-	PATH="$(abspath $(BIN)):$$PATH" npm install --package-lock-only --save-dev --save-exact @biomejs/biome@latest typescript@latest
+	PATH="$(abspath $(BIN)):$$PATH" npm install --package-lock-only --save-dev --save-exact @biomejs/biome@latest axe-core@latest typescript@latest
 
 clean:           ## remove what was built
 	rm -rf build node_modules $(VENV)

@@ -3,20 +3,38 @@
 One thread of linear algebra for each test process, whose neighbours have the other cores: threads of small products
 wait for each other, and keep a core busy while they do. What is set already is kept. One process more than there are
 cores, because many tests wait for something: a machine that sends at its pace, a browser, a process that starts.
+
+Python keeps what it compiles, also where the environment asks it not to: some hundred processes are started, and each
+would compile all that it imports.
 """
 
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 def pytest_xdist_auto_num_workers() -> int:
     """Of `-n auto`."""
     return (os.cpu_count() or 1) + 1
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """A folder for what tests/support/shared.py keeps; the processes that xdist starts get it from this one."""
+    if not hasattr(config, "workerinput"):
+        kept = tempfile.TemporaryDirectory(prefix="livebode-tests-")
+        os.environ["LIVEBODE_TESTS_SHARED"] = kept.name
+        config.add_cleanup(kept.cleanup)
 
 
 @pytest.fixture(autouse=True)
@@ -25,3 +43,12 @@ def _no_open_figure() -> Iterator[None]:
     yield
     if (pyplot := sys.modules.get("matplotlib.pyplot")) is not None:
         pyplot.close("all")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator["Browser"]:
+    """Chromium for the tests of a file; not for a session, since Playwright keeps an event loop in its thread."""
+    from tests.support.browser import chromium
+
+    with chromium() as found:
+        yield found

@@ -10,13 +10,13 @@ from typing import Any
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
+def chromium(*switches: str) -> Iterator[Any]:
     """Start Debian's, or any `chromium` that is found."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=["--no-sandbox"] * (os.geteuid() == 0)
+            executable_path=shutil.which("chromium"), args=[*switches, *["--no-sandbox"] * (os.geteuid() == 0)]
         )
         yield browser
         browser.close()

@@ -47,6 +47,7 @@ MORE = {
     "loop": "[The loop description](../how-to/loop.md) gives the formulas.",
     "record": "See [the run directory](run-directory.md).",
     "motion": "See [motion correction](../explanation/motion.md).",
+    "report": "See [reports](../how-to/report.md).",
     "fit": "See [fits](../explanation/fits.md).",
     "monitoring": "See [monitoring](../how-to/monitoring.md).",
     "serve": "See [the dashboard](../how-to/dashboard.md).",
@@ -83,6 +84,8 @@ def _tables(file: Schema, name: str, table: Schema, needed: Schema) -> Iterator[
     for key, value in keys.items():
         if key == "loop" and file["title"] != "axis.toml":
             yield f"### [loop] of a measured axis\n\n{LOOP}"
+        elif "$ref" in value.get("items", {}):
+            yield from _tables(file, f"[{name}.{key}]", _resolved(file, value["items"]), {})
         elif "properties" in value:
             yield from _tables(file, f"{name}.{key}" if name else key, value, needed.get("properties", {}).get(key, {}))
 
@@ -109,6 +112,8 @@ def _type(value: Schema) -> str:
     choices = value.get("enum", [value["const"]] if "const" in value else [])
     if choices:
         return ", ".join(f"`{json.dumps(choice)}`" for choice in choices)
+    if "$ref" in value:
+        return "table"
     if value["type"] == "array":
         return f"list ({_type(value['items'])})"
     if value["type"] == "object":

@@ -15,7 +15,7 @@ never changes its meaning; new ones may come.
 On the command line an error is one line on standard error, and the exit code is 2. It names the options of the command
 that it is about. With `--json` the last line on standard error is an object instead, with these options as a fact:
 
-    $ livebode run log.parquet --json
+    $ livebode run standstill.csv --json
     {"error": {"code": "usage.missing", "place": "", "message": "the output channel is not named", "remedy": "...",
     "facts": {"argument": "output", "options": ["--output"]}}}
 

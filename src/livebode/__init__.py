@@ -49,9 +49,10 @@ Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the 
 together with the `__all__` of the packages that docs/reference/python.md lists; other modules may change at any time.
 """
 
-import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from livebode.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from livebode.analysis.learning import learn
@@ -106,8 +107,6 @@ if TYPE_CHECKING:
     from livebode.motion import MotionCorrection
     from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
     from livebode.sources import Log, open_log
-
-logging.getLogger(__name__).addHandler(logging.NullHandler())  # quiet, but for a program that wants to hear of it
 
 _HOME = {
     "analysis.learning": ("learn",),
@@ -233,10 +232,6 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        from importlib.metadata import version  # slower to import than the whole of this package
-
-        return version("livebode")
     if name not in _MODULE:
         raise AttributeError(f"module 'livebode' has no attribute {name!r}")
     return getattr(import_module(f"livebode.{_MODULE[name]}"), name)

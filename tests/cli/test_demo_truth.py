@@ -4,63 +4,67 @@ from __future__ import annotations
 
 import json
 import re
-from functools import cache
+import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from livebode.core import Event, UsageError
+from livebode.analysis.overview import Overview
+from livebode.core import UsageError
+from livebode.dashboard import Hub
+from livebode.dashboard.state import State
+from livebode.dashboard.verdict import verdict
 from livebode.estimation import Tracker
-from livebode.monitoring import Baseline, Monitor
+from livebode.monitoring import Monitor
 from livebode.records import RunRecord
-from livebode.runtime import Destination, Document
-from livebode.runtime.demo import LOSS, check_seconds, demo, demo_axis, demo_baseline, demo_settings
+from livebode.runtime import RunControl
+from livebode.runtime.change_detection import ChangeDetection
+from livebode.runtime.demo import LOSS, check_seconds, demo_axis, demo_settings
+from livebode.runtime.documents import RunStarted
 from livebode.simulation import SimulatedAxis
 from tests.support.command import livebode
+from tests.support.demonstrated import learned, shown
 from tests.support.errors import refused
 from tests.support.reports import Page
+from tests.support.runs import record
 
 _WINDOW_S = 0.2
-
-
-@cache
-def baseline() -> Baseline:
-    return demo_baseline(2)
 
 
 def test_the_alarm_is_the_same_sentence_in_terminal_page_record_and_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("livebode.runtime.demo.demo_baseline", lambda seed: {2: baseline}[seed]())  # learned once
-    done = livebode("demo", "--fast", "--out", tmp_path / "run")
-    assert done.code == 0, done.err
-    (change,) = [
-        event
-        for line in (tmp_path / "run" / "events.jsonl").read_text("utf-8").splitlines()
-        if (event := json.loads(line))["kind"] == "change"
-    ]
-    assert (change["details"]["what"], change["details"]["place_m"]) == ("stiffness", None)
-    assert change["details"]["since_s"] == pytest.approx(11.0, abs=2 * _WINDOW_S)
-    assert abs(change["details"]["amount_percent"] + 100 * LOSS) < 2 * change["details"]["bound_percent"]
-    monitoring = json.loads((tmp_path / "run" / "run.json").read_text("utf-8"))["monitoring"]
-    assert done.out.splitlines()[-2:] == [change["message"], monitoring["message"]]
-    assert livebode("report", tmp_path / "run", "--out", tmp_path / "report").code == 0
+    """In the page of the dashboard too: tests/dashboard/test_commands_truth.py."""
+    demonstrated, printed = shown()
+    (change,) = [event for event in RunRecord.open(demonstrated).events() if event.kind == "change"]
+    assert (change.details["what"], change.details["place_m"]) == ("stiffness", None)
+    assert change.details["since_s"] == pytest.approx(11.0, abs=2 * _WINDOW_S)
+    assert abs(change.details["amount_percent"] + 100 * LOSS) < 2 * change.details["bound_percent"]
+    monitoring = json.loads((demonstrated / "run.json").read_text("utf-8"))["monitoring"]
+    assert printed.splitlines()[-2:] == [change.message, monitoring["message"]]
+    monkeypatch.setitem(sys.modules, "reportlab", None)  # the page alone
+    assert livebode("report", demonstrated, "--out", tmp_path / "report").code == 0
     page = Page((tmp_path / "report.html").read_text("utf-8"))
-    assert re.search(f"ALARM {re.escape(change['message'])}", page.text)
-    published: list[Document] = []
-    to = Destination(tmp_path / "again", lambda *_: None, subscribers=(published.append,))
-    demo(to, seconds=22, seed=1, real_time=False, baseline=baseline())
-    assert change["message"] in [document.message for document in published if isinstance(document, Event)]
-    first, again = (RunRecord.open(tmp_path / name).responses() for name in ("run", "again"))
-    assert np.array_equal(first.value, again.value, equal_nan=True)
+    assert re.search(f"ALARM {re.escape(change.message)}", page.text)
 
 
 def test_a_healthy_axis_raises_no_alarm() -> None:
     settings = demo_settings()
-    monitor, tracker = Monitor(baseline(), settings), Tracker(settings)
+    monitor, tracker = Monitor(learned(), settings), Tracker(settings)
     events = [e for b in SimulatedAxis(demo_axis(24.0, 9)).blocks() for e in monitor.process(b, tracker.process(b))]
     assert [event.message for event in events + monitor.finish()] == []
+
+
+def test_the_page_of_a_healthy_axis_names_its_baseline_from_the_start(tmp_path: Path) -> None:
+    settings, heard = demo_settings(), Hub("axis")
+    detection = ChangeDetection(Monitor(learned(), settings), "healthy strokes")
+    axis = SimulatedAxis(demo_axis(1.0, 9))
+    record(axis, Tracker(settings), tmp_path / "run", subscribers=[heard], detection=detection)
+    hub = Hub("axis")  # of the same run, before its end
+    state = State("axis", 0, hub)
+    hub(RunStarted(tmp_path, dict(heard.begun or {}), RunControl(), Overview()))
+    state.refresh()
+    assert (state.has_baseline, verdict(state).word) == (True, "healthy")
 
 
 def test_the_lines_leave_bins_for_the_noise_and_none_is_at_the_mains() -> None:

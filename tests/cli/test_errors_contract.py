@@ -35,12 +35,14 @@ def named(error: LivebodeError, command: str) -> list[str]:
 
 
 def test_a_process_that_fails_prints_one_object_and_ends_with_2(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("t,w,y\n0,1,2\n0.001,2,3\n")
     done = subprocess.run([LIVEBODE, "run", "log.csv", "--json"], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
     error = json.loads(done.stderr)["error"]
     assert error["code"] == "usage.missing"
     assert error["facts"] == {"argument": "output", "options": ["--output"]}
-    assert list(tmp_path.iterdir()) == []
+    assert list(tmp_path.iterdir()) == [log]
 
 
 def test_an_internal_error_is_an_object_with_its_traceback_and_ends_with_1(monkeypatch: pytest.MonkeyPatch) -> None:

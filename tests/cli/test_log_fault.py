@@ -33,7 +33,7 @@ ROLES = ("--output", "y", "--input", "u", "--excitation", "w", "--json")
 
 
 def test_a_program_that_asks_for_no_log_sees_none() -> None:
-    code = "import livebode, logging; logging.getLogger('livebode.runtime.live').error('not shown')"
+    code = "import livebode.core, logging; logging.getLogger('livebode.runtime.live').error('not shown')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr == ""
 

@@ -127,6 +127,17 @@ def test_bad_input_is_one_sentence(log: Path, tmp_path: Path, options: tuple[obj
     assert not (tmp_path / "run").exists()
 
 
+def test_a_band_replaces_that_of_an_output_only_configuration(log: Path, tmp_path: Path) -> None:
+    path = tmp_path / "axis.toml"
+    path.write_text(f"[source]\nlog = '{log}'\n[signals]\noutput = 'a'\n[output_only]\nband_hz = [2, 40]\n")
+    done = livebode("run", path, "--band", "2:50", "--hop", 200, "--window", 2000, "--out", tmp_path / "run")
+    assert done.code == 0, done.err
+    assert json.loads((tmp_path / "run" / "run.json").read_text("utf-8"))["found"]["band_hz"] == [2, 50]
+    path.write_text(f"[source]\nlog = '{log}'\n[signals]\noutput = 'a'\ninput = 'b'\n")
+    refused = livebode("run", path, "--band", "2:50", "--out", tmp_path / "other")
+    assert "a band belongs to an output-only run" in refused.err
+
+
 def test_a_band_needs_an_output_only_run(log: Path) -> None:
     done = livebode("run", log, "--output", "a", "--band", "2:20")
     assert done.code == 2

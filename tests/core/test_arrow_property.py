@@ -72,7 +72,7 @@ def test_neither_a_run_nor_one_that_records_samples_imports_pandas(tmp_path: Pat
     (tmp_path / "plain.toml").write_text(AXIS)
     (tmp_path / "recorded.toml").write_text(AXIS + "[record]\nsamples = true\nsegment_s = 1.0\n")
     code = (
-        "import sys; from livebode.cli import app\n"
+        "import sys; from livebode.cli.app import app\n"
         "for name in ('plain', 'recorded'):\n"
         "    app(['run', f'{sys.argv[1]}/{name}.toml', '--out', f'{sys.argv[1]}/{name}'], standalone_mode=False)\n"
         "print('pandas' in sys.modules)"

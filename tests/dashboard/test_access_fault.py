@@ -27,6 +27,8 @@ from tests.support.errors import refused
 from tests.support.guarded import TOKEN, VIEWER, ask, cookie, guarded, login, origin, port_of
 from tests.support.peers.certificates import Authority
 
+ACTIONS = ("/api/acknowledge", "/api/shelve", "/api/unshelve")
+
 
 @pytest.fixture(scope="module")
 def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
@@ -36,10 +38,17 @@ def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
 
 def test_nothing_is_shown_without_a_token(watched: Watched) -> None:
     assert ask(watched, "/")[:2][0] == 303
-    for path in ("/api/past?axis=0&from=0&to=1", "/api/moment?axis=0&from=0", "/api/export?axis=0&from=0&to=1"):
+    for path in (
+        "/api/past?axis=0&from=0&to=1",
+        "/api/moment?axis=0&from=0",
+        "/api/signals?axis=0",
+        "/api/export?axis=0&from=0&to=1",
+        "/api/saved?axis=0",
+    ):
         status, _, body = ask(watched, path)
         assert (status, json.loads(body)) == (401, {"error": "log in first"})
-    assert ask(watched, "/api/acknowledge", "POST", {"axis": 0, "event": "x"}, Origin=origin(watched))[0] == 401
+    for path in (*ACTIONS, "/api/saved"):
+        assert ask(watched, path, "POST", {"axis": 0, "event": "x"}, Origin=origin(watched))[0] == 401
     with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
         connect(f"ws://127.0.0.1:{port_of(watched)}/live", origin=origin(watched))
 
@@ -65,8 +74,11 @@ def test_a_viewer_may_only_look(watched: Watched) -> None:
     mine = cookie(watched, VIEWER)
     assert ask(watched, "/api/past?axis=0&from=0&to=1", Cookie=mine)[0] == 200
     headers = {"Origin": origin(watched), "Cookie": mine, "Content_Type": "application/json"}
-    status, _, body = ask(watched, "/api/acknowledge", "POST", {"axis": 0, "event": "x"}, **headers)
-    assert (status, json.loads(body)["error"]) == (403, "this session is read-only")
+    assert json.loads(ask(watched, "/api/saved?axis=0", Cookie=mine)[2]) == {"references": [], "annotations": []}
+    for path in (*ACTIONS, "/api/saved"):
+        status, _, body = ask(watched, path, "POST", {"axis": 0, "event": "x"}, **headers)
+        assert (status, json.loads(body)["error"]) == (403, "this session is read-only")
+    assert not (watched.directory / "references.json").exists()
     with connect(
         f"ws://127.0.0.1:{port_of(watched)}/live", origin=origin(watched), additional_headers={"Cookie": mine}
     ) as live:
@@ -78,7 +90,7 @@ def test_other_origins_are_refused(watched: Watched, wrong: str) -> None:
     mine, wrong = cookie(watched, TOKEN), wrong.format(port=port_of(watched))
     body = {"axis": 0, "event": "x"}
     headers = {"Cookie": mine, "Content_Type": "application/json"} | ({"Origin": wrong} if wrong else {})
-    assert ask(watched, "/api/acknowledge", "POST", body, **headers)[0] == 403
+    assert all(ask(watched, path, "POST", body, **headers)[0] == 403 for path in ACTIONS)
     assert ask(watched, "/login", "POST", {"token": TOKEN}, **({"Origin": wrong} if wrong else {}))[0] == 403
     with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
         connect(f"ws://127.0.0.1:{port_of(watched)}/live", origin=wrong or None, additional_headers={"Cookie": mine})
@@ -103,7 +115,7 @@ def test_only_requests_for_known_host_names_are_served() -> None:
 
 def test_no_get_changes_anything(watched: Watched) -> None:
     mine = cookie(watched, TOKEN)
-    for path in ("/api/acknowledge?axis=0&event=x", "/logout"):
+    for path in (*(f"{path}?axis=0&event=x" for path in ACTIONS), "/logout"):
         assert ask(watched, path, Cookie=mine)[0] == 405
     assert ask(watched, "/", Cookie=mine)[0] == 200  # still logged in
     for method in ("PUT", "DELETE", "PATCH"):

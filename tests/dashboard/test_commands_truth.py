@@ -13,20 +13,23 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from livebode.core.installing import install_command
 from livebode.records import RunRecord
 from tests.support.browser import Tab, chromium, until
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.dashboards import Watched
+from tests.support.demonstrated import already_learned, shown
 
 
 @contextmanager
-def started(folder: Path, *arguments: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def started(folder: Path, *arguments: object, before: str = "") -> Iterator[tuple[subprocess.Popen[str], str]]:
     """The command in a process of its own, and the address that it printed; ended by Ctrl-C, and cleanly."""
     # What starts the tests in the background may have told them to ignore Ctrl-C.
-    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
-    code += "from livebode.cli import main; main()"
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    code += f"{before}\nfrom livebode.cli import main; main()"
     command = [sys.executable, "-c", code, *map(str, arguments)]
     log = folder / "log.txt"
     with log.open("w") as out:
@@ -53,7 +56,7 @@ def started(folder: Path, *arguments: object) -> Iterator[tuple[subprocess.Popen
 
 def test_the_demo_is_served_by_default_during_its_run_and_ends_by_itself(tmp_path: Path) -> None:
     out = tmp_path / "demo"
-    with started(tmp_path, "demo", "--seconds", 16, "--out", out) as (process, url):
+    with started(tmp_path, "demo", "--seconds", 16, "--out", out, before=already_learned(tmp_path)) as (process, url):
         assert url.startswith("http://127.0.0.1:")
         with chromium() as browser, Tab(browser, url) as tab:
             assert tab.js("page.facts.live")
@@ -66,9 +69,12 @@ def test_the_demo_is_served_by_default_during_its_run_and_ends_by_itself(tmp_pat
     assert "stiffness is 1" in (tmp_path / "log.txt").read_text()
 
 
-def test_the_page_of_the_demo_stays_after_its_run_where_it_was_asked_for(tmp_path: Path) -> None:
+def test_the_page_of_the_demo_stays_after_its_run_where_it_was_asked_for(
+    tmp_path: Path,
+) -> None:
     out = tmp_path / "demo"
-    with started(tmp_path, "demo", "--serve", "--fast", "--port", 0, "--seconds", 16, "--out", out) as (_, url):
+    asked = ("demo", "--serve", "--fast", "--port", 0, "--out", out)
+    with started(tmp_path, *asked, before=already_learned(tmp_path)) as (_, url):
         with chromium() as browser, Tab(browser, url) as tab:
             tab.until("!timeline.span.live")  # the run is done, and the page stays
             assert (out / "run.json").is_file()
@@ -76,9 +82,13 @@ def test_the_page_of_the_demo_stays_after_its_run_where_it_was_asked_for(tmp_pat
             at_s = float(last.time_s[last.valid.any(axis=1)][-1])
             tab.until(f"bode.curves.measured.frame.timeS[0] === {at_s!r}")
             assert tab.js("document.getElementById('status-text').textContent") == "demo · recorded"
+            (change,) = [event.message for event in RunRecord.open(out).events() if event.kind == "change"]
+            tab.until(f"document.getElementById('events').textContent.includes({json.dumps(change)})")
             assert tab.wrong == []
         # The page knows of the end before the summary is printed.
-        until(lambda: "stiffness is 1" in (tmp_path / "log.txt").read_text(), "the alarm on the terminal")
+        until(lambda: change in (tmp_path / "log.txt").read_text(), "the alarm on the terminal")
+    # The same seed gives the same run.
+    assert np.array_equal(last.value, RunRecord.open(shown()[0]).responses().value, equal_nan=True)
 
 
 def test_a_recording_is_shown_by_run(tmp_path: Path) -> None:
@@ -136,4 +146,4 @@ def test_view_of_a_directory_without_a_run_is_refused(tmp_path: Path, monkeypatc
     assert livebode("run", log, "--excitation", "w", "--output", "y", "--input", "u", *options).code == 0
     result = livebode("view", tmp_path / "run")
     assert result.code == 2
-    assert "pip install 'livebode[dashboard]'" in result.err
+    assert install_command("dashboard") in result.err

@@ -16,9 +16,10 @@ from livebode.analysis.overview import Overview
 from livebode.configuration.axis import LoopSection
 from livebode.core import Block, Event, Lines, Responses, ServerError
 from livebode.dashboard import Hub
+from livebode.dashboard.alarm_actions import acknowledgement
 from livebode.dashboard.frames import KINDS, frame
 from livebode.dashboard.hub import EVENTS_MAX, VALUES_MAX
-from livebode.dashboard.notices import CAUSES_MAX, EventCauses, acknowledgement, event_id
+from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id
 from livebode.dashboard.past import Past
 from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import RecentResponses
@@ -38,13 +39,13 @@ def decoded(data: bytes) -> list[dict[str, object]]:
     found, at = [], 0
     while at < len(data):
         magic, version, kind, quantity, axis, rows, columns = struct.unpack_from("<4sBBBBII", data, at)
-        assert (magic, version) == (b"LBCV", 1)
+        assert (magic, version) == (b"LBCV", 2)
         next_at = at + 16
         one: dict[str, object] = {"kind": KINDS[kind], "quantity": QUANTITIES[quantity], "axis": axis}
         for name in ("time_s", "schedule", "dof"):
             one[name] = np.frombuffer(data, "<f8", rows, next_at)
             next_at += 8 * rows
-        for name in ("magnitude", "phase", "reach", "coherence"):
+        for name in ("magnitude", "phase", "reach", "noise", "coherence"):
             one[name] = np.frombuffer(data, "<f4", rows * columns, next_at).reshape(rows, columns)
             next_at += 4 * rows * columns
         found.append(one)
@@ -58,11 +59,12 @@ def decoded(data: bytes) -> list[dict[str, object]]:
 def test_frames_hold_the_responses(responses: Responses) -> None:
     first, second = decoded(frame("rows", 3, responses) + frame("newest", 0, responses[-1:]))
     assert (first["kind"], first["axis"], second["kind"]) == ("rows", 3, "newest")
-    use = responses.valid & np.isfinite(responses.value)
+    use, size = responses.valid & np.isfinite(responses.value), np.abs(responses.value)
     with np.errstate(invalid="ignore"):
         expected = {
             "magnitude": np.where(use, responses.magnitude_db, np.nan),
             "reach": np.where(use, 3 * responses.sigma / np.abs(responses.value), np.nan),
+            "noise": np.where(use, 3 * np.sqrt(responses.sigma**2 - responses.distortion**2) / size, np.nan),
             "coherence": np.where(use, responses.coherence, np.nan),
         }
     for name, values in expected.items():

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 from playwright.sync_api import Browser
 from scipy.io import loadmat
 
@@ -21,15 +20,9 @@ from livebode.core import Event, Lines
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.records import RunRecord
 from livebode.simulation.two_mass_loop import RATE_HZ
-from tests.support.browser import TABLET, Tab, chromium, until
+from tests.support.browser import TABLET, Tab, until
 from tests.support.dashboards import LINES, Watched, begin, whole_run
 from tests.support.responses import made
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as found:
-        yield found
 
 
 @pytest.fixture
@@ -90,7 +83,7 @@ def test_freezing_pausing_and_scrolling_back(browser: Browser, watched: Watched)
 
         page.keyboard.press(" ")
         tab.until("timeline.atS === null && bode.curves.measured.frame.timeS[0] > 2.3")
-        page.keyboard.press("f")
+        page.keyboard.press("u")
         tab.until("!bode.curves.reference")
         assert tab.wrong == []
 
@@ -112,8 +105,7 @@ def test_a_new_run_with_other_lines_lets_the_reference_go(browser: Browser, tmp_
         tab.until("bode.curves.reference?.frame.quantity === 'open loop'")
         begin(hub, tmp_path, Lines(LINES.bins[:6], LINES.window, RATE_HZ))
         tab.until("bode.curves.measured?.frame.columns === 6")
-        tab.page.locator("#notice", has_text="the frozen reference was released").wait_for()
-        assert tab.page.locator("#freeze").inner_text() == "Freeze"
+        tab.page.locator("#notice", has_text="the references were released").wait_for()
         assert not tab.page.locator("#legend [data-name=reference]").is_visible()
         tab.page.wait_for_timeout(300)
         assert tab.js("bode.curves.reference === undefined && page.up")
@@ -154,7 +146,7 @@ def test_a_measured_point_near_zero_stays_in_its_scale(browser: Browser, tmp_pat
     size = np.where(np.arange(len(LINES)) == 4, 1e-3, 1.0)[np.newaxis]
     hub(replace(rows, value=size.astype(complex), sigma=np.full(size.shape, 2e-3), time_s=rows.time_s + 9))
     with dashboard, Tab(browser, dashboard.url) as tab:
-        tab.until("bode.curves.measured.frame.timeS[0] > 9 && bode.charts[0].data[1][bode.at[4]] < -59")
+        tab.until("bode.curves.measured.frame.timeS[0] > 9 && bode.drawn.measured?.db[bode.at[4]] < -59")
         low, high = tab.js("[bode.charts[0].scales.y.min, bode.charts[0].scales.y.max]")
         assert -120 < low < -60
         assert 0 < high < 60
@@ -166,9 +158,15 @@ def test_a_map_of_nothing_valid_has_no_scale(browser: Browser, whole: Path) -> N
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         rows = "{ rows: 1, columns: 13, timeS: [347.9], schedule: [NaN], magnitude: Array(13).fill(NaN) }"
-        tab.page.wait_for_timeout(1000)  # the page's own map is drawn
-        assert tab.js("map.cells !== null")
+        tab.until("map.cells !== null")  # the page's own map is drawn
         assert tab.js(f"(map.draw({rows}, 347, 349), map.cells)") is None
+        # At standstill the position is noise: the map is over time.
+        for reach, moves in ((1e-4, "false"), (0.1, "true")):
+            places = [0.9 + reach * (i % 7) / 7 for i in range(40)]
+            at = f"timeS: {list(range(40))}, schedule: {places}"
+            rows = f"{{ rows: 40, columns: 13, {at}, magnitude: Array(520).fill(0) }}"
+            assert tab.js(f"String((map.draw({rows}, 0, 40), map.cells.moving))") == moves
+            assert tab.js("String(map.cells.moved)") == moves
         assert tab.wrong == []
 
 
@@ -201,10 +199,10 @@ def test_every_key_does_what_the_help_lists(browser: Browser, whole: Path) -> No
         assert page.locator("#download-menu button").first.is_visible()
         page.keyboard.press("Escape")
         assert not page.locator("#download-menu").is_visible()
-        alarms = page.locator("#alarms-only")
-        alarms.focus()
+        page.keyboard.press("a")
+        assert page.locator("#events-view [data-value=alarms]").get_attribute("aria-checked") == "true"
+        page.locator("#events-view [data-value=all]").focus()
         page.keyboard.press("Space")
-        assert alarms.is_checked()
         assert tab.js("timeline.atS") is None
         # Everything can be reached by Tab, shows that it has the focus, and has a name.
         names = set()
@@ -269,6 +267,12 @@ def test_the_page_is_usable_by_touch_on_a_tablet(browser: Browser, whole: Path) 
             tab.page.touchscreen.tap(box["x"] + x, box["y"] + 40)
         tab.until("bode.sight === bode.whole")
         assert tab.js("bode.sight") == before
+        for kind, xs in (("touchStart", [120]), ("touchStart", [120, 200]), ("touchMove", [80, 240]), ("touchEnd", [])):
+            points = [{"x": box["x"] + x, "y": box["y"] + 60, "id": i} for i, x in enumerate(xs)]
+            cdp.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        tab.until("bode.sight !== bode.whole")
+        low, high = tab.js("bode.sight")
+        assert before[0] < low < high < before[1], "two fingers that part show less"
         tab.page.locator("#tracking").scroll_into_view_if_needed()
         tab.until("tracking.made.data[0].length > 20")
         box = tab.page.locator("#tracking .u-over").bounding_box()
@@ -314,17 +318,6 @@ def test_downloads_hold_the_data(browser: Browser, whole: Path, tmp_path: Path) 
         rows = list(csv.DictReader(io.StringIO(get(tab, "this response as CSV").read_text())))
         found = np.array([float(r["magnitude [dB]"]) for r in rows])
         assert np.allclose(found, tab.numbers("bode.curves.measured.frame.magnitude"), atol=2e-5)
-        tab.page.locator("#legend [data-name=model]").click()  # it is drawn over the points
-        tab.page.wait_for_timeout(200)
-        with Image.open(get(tab, "Bode plot as PNG")) as picture:
-            pixels = np.asarray(picture.convert("RGB")).astype(int)
-            x, y = tab.js(
-                "((u, i) => [u.valToPos(bode.lines[i], 'x', true), u.valToPos(u.data[1][bode.at[i]], 'y', true)])"
-                "(bode.charts[0], 5)"
-            )
-            assert pixels.shape[0] == 54 + tab.js("bode.charts.reduce((s, u) => s + u.ctx.canvas.height, 0)")
-            assert tuple(pixels[54 + round(y), round(x)]) == (0x00, 0x72, 0xB2)
-            assert np.ptp(pixels[:50, :500]) > 100, "a title"
         assert tab.wrong == []
 
 
@@ -333,7 +326,7 @@ def test_acknowledging_is_recorded(browser: Browser, watched: Watched) -> None:
     with Tab(browser, watched.url) as tab:
         page = tab.page
         event = next(e for e in watched.record().events() if e.kind == "non-finite")
-        until(lambda: page.locator("#events li", has_text=event.message).count() == 1, "the event on the page")
+        until(lambda: page.locator("#events [role=row]", has_text=event.message).count() == 1, "the event on the page")
         alarm = Event("change", 6000, 1.5, "the belt's <b>stiffness</b> is 9 % less", {"share": -0.09})
         watched.hub(alarm)
         button = page.get_by_role("button", name="Acknowledge: the belt's <b>stiffness</b>")
@@ -342,8 +335,10 @@ def test_acknowledging_is_recorded(browser: Browser, watched: Watched) -> None:
         assert page.locator("#events b").count() == 0, "what comes from a machine is text, not HTML"
         button.focus()
         page.keyboard.press("Enter")
+        page.get_by_label("Your name").fill("Ann")
+        page.keyboard.press("Enter")
         watched.go(8000)
-        page.locator("#events li.seen").wait_for()
+        page.locator("#events [role=row].seen").wait_for()
         assert not page.locator("#alarm-count").is_visible()
         watched.go(10_000)
         found = [e for e in watched.record().events() if e.kind == "acknowledged"]
@@ -352,7 +347,7 @@ def test_acknowledging_is_recorded(browser: Browser, watched: Watched) -> None:
         assert found[0].details["time_s"] == 1.5
         assert "9 % less" in found[0].message
         with Tab(browser, watched.url) as second:
-            second.page.locator("#events li.seen").wait_for()
+            second.page.locator("#events [role=row].seen").wait_for()
         assert tab.wrong == []
 
 
@@ -400,6 +395,26 @@ def test_an_axis_without_a_loop_shows_the_plant_beside_other_axes(
         assert tab.wrong == []
 
 
+def test_back_returns_to_the_axis_quantity_and_plot_before_and_a_zoom_is_no_entry(
+    browser: Browser, whole: Path, tmp_path: Path
+) -> None:
+    with two_axes(browser, whole, tmp_path) as tab:
+        page, entries = tab.page, "history.length"
+        first = tab.js(entries)
+        page.keyboard.press("4")
+        tab.until("bode.curves.measured?.frame.quantity === 'sensitivity'")
+        page.locator("#bode-kind [data-value=nyquist]").click()
+        page.locator("#tracking-what [data-value=phase]").click()  # replaces the address
+        page.locator("#axis").select_option("1")
+        tab.until("page.facts.name === 'other' && bode.curves.measured?.frame.axis === 1")
+        assert tab.js(entries) == first + 3
+        for plot in ("nyquist", None):
+            page.go_back()
+            shown = "page.facts?.name === 'run' && page.quantity === 'sensitivity'"
+            tab.until(f"window.livebode?.bode.curves.measured && {shown}")
+            assert tab.js("bode.plane?.kind ?? null") == plot
+
+
 def test_a_late_answer_to_an_earlier_request_does_not_change_the_chosen_axis(
     browser: Browser, whole: Path, tmp_path: Path
 ) -> None:
@@ -412,19 +427,6 @@ def test_a_late_answer_to_an_earlier_request_does_not_change_the_chosen_axis(
             assert tab.js("[page.axis, page.facts.name]") == [1, "other"]
             tab.page.locator("#axis").select_option("0")
             tab.until("page.facts.name === 'run' && bode.curves.measured?.frame.axis === 0")
-
-
-def test_a_broken_link_is_connected_again(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
-    dashboard.view(whole)
-    with dashboard, Tab(browser, dashboard.url) as tab:
-        port = int(tab.url.rsplit(":", 1)[1].strip("/"))
-        dashboard.__exit__()
-        tab.until("document.getElementById('status-text').textContent.includes('no connection')")
-        again = Dashboard(Serving("127.0.0.1", port))
-        again.view(whole)
-        with again:
-            tab.until("document.getElementById('status-text').textContent.includes('recorded')")
 
 
 CONTRAST = """() => {

@@ -19,6 +19,7 @@ from websockets.sync.client import connect
 
 from livebode.core import LivebodeError
 from livebode.dashboard import Dashboard, Serving, queries
+from livebode.dashboard.alarm_requests import alarm_request
 from tests.support.dashboards import Watched
 
 CASES = int(os.environ.get("LIVEBODE_DASHBOARD_FUZZ", "4000"))
@@ -89,6 +90,7 @@ def message(rng: random.Random) -> str:
             "axis": rng.choice([0, anything(rng)]),
             "quantity": rng.choice(["plant", anything(rng)]),
         }
+        request |= {"slot": rng.choice([1, 8, anything(rng)]), "saved": rng.choice([None, "12345678", anything(rng)])}
         text = json.dumps(request | {"time_s": rng.choice([1.0, anything(rng)])})
     elif pick < 0.8:
         text = json.dumps(anything(rng))
@@ -133,9 +135,14 @@ def test_random_bodies_are_understood_or_refused() -> None:
     for _ in range(CASES):
         data = message(rng).encode("utf-8", "surrogatepass")
         with contextlib.suppress(LivebodeError):
-            axis, event = queries.acknowledged(data, axes=2)
-            assert axis in (0, 1)
-            assert len(event) <= 64
+            found = alarm_request(data, axes=2, act=rng.choice(["acknowledge", "shelve", "unshelve"]))
+            assert found.axis in (0, 1)
+            assert len(found.event) <= 64
+        with contextlib.suppress(LivebodeError):
+            change = queries.saved_change(data, axes=2)
+            assert change.axis in (0, 1)
+            assert change.kind in ("reference", "annotation", "remove")
+            assert 0 < len(change.text) <= 200
 
 
 def port_of(watched: Watched) -> int:
@@ -144,8 +151,20 @@ def port_of(watched: Watched) -> int:
 
 def head(rng: random.Random, port: int) -> bytes:
     """A request that is nearly right."""
-    paths = ["/", "/api/past", "/api/moment", "/api/export", "/api/acknowledge", "/live", "/login", "/static/x", "*"]
-    names = ["axis", "from", "to", "quantity", "rows", "format"]
+    paths = [
+        "/",
+        "/api/past",
+        "/api/moment",
+        "/api/signals",
+        "/api/export",
+        "/api/acknowledge",
+        "/api/shelve",
+        "/live",
+        "/login",
+        "/static/x",
+        "*",
+    ]
+    names = ["axis", "from", "to", "quantity", "rows", "format", "picture", "at"]
     query = "&".join(f"{rng.choice(names)}={rng.choice(_WORDS)}" for _ in range(rng.randrange(4)))
     method, version = rng.choice(["GET", "GET", "POST", "HEAD", "PUT", "X"]), rng.choice(["1.1", "1.1", "1.0", "9", ""])
     lines = [

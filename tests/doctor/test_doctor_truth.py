@@ -14,9 +14,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from livebode.core import UsageError
+from livebode.core.installing import install_command
 from livebode.doctor import Subject
 from livebode.doctor.disk import check_disk
 from livebode.doctor.extras import check_extras
@@ -80,11 +82,12 @@ def test_the_table_on_a_terminal_names_each_check_its_verdict_and_a_remedy(tmp_p
 def test_extras_are_those_of_the_package_and_a_version_that_does_not_suffice_is_named() -> None:
     own = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     facts = check_extras().facts
-    assert sorted(extra for names in facts.values() for extra in names) == sorted(own)
-    found = judged_extras({"mqtt": ["paho-mqtt 1.6 is installed, >=2.1 is required"], "pdf": ["reportlab is missing"]})
+    assert sorted(extra for names in facts.values() for extra in names) == sorted(set(own) - {"all"})
+    assert own["all"] == [f"livebode[{','.join(sorted(set(own) - {'all'}))}]"]
+    found = judged_extras({"mqtt": ["paho-mqtt 1.6 is installed, >=2.1 is required"], "pdf": ["typst is missing"]})
     assert found.verdict == "warning"
     assert found.facts == {"present": [], "missing": ["pdf"], "unsuitable": ["mqtt"]}
-    assert found.remedy == "run pip install 'livebode[mqtt]'"
+    assert found.remedy == f"run {install_command('mqtt')}"
 
 
 def test_an_unknown_instruction_set_in_the_environment_fails(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -137,6 +140,21 @@ def test_a_port_that_another_program_receives_udp_on_fails(tmp_path: Path) -> No
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as other:
         other.bind(("127.0.0.1", port))
         assert doctor(path)[1]["source"]["verdict"] == "failed"
+
+
+def test_a_channel_of_a_recording_that_is_constant_empty_or_missing_is_named(tmp_path: Path) -> None:
+    given = signals(100)
+    path = axis(tmp_path, 'log = "a.parquet"')
+    for change, verdict, words in (
+        ({"w": np.zeros(100)}, "warning", "channel 'w' is constant at 0"),
+        ({"y": np.full(100, np.nan)}, "warning", "channel 'y' is empty"),
+        ({"y": None}, "failed", "'y'"),
+    ):
+        columns = {name: x for name, x in (given | change).items() if x is not None}
+        write_parquet(tmp_path / "a.parquet", columns)
+        check = doctor(path)[1]["source"]
+        assert check["verdict"] == verdict
+        assert words in check["message"]
 
 
 def test_each_of_several_axes_is_asked_for_its_source(tmp_path: Path) -> None:

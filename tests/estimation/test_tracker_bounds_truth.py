@@ -63,21 +63,22 @@ def errors(window: int, found: list[Responses], periods: int) -> np.ndarray:
     return np.array([np.abs(r.value[periods - 1] - truth) for r in found])
 
 
+def within(window: int, found: list[Responses], periods: int) -> np.ndarray:
+    """Whether the truth is within one and two times sigma, shape (2, runs, lines)."""
+    radii = np.array([[r.bound(c)[periods - 1] for r in found] for c in (1, 2)])
+    return errors(window, found, periods) <= radii
+
+
 @pytest.mark.parametrize("window", [400, 800])
 @pytest.mark.parametrize("estimator", ["joint", "indirect"])
 def test_coverage_from_four_periods_on(window: int, estimator: str) -> None:
     found = responses(window, estimator)
-    hits = np.array(
-        [
-            [errors(window, found, m) <= np.array([r[m - 1].bound(c) for r in found]) for c in (1, 2)]
-            for m in range(4, PERIODS + 1)
-        ]
-    )
-    within = hits.mean(axis=(0, 2, 3))
+    hits = np.array([within(window, found, m) for m in range(4, PERIODS + 1)])
+    shares = hits.mean(axis=(0, 2, 3))
     at_60_hz = hits[:, 0, :, 2].mean()
-    print(f"N={window} {estimator}: within 1 sigma {within[0]:.4f} (60 Hz {at_60_hz:.3f}), within 2 {within[1]:.4f}")
-    assert within[0] == pytest.approx(0.63, abs=0.03)
-    assert within[1] == pytest.approx(0.98, abs=0.01)
+    print(f"N={window} {estimator}: within 1 sigma {shares[0]:.4f} (60 Hz {at_60_hz:.3f}), within 2 {shares[1]:.4f}")
+    assert shares[0] == pytest.approx(0.63, abs=0.03)
+    assert shares[1] == pytest.approx(0.98, abs=0.01)
 
 
 @pytest.mark.parametrize("window", [400, 800])
@@ -101,17 +102,15 @@ def test_variance_against_the_cramer_rao_bound(window: int, estimator: str) -> N
 
 def test_single_windows_are_covered_too() -> None:
     found = responses(400, "joint", average=False)
-    error = errors(400, found, 10)
-    within = [np.mean(error <= np.array([r[9].bound(c) for r in found])) for c in (1, 2)]
-    assert within[0] == pytest.approx(0.63, abs=0.04)
-    assert within[1] == pytest.approx(0.98, abs=0.015)
+    shares = within(400, found, 10).mean(axis=(1, 2))
+    assert shares[0] == pytest.approx(0.63, abs=0.04)
+    assert shares[1] == pytest.approx(0.98, abs=0.015)
 
 
 def test_windows_further_apart_are_covered_too() -> None:
     # As from a drive that sends seldom: two periods apart, what rings at 60 Hz is gone, and sigma is right there too.
     found = responses(400, "joint", average=True, apart=2)
-    error = errors(400, found, 5)
-    hits = np.array([error <= np.array([r[4].bound(c) for r in found]) for c in (1, 2)])
+    hits = within(400, found, 5)
     print(f"two windows apart: {hits[0].mean():.4f} (60 Hz {hits[0, :, 2].mean():.3f}), {hits[1].mean():.4f}")
     assert hits[0].mean() == pytest.approx(0.63, abs=0.03)
     assert hits[0, :, 2].mean() == pytest.approx(0.63, abs=0.06)
@@ -121,10 +120,9 @@ def test_windows_further_apart_are_covered_too() -> None:
 def test_bounds_from_detection_lines_cover_the_truth_and_are_somewhat_wide() -> None:
     # The larger of two estimates, of which one is high near the resonance, so coverage may only be high.
     found = responses(400, "joint", noise="quiet")
-    error = errors(400, found, 4)
-    within = [np.mean(error <= np.array([r[3].bound(c) for r in found])) for c in (1, 2)]
-    assert 0.60 <= within[0] <= 0.80
-    assert 0.97 <= within[1] <= 1.0
+    shares = within(400, found, 4).mean(axis=(1, 2))
+    assert 0.60 <= shares[0] <= 0.80
+    assert 0.97 <= shares[1] <= 1.0
 
 
 def test_direct_is_biased_in_closed_loop_and_joint_is_not() -> None:

@@ -134,6 +134,15 @@ def test_a_window_without_excitation_is_not_valid() -> None:
     assert not responses.valid[500:].any()
 
 
+def test_a_short_window_with_three_bins_for_the_distortion_is_judged_by_these() -> None:
+    lines = Lines((1, 4), 12, RATE_HZ, quiet=(2, 3))
+    w = np.tile(multisine(lines), 40)
+    y = np.roll(w, 1) + 0.01 * np.random.default_rng(0).standard_normal(w.size)
+    responses = tracker(lines=lines, hop=12).process(Block(np.array([w, w, y]), NAMES, RATE_HZ))
+    assert responses.valid[-1].all()
+    assert (responses.distortion[-1] < 0.01).all()
+
+
 def test_a_line_without_excitation_is_not_valid() -> None:
     lines = Lines.parse("50,100,200,300", RATE_HZ, WINDOW)
     responses = tracker(lines=lines).process(record())

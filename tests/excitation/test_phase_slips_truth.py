@@ -59,6 +59,12 @@ def test_every_leap_is_found_at_its_place_and_with_its_size(missing: int) -> Non
     assert away.size <= 8 * len(places)
 
 
+def test_a_window_of_two_periods_sent_in_single_precision_has_no_leap() -> None:
+    played = multisine(Lines.parse("20:140:20", RATE_HZ, WINDOW))
+    for scale in (1.0, 1.1, 3.0):
+        assert find_slips(np.resize((scale * played).astype(np.float32).astype(float), 12_800), WINDOW) == ()
+
+
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(
     st.integers(50, 1000), st.floats(-20, 60), st.floats(0, 100), st.integers(3, 40), st.integers(0, 2**31),

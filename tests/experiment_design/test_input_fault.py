@@ -292,7 +292,7 @@ def completed(excitation):
         ({"excitation": {}, "belt": {}, "limit": {}}, "did you mean 'limits'?"),
         ({"excitation": {}, "belt": {}, "limits": {"torque_n_m_max": 0}}, "not above 0"),
         ({"excitation": {}, "belt": {}, "signals": {"exitation": "w"}}, "did you mean 'excitation'?"),
-        ({"excitation": {}, "measured": {"run": "nowhere"}}, "not the directory of a run"),
+        ({"excitation": {}, "measured": {"run": "nowhere"}}, "there is no directory 'nowhere'"),
         ({"excitation": {}, "belt": {"sensor": {"noise_rad_per_s": 1e300}}}, "noise=1e+300"),
     ],
 )

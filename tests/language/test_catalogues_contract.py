@@ -9,6 +9,7 @@ from functools import cache
 
 import pytest
 
+from livebode.dashboard.alarm_kinds import ALARMS, RETURNS
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.fitting.extended import WORDS as EFFECTS
 from livebode.fitting.extended import Extended
@@ -108,9 +109,7 @@ def kinds() -> set[str]:
             kind = str(node.args[0].value)
             if name in ("Event", "report", "_report_to_axes") and re.fullmatch("[a-z]+(-[a-z]+)*", kind):
                 found.add(kind)
-    alarms = re.search(r"ALARMS = new Set\(\[(.*?)\]", (STATIC / "events.js").read_text("utf-8"), re.S)
-    assert alarms is not None
-    return found | set(re.findall(r'"([a-z-]+)"', alarms[1]))
+    return found | ALARMS.keys() | RETURNS.keys()
 
 
 def test_kinds_parameters_statuses_and_margins_have_names() -> None:

@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-import pytest
 from playwright.sync_api import Browser
 
 from livebode.dashboard import Dashboard, Serving
 from livebode.language import catalogue, in_language, recognised
-from tests.support.browser import Tab, chromium
+from tests.support.browser import Tab
 from tests.support.dashboards import Watched
 from tests.support.languages import filled, pseudo, untranslated
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as found:
-        yield found
 
 
 def test_the_page_recognises_what_python_recognises(browser: Browser) -> None:
@@ -45,12 +37,13 @@ def test_the_page_has_no_english_outside_of_its_catalogue(browser: Browser, tmp_
         with Tab(browser, "about:blank", wait=False) as tab:
             tab.page.route("**/catalogue*", lambda route: route.fulfill(body=answer, content_type="application/json"))
             tab.page.goto(watched.url)
-            tab.until("bode.curves.measured && document.querySelector('#events li time')")
+            tab.until("bode.curves.measured && document.querySelector('#events [role=row] time')")
             found = set()
             for name in ("map", "parameters", "margins"):
                 tab.page.locator(f"#tab-{name}").click()
                 tab.until("!page.dirty.has('trends')")
-                found |= untranslated(tab.page.evaluate(_TEXTS), {"livebode", "axis", "English", "Keff"})
+                data = {"livebode", "axis", "English", "Keff", "Enter", "Shift"}
+                found |= untranslated(tab.page.evaluate(_TEXTS), data)
             assert found == set()
             assert "⟦Bode plot⟧" in tab.page.locator("body").inner_text()
             assert tab.wrong == []

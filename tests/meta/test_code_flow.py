@@ -24,10 +24,20 @@ def test_a_name_on_the_page_exists(name: str) -> None:
 def test_the_loop_calls_its_steps_in_the_order_of_the_page() -> None:
     steps = re.findall(r"self\.(?:_recorder\.|_stream\.)?(\w+)\(", inspect.getsource(RunLoop._process))
     assert steps == [
-        "write_samples", "_monitor_samples", "_estimate", "_record_and_publish", "_report_events", "_check_signals",
-        "announce", "commit",
+        "write_samples", "_ready_parts", "_monitor_samples", "_estimate", "_record_and_publish", "_report_events",
+        "_check_signals", "announce", "commit",
     ]  # fmt: skip
-    order = ("Number", "Split", "Monitor", "Estimate", "Record and publish", "Events", "Check signals", "Commit")
+    order = (
+        "Number",
+        "Split",
+        "Ready",
+        "Monitor",
+        "Estimate",
+        "Record and publish",
+        "Events",
+        "Check signals",
+        "Commit",
+    )
     places = [PAGE.index(f"\n{word}\n: ") for word in order]
     assert places == sorted(places)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -15,15 +15,15 @@ ROOT = Path(__file__).parents[2]
 KINDS = {kind.__name__: kind for kind in LivebodeError.__subclasses__()}
 
 
-def made() -> Iterator[tuple[str, str, ast.Call]]:
+@cache
+def made() -> list[tuple[str, str, ast.Call]]:
     """Where in the package an error is made: file and line, name of its class, and the call."""
-    for path in sorted((ROOT / "src").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in KINDS:
-                yield f"{path.relative_to(ROOT)}:{node.lineno}", node.func.id, node
-
-
-MADE = list(made())
+    return [
+        (f"{path.relative_to(ROOT)}:{node.lineno}", node.func.id, node)
+        for path in sorted((ROOT / "src").rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in KINDS
+    ]
 
 
 def texts(call: ast.Call) -> list[str]:
@@ -32,7 +32,7 @@ def texts(call: ast.Call) -> list[str]:
 
 
 def test_every_error_is_made_with_a_declared_code_and_a_message() -> None:
-    for where, kind, call in MADE:
+    for where, kind, call in made():
         code = call.args[0]
         assert isinstance(code, ast.Constant), f"{where}: the code is not a literal"
         assert code.value in KINDS[kind].codes, f"{where}: {code.value!r} is not declared in {kind}"
@@ -41,14 +41,14 @@ def test_every_error_is_made_with_a_declared_code_and_a_message() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_declared_code_is_used_and_has_a_sentence(kind: str) -> None:
-    used = {call.args[0].value for _, name, call in MADE if name == kind}  # type: ignore[attr-defined]
+    used = {call.args[0].value for _, name, call in made() if name == kind}  # type: ignore[attr-defined]
     assert used == KINDS[kind].codes.keys()
     assert list(KINDS[kind].codes) == sorted(KINDS[kind].codes)
     assert all(text.endswith(".") and text[0].isupper() for text in KINDS[kind].codes.values())
 
 
 def test_no_message_of_the_library_names_an_option_of_the_command_line() -> None:
-    for where, _, call in MADE:
+    for where, _, call in made():
         texts = [
             node.value for node in ast.walk(call) if isinstance(node, ast.Constant) and isinstance(node.value, str)
         ]

@@ -50,6 +50,23 @@ print(sorted(heavy & set(sys.modules)))
     assert done.stdout.splitlines() == ["[]", "['numpy']"]
 
 
+@pytest.mark.parametrize("word", ["--version", "--help"])
+def test_version_and_help_load_nothing_but_the_first_page(word: str) -> None:
+    code = f"import sys; from livebode.cli import main; sys.argv[1:] = [{word!r}]; main(); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.splitlines()[-1].split())
+    heavy = {"numpy", "scipy", "pyarrow", "matplotlib", "pydantic", "starlette", "typer", "rich", "logging"}
+    assert loaded & heavy == set()
+    assert {name for name in loaded if name.startswith("livebode.")} <= {
+        "livebode.version", "livebode.cli", "livebode.cli.start", "livebode.cli.first_page", "livebode.cli.commands"
+    }  # fmt: skip
+
+
+def test_the_package_has_the_version_that_is_published() -> None:
+    published = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+    assert livebode.__version__ == published
+
+
 def test_the_command_line_starts_without_what_most_commands_do_not_need() -> None:
     code = """
 import sys, livebode.cli.app

@@ -29,6 +29,7 @@ FILES = {
     "CHANGELOG.md": "# Changelog\n\n## [Unreleased]\n\n## [1.2.0] - 2026-02-03\n\n- Faster.\n\n"
     "## [1.1.0] - 2026-01-01\n\n- Old.\n",
     "CITATION.cff": "title: livebode\nversion: 1.2.0\ndate-released: 2026-02-03\nreferences:\n  - year: 2016\n",
+    "src/livebode/version.py": '__version__ = "1.2.0"\n',
     "LICENSE": "MIT", "NOTICE": "uPlot, src/livebode/dashboard/_vendor/uplot\n",
     "src/livebode/dashboard/_vendor/uplot/LICENSE": "MIT",
     "package-lock.json": "{}", **dict.fromkeys(("requirements-dev.lock", "requirements-bench.lock"), LOCK),
@@ -94,6 +95,7 @@ FAULTS: list[tuple[str, Callable[[Path], None]]] = [
     ("changelog heading", edited("CHANGELOG.md", "## [1.2.0] -", "## [1.2.0-1] - 2026-02-03\n\n## [1.2.0] of")),
     ("changelog entries", edited("CHANGELOG.md", "## [Unreleased]\n", "## [Unreleased]\n\n- Smaller.\n")),
     ("changelog entries", edited("CHANGELOG.md", "- Faster.\n", "")),
+    ("version in the package", edited("src/livebode/version.py", "1.2.0", "1.1.0")),
     ("citation", edited("CITATION.cff", "version: 1.2.0", "version: 1.1.0")),
     ("citation", edited("CITATION.cff", "date-released: 2026-02-03\n", "")),
     ("locks", edited("pyproject.toml", "numpy>=2.0", "numpy>=2.2")),

@@ -11,7 +11,7 @@ import matplotlib
 import matplotlib.pyplot as plt
 import pytest
 
-from livebode.cli import app
+from livebode.cli.app import app
 
 FOLDER = Path(__file__).parents[2] / "docs" / "tutorials"
 TUTORIALS = sorted(page for page in FOLDER.glob("*.md") if page.stem != "index")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 import tomllib
 from datetime import UTC, datetime
@@ -19,8 +18,10 @@ from pypdf import PdfReader
 
 from livebode.core import Event
 from livebode.core.document import Document, Finding, Listing, Paragraph, Picture, Section, Table
+from livebode.core.installing import install_command
 from livebode.report.html import to_html
 from livebode.report.pdf import save_pdf
+from livebode.report.svg import pictures_svg
 from livebode.reporting.run_report import run_report
 from livebode.reporting.wording import to_toml
 from tests.support.command import livebode
@@ -42,33 +43,24 @@ PAGE = {
 }
 
 
-def hostile(text: str) -> Document:
+def hostile(text: str, pictures: bool = False) -> Document:
     """A document with the text wherever one can be."""
     data = {"responses": measured(6, 1), "schedule_name": text}
     bode = {"responses": measured(6, 1, unit=text), "names": (text, text)}
-    parts = (
-        Paragraph(text), Table((text, "n"), ((text, text),), (1,), text), Listing(text),
-        Picture("tracking", data, text),
-        Picture("bode", bode, text),
-        Picture("parameters", {"time_s": np.arange(3.0), "curves": [(text, text, np.ones(3), np.ones(3))]}, text),
+    curves = {"time_s": np.arange(3.0), "curves": [(text, text, np.ones(3), np.ones(3))]}
+    drawn = (Picture("bode", bode, text), Picture("tracking", data, text), Picture("parameters", curves, text))
+    parts = (Paragraph(text), Table((text, "n"), ((text, text),), (1,), text), Listing(text), *drawn[1:] * pictures)
+    sections, finding = (Section(text, parts),), Finding("alarm", text)
+    return Document(
+        text, text, ((text, text),), (finding,), sections, text, text, result=(finding, finding),
+        picture=drawn[0] if pictures else None, signatures=(text, text), appendix=sections[: not pictures],
     )  # fmt: skip
-    return Document(text, text, ((text, text),), (Finding("alarm", text),), (Section(text, parts),), text)
 
 
-@cache
-def plain_page() -> Page:
-    return Page(to_html(hostile("plain")))
-
-
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(text=st.text(min_size=1, max_size=60) | st.text("<>&\"'/=scriptm ", min_size=3, max_size=30))
-@example(text="".join(HOSTILE[:3]))
-@example(text="".join(HOSTILE[3:6]))
-@example(text="".join(HOSTILE[6:9]))
-@example(text=HOSTILE[9])
-def test_data_are_text_and_nothing_else(text: str, tmp_path: Path) -> None:
-    page = Page(to_html(hostile(text)))
-    plain = plain_page()
+def check_text_and_nothing_else(text: str, path: Path, pictures: bool) -> None:
+    document = hostile(text, pictures)
+    drawn = pictures_svg(document)
+    page, plain = Page(to_html(document, drawn)), plain_page(pictures)
     assert {tag for tag, _ in page.tags} <= PAGE
     assert [tag for tag, _ in page.tags if tag not in ("text", "tspan", "path", "use", "g", "defs")] == [
         tag for tag, _ in plain.tags if tag not in ("text", "tspan", "path", "use", "g", "defs")
@@ -77,10 +69,28 @@ def test_data_are_text_and_nothing_else(text: str, tmp_path: Path) -> None:
         assert not [name for name in attributes if name.startswith("on")]
     if text.isprintable() and text.strip() == text:
         assert " ".join(text.split()) in page.text
-    save_pdf(hostile(text), tmp_path / "a.pdf")
-    reader = PdfReader(tmp_path / "a.pdf")
+    save_pdf(document, path, drawn)
+    reader = PdfReader(path)
     if text.isascii() and text.isprintable() and text.strip() == text and len(text) < 40 and "  " not in text:
         assert text in " ".join(reader.pages[0].extract_text().split())
+
+
+@cache
+def plain_page(pictures: bool) -> Page:
+    return Page(to_html(hostile("plain", pictures)))
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(text=st.text(min_size=1, max_size=60) | st.text("<>&\"'/=#$*_[]\\scriptm ", min_size=3, max_size=30))
+@example(text='#image("/etc/passwd") $x$ *b* @r <l>')
+@example(text=HOSTILE[9])
+@example(text="\U0001d5a9\U0001ee6d\ue001\u0301\ufffe")  # letters of one weight only, private, combining
+def test_data_are_text_and_nothing_else(text: str, tmp_path: Path) -> None:
+    check_text_and_nothing_else(text, tmp_path / "a.pdf", pictures=False)
+
+
+def test_data_are_text_and_nothing_else_in_pictures(tmp_path: Path) -> None:
+    check_text_and_nothing_else("".join(HOSTILE[:9]), tmp_path / "a.pdf", pictures=True)
 
 
 def references(html: str) -> list[str]:
@@ -119,7 +129,6 @@ def test_a_report_needs_nothing_else_and_holds_no_secret(moving: Path, monkeypat
     text = "\n".join(page.extract_text() for page in pdf.pages)
     for where in (html, text):
         assert "hunter2" not in where
-        assert "PLC_PASSWORD" in where
         assert "<script>alert(1)</script>" not in html
     assert "http" not in re.sub(r"&lt;.*?&gt;", "", html.replace('http-equiv="', ""))
 
@@ -131,7 +140,7 @@ def test_long_logs_are_grouped_and_long_runs_thinned_with_a_note(moving: Path) -
     assert {row[0]: row[1] for row in grouped.rows} == {"change": "60", "gap": "3,000"}
     assert len(in_full.rows) == 40
     assert "20 events between them not shown" in in_full.note
-    pictures = {p.what: p for s in document.sections for p in s.parts if isinstance(p, Picture)}
+    pictures = {p.what: p for p in document.pictures}
     assert len(pictures["bode"].data["responses"]) <= 2048
     drawn = len(pictures["tracking"].data["responses"])
     assert 250 < drawn <= 500
@@ -149,7 +158,9 @@ def test_pages_are_numbered_and_sections_are_in_the_outline(tmp_path: Path) -> N
     for i, (page, text) in enumerate(zip(reader.pages, texts), 1):
         assert f"{i} / {len(reader.pages)}" in text
         assert [float(side) for side in page.mediabox[2:]] == pytest.approx([595.28, 841.89], abs=0.1)
-    assert [entry["/Title"] for entry in reader.outline] == [document.heading, *(s.title for s in document.sections)]
+    title, sections = reader.outline
+    assert title["/Title"] == document.title
+    assert [entry["/Title"] for entry in sections] == [document.heading, *(s.title for s in document.sections)]
 
 
 def test_the_report_of_an_unfinished_run_states_that_it_is_unfinished(tmp_path: Path) -> None:
@@ -191,17 +202,52 @@ def test_figures_are_vectors_with_text_that_can_be_searched(tmp_path: Path) -> N
     assert not page.images
 
 
-def test_without_reportlab_the_page_is_written_and_the_missing_pdf_is_reported(tmp_path: Path) -> None:
+def test_without_typst_the_page_is_written_and_the_missing_pdf_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = write_run(tmp_path / "run", measured(20, 1))
-    code = (
-        "import sys; sys.modules['reportlab'] = None; sys.argv[1:] = ['report', sys.argv[1]]\n"
-        "from livebode.cli import main; main()"
-    )
-    done = subprocess.run([sys.executable, "-c", code, str(run)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "pip install 'livebode[pdf]'" in done.stdout
+    monkeypatch.setitem(sys.modules, "typst", None)
+    monkeypatch.delitem(sys.modules, "livebode.report.pdf")
+    done = livebode("report", run)
+    assert done.code == 0, done.err
+    assert f"Typst is not installed; run {install_command('pdf')}" in done.out
     assert (run / "report.html").is_file()
     assert not (run / "report.pdf").exists()
+
+
+def test_the_first_page_is_from_template_and_options_on_the_paper_that_is_asked_for(tmp_path: Path) -> None:
+    run, template = write_run(tmp_path / "run", measured(20, 1)), tmp_path / "t.toml"
+    template.write_text('[report]\nmachine = "M"\noperator = "Ann"\npaper = "letter"\n', encoding="utf-8")
+    done = livebode("report", run, "--template", template, "--operator", "Bob <b>", "--out", tmp_path / "r")
+    assert done.code == 0, done.err
+    page = PdfReader(tmp_path / "r.pdf").pages[0]
+    assert [float(side) for side in page.mediabox[2:]] == [612, 792]
+    text = page.extract_text()
+    assert ("Bob <b>" in text, "Ann" in text, "not judged" in text) == (True, False, True)
+    assert "size: letter" in (tmp_path / "r.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (("--ask",), "--ask needs a terminal"),
+        (("--check",), "--check needs limits"),
+        (("--paper", "a5"), "choose a4, letter"),
+        (("--logo", "none.png"), "the logo 'none.png' cannot be read"),
+        (("--machine", "x" * 600), "more than 500 letters"),
+        (("--template", "none.toml"), "there is no file none.toml"),
+    ],
+    ids=str,
+)
+def test_options_that_are_not_possible_are_refused_before_a_file_is_written(
+    options: tuple[str, ...], why: str, tmp_path: Path
+) -> None:
+    run = write_run(tmp_path / "run", measured(20, 1))
+    done = livebode("report", run, *options)
+    assert (done.code, why in done.err, done.err.count("\n")) == (2, True, 1), done.err
+    assert not list(run.glob("report.*"))
+    if options[0] not in ("--check", "--ask"):
+        assert livebode("compare", run, run, *options).code == 2
 
 
 _NAMES = st.text(min_size=1, max_size=8)

@@ -27,6 +27,7 @@ from livebode.sources.live import SpectraBatch, encode_spectra, encode_spectra_l
 from livebode.sources.live.kernel_drive import KernelDrive
 from tests.support.command import livebode, write_parquet
 from tests.support.errors import refused
+from tests.support.forked import Command
 from tests.support.live_runs import started, table
 from tests.support.monitored import small_baseline
 from tests.support.peers.broker import MqttPeer
@@ -145,7 +146,7 @@ def run_live(
     return json.loads(out), folder / name
 
 
-def ended(process: subprocess.Popen[bytes], message: bytes = b"") -> bytes:
+def ended(process: Command, message: bytes = b"") -> bytes:
     """Its output after Ctrl-C, sent when it has read everything; `message` is how its errors begin."""
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(2.5)  # it goes on, for the machine may send more

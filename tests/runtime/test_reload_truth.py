@@ -143,7 +143,7 @@ def test_a_live_run_with_a_loop_is_reported(tmp_path: Path) -> None:
     with Machine(tmp_path) as machine, Running(tmp_path, text + f"[axes.x]\n{source(machine)}") as running:
         running.tracked("x", 800)
         assert running.end()[0] == 0
-    result = livebode("report", running.out / "x")
+    result = livebode("report", running.out / "x", "--appendix")
     assert result.code == 0, result.err
     page = (running.out / "x" / "report.html").read_text()
     for words in ("excitation at the plant input", "forgetting 0.8", "joint"):

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from livebode.core import ExtraError, RecordingError
+from livebode.core.installing import install_command
 from livebode.sources import open_log
 from tests.support.command import livebode
 from tests.support.errors import refused
@@ -227,4 +228,4 @@ def test_frames_without_their_libraries_name_the_extra(tmp_path, monkeypatch, pa
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(ExtraError, match="which is not installed") as caught:
         open_log(path, dbc=dbc)
-    assert caught.value.remedy == "run pip install livebode[can]"
+    assert caught.value.remedy == f"run {install_command('can')}"

@@ -13,6 +13,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from livebode.core import ExtraError, RecordingError
+from livebode.core.installing import install_command
 from livebode.sources import open_log
 from tests.support.command import livebode
 from tests.support.errors import refused
@@ -249,4 +250,4 @@ def test_ros_without_its_library_names_the_extra(tmp_path, monkeypatch, name):
     monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(ExtraError, match="rosbags") as caught:
         open_log(path)
-    assert caught.value.remedy == "run pip install livebode[ros]"
+    assert caught.value.remedy == f"run {install_command('ros')}"

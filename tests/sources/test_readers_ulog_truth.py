@@ -10,6 +10,7 @@ import pytest
 import pyulog
 
 from livebode.core import ExtraError, RecordingError
+from livebode.core.installing import install_command
 from livebode.sources import open_log
 from tests.support.errors import refused
 from tests.support.ulog_file import assembled, definition, dropout, parameter, sample, subscription, ulog_file
@@ -138,4 +139,4 @@ def test_ulog_without_its_library_names_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyulog", None)
     with pytest.raises(ExtraError, match="pyulog") as caught:
         open_log(tmp_path / "a.ulg")
-    assert caught.value.remedy == "run pip install livebode[ulog]"
+    assert caught.value.remedy == f"run {install_command('ulog')}"

@@ -58,8 +58,20 @@ class Tab:
         self.context.close()
 
     def until(self, expression: str) -> None:
-        """Wait for JavaScript to become true."""
-        self.page.wait_for_function(f"() => {{ with (window.livebode || {{}}) return Boolean({expression}); }}")
+        """Wait for JavaScript to become true; before the page has loaded its parts, their names are not defined."""
+        self.page.wait_for_function(
+            f"() => {{ try {{ with (window.livebode || {{}}) return Boolean({expression}); }}"
+            " catch (error) { if (window.livebode || !(error instanceof ReferenceError)) throw error; return false; } }"
+        )
+
+    def settle(self) -> None:
+        """Wait until the read-out is drawn, which has rows or none, and each chart has the size that this leaves it."""
+        self.until("!page.dirty.has('read') && !page.dirty.has('bode')")
+        self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        self.until(
+            "bode.charts.every(({root: {parentElement: host}, width, height}) =>"
+            " width === host.clientWidth && height === host.clientHeight)"
+        )
 
     def js(self, expression: str) -> Any:
         """The value of JavaScript; NaN and undefined come as null."""

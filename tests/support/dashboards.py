@@ -85,7 +85,12 @@ class Watched:
     """A run in segments that the dashboard shows; `serving` says to whom."""
 
     def __init__(
-        self, directory: Path, serving: Serving | None = None, loop: dict[str, Any] | None = LOOP, name: str = "axis"
+        self,
+        directory: Path,
+        serving: Serving | None = None,
+        loop: dict[str, Any] | None = LOOP,
+        name: str = "axis",
+        samples: bool = False,
     ) -> None:
         self.directory, self.machine = directory, Machine()
         self.messages: list[str] = []
@@ -99,7 +104,8 @@ class Watched:
             args=(self.machine, Tracker(SETTINGS), directory),
             kwargs={
                 "about": {"configuration": words, "found": {"format": "test"}}, "subscribers": [self.hub],
-                "fits": Fits(section, described if loop else None), "segments": RecordSection(segment_s=1.0),
+                "fits": Fits(section, described if loop else None),
+                "segments": RecordSection(segment_s=1.0, samples=samples),
             },
         )  # fmt: skip
 

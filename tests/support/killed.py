@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import signal
 import time
 from multiprocessing.connection import Connection
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.support.command import RATE_HZ
+from tests.support.forked import server
 from tests.support.recorded import check_beginning, check_whole, machine, record_machine, unfinished
 
 SAMPLES = 8_000
@@ -20,9 +20,7 @@ SAMPLES = 8_000
 
 def start(directory: Path) -> tuple[ForkServerProcess, Connection]:
     """A process that records, and the numbers of samples that it says are tracked."""
-    # Its server has imported what is slow, and starts a process in some milliseconds.
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["tests.support.killed"])
+    context = server()
     results, outlet = context.Pipe(duplex=False)
     process = context.Process(target=_work, args=(directory, outlet))
     process.start()

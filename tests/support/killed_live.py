@@ -6,7 +6,6 @@ Each sender numbers its samples, and sends the number as the channel n: what is 
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import os
 import sys
 import time
@@ -25,6 +24,7 @@ from livebode.records.grouped_events import each_event
 from livebode.runtime.destination import Destination
 from livebode.runtime.run import run
 from tests.support.command import RATE_HZ
+from tests.support.forked import server
 from tests.support.live_feeds import Feed
 from tests.support.peers.peer import PATIENCE_S, until
 
@@ -50,8 +50,7 @@ def _work(configuration: dict[str, Any], directory: Path, outlet: Connection, fi
 
 def start(feed: Feed, directory: Path) -> ForkServerProcess:
     """A process that records this feed, once it has imported all."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["tests.support.killed_live"])
+    context = server()
     results, outlet = context.Pipe(duplex=False)
     process = context.Process(
         target=_work, args=(REST | feed.rest | {"source": feed.source}, directory, outlet, feed.fifo)

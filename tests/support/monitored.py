@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ from livebode.simulation import (
     StrokeSequence,
 )
 from tests.support.axes import LINES, MULTISINE, RATE_HZ
+from tests.support.shared import shared
 
 NAMES = ("u", "velocity", "x")
 CHANNELS = ("w", *NAMES)
@@ -41,7 +42,7 @@ RADIUS_M = Mechanics().radius_m
 THERE, BACK = (LOW_M, HIGH_M), (HIGH_M, LOW_M)
 
 
-@cache
+@shared
 def machine() -> LearnedMachine:
     """From twelve strokes of random speed."""
     return learn_machine(healthy_runs(2, 6), LINES, input="u", output="velocity", schedule="x", radius_m=RADIUS_M)

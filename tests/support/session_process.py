@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ import numpy as np
 from livebode.core import Block, Event
 from livebode.records import RunRecord
 from tests.support.command import RATE_HZ
+from tests.support.forked import Command
 from tests.support.peers.machine import CHANNELS, Machine, data
 from tests.support.peers.peer import PATIENCE_S, until
 from tests.support.small_axis import WITH_SCHEDULE
@@ -37,16 +36,13 @@ class Running:
     def __init__(self, folder: Path, text: str, *options: str) -> None:
         self.file, self.out = folder / "axes.toml", folder / "run"
         self.file.write_text(text)
-        command = [Path(sys.executable).with_name("livebode"), "run", self.file, "--out", self.out, "--json", *options]
-        self.process = subprocess.Popen([*map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.process = Command("run", self.file, "--out", self.out, "--json", *options)
 
     def __enter__(self) -> Running:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.communicate()
+    def __exit__(self, *error: object) -> None:
+        self.process.__exit__(*error)
 
     def edit(self, text: str) -> None:
         """Change the file, and say so."""

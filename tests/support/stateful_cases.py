@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from livebode.configuration.axis import FitSection
+from livebode.configuration.ready import ReadyCondition
 from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
 from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.estimation.successive import SuccessiveTrackers
@@ -24,6 +25,7 @@ from livebode.preparation.checks import ChannelCheck
 from livebode.runtime.change_detection import ChangeDetection
 from livebode.runtime.continuing import StreamPosition
 from livebode.runtime.fits import Fits
+from livebode.runtime.readiness import Readiness
 from livebode.runtime.run_counts import RunCounts
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
 from livebode.sources.live import LiveBlock
@@ -277,6 +279,23 @@ def run_counts() -> Case:
     )
 
 
+def readiness() -> Case:
+    """Ready, then not, at the end again for less than a window."""
+    state = np.ones(900)
+    state[300:320] = state[500:880] = 0.0
+    parts = cut(Block(state[np.newaxis], ("on",), RATE_HZ), 310, 600)
+
+    def step(stage: Readiness, part: Block) -> object:
+        marked = stage.mark(responses()[5:10])
+        return [vars(event) for event in stage.take(part)], marked.ready.tolist(), stage.summary(RATE_HZ)
+
+    return Case(
+        lambda: Readiness(ReadyCondition("on"), WINDOW),
+        [lambda stage, part=part: step(stage, part) for part in parts],
+        [lambda: Readiness(ReadyCondition("on", 1), WINDOW), lambda: Readiness(ReadyCondition("on"), WINDOW, 10)],
+    )
+
+
 def stream_position() -> Case:
     """It continues only where its own record ends, so a restored one is made from the snapshot."""
     origin = Origin(epoch=3, offset=100, mark={"name": "a.csv", "offset": 17})
@@ -293,6 +312,6 @@ CASES = {
     for case in (
         tracker, direct_tracker, successive_trackers, local_polynomial, welch_average, spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
-        run_counts, stream_position,
+        run_counts, readiness, stream_position,
     )
 }  # fmt: skip

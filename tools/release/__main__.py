@@ -1,7 +1,7 @@
 """`python -m tools.release check`, and `prepare VERSION`: what must be true before a version is published.
 
 `check` prints every check as ok or missed with its remedy; the exit code is 1 if one is missed. `prepare` sets the
-version in pyproject.toml and CITATION.cff, and dates the Unreleased part of CHANGELOG.md.
+version in pyproject.toml, the package and CITATION.cff, and dates the Unreleased part of CHANGELOG.md.
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ from tools.release.files import (
     section,
     text,
     version,
+    version_in_package,
 )
 
 LOCKS = {"requirements-dev.lock": "dev", "requirements-bench.lock": "bench", "requirements-docs.lock": "docs"}
@@ -64,6 +65,11 @@ def unreleased(root: Path) -> str:
     return "" if section(root, version(root)) else f"the part of {version(root)} is empty"
 
 
+def packaged(root: Path) -> str:
+    found, wanted = version_in_package(root), version(root)
+    return "" if found == wanted else f"pyproject.toml has {wanted}, livebode.__version__ is {found or 'missing'}"
+
+
 def cited(root: Path) -> str:
     date = newest_heading(root)[1]
     wanted = {"version": version(root), "date-released": date}
@@ -85,8 +91,9 @@ def required(root: Path, group: str) -> Iterator[str]:
     yield from settings["dependency-groups"][group]
     if group == "dev":
         yield from settings["project"]["dependencies"]
-        for extra in settings["project"].get("optional-dependencies", {}).values():
-            yield from extra
+        for name, extra in settings["project"].get("optional-dependencies", {}).items():
+            if name != "all":  # which names the others
+                yield from extra
 
 
 def locked(root: Path) -> str:
@@ -155,6 +162,7 @@ CHECKS = (
     Check("tag", tag, "choose the next version: python -m tools.release prepare VERSION"),
     Check("changelog heading", heading, "python -m tools.release prepare VERSION"),
     Check("changelog entries", unreleased, "move the entries to the part of this release"),
+    Check("version in the package", packaged, "set __version__ in src/livebode/version.py"),
     Check("citation", cited, "set version and date-released in CITATION.cff"),
     Check("locks", locked, "make lock"),
     Check("hosts in locks", hosts, "remove the addresses from the lock"),

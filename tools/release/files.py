@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+PACKAGE = "src/livebode/version.py"
 DATED = re.compile(r"^## \[(?P<version>[^\]]+)\] - (?P<date>\d{4}-\d\d-\d\d)$", re.M)
 
 
@@ -29,6 +30,12 @@ def project(root: Path) -> dict[str, Any]:
 
 def version(root: Path) -> str:
     return str(project(root)["project"]["version"])
+
+
+def version_in_package(root: Path) -> str:
+    """`livebode.__version__`, empty if the module lacks it."""
+    found = re.search(r'^__version__ = "(.*)"$', text(root, PACKAGE), re.M)
+    return found.group(1) if found else ""
 
 
 def section(root: Path, heading: str) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from packaging.version import Version
 
-from tools.release.files import section, text
+from tools.release.files import PACKAGE, section, text
 
 
 def replaced(content: str, pattern: str, replacement: str, name: str) -> str:
@@ -18,7 +18,7 @@ def replaced(content: str, pattern: str, replacement: str, name: str) -> str:
 
 
 def prepare(root: Path, version: str, date: str) -> list[str]:
-    """Write version and date to pyproject.toml, CITATION.cff and CHANGELOG.md; return what was written."""
+    """Write version and date to pyproject.toml, the package, CITATION.cff and CHANGELOG.md; return what was written."""
     version = str(Version(version))
     if not section(root, "Unreleased"):
         raise ValueError("the Unreleased part of CHANGELOG.md is empty: there is nothing to release")
@@ -31,6 +31,7 @@ def prepare(root: Path, version: str, date: str) -> list[str]:
         "pyproject.toml": replaced(
             text(root, "pyproject.toml"), r'^version = ".*"$', f'version = "{version}"', "pyproject.toml"
         ),
+        PACKAGE: replaced(text(root, PACKAGE), r'^__version__ = ".*"$', f'__version__ = "{version}"', PACKAGE),
         "CITATION.cff": replaced(cff, r"^date-released:.*$", f"date-released: {date}", "CITATION.cff"),
         "CHANGELOG.md": replaced(text(root, "CHANGELOG.md"), r"^## \[Unreleased\]$", heading, "CHANGELOG.md"),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from functools import cache
 from types import SimpleNamespace
@@ -31,7 +32,11 @@ class ReturnNow(Exception):  # noqa: N818 (no error)
 @cache
 def parse(text: str) -> tuple:
     """blark's declarations in `text`; what it cannot parse fails."""
-    result = parse_source_code(text)
+    gc.disable()  # it makes a million objects and no circles, and each pass of the collector visits them all
+    try:
+        result = parse_source_code(text)
+    finally:
+        gc.enable()
     if result.exception is not None:
         raise result.exception
     return tuple(result.transform().items)

@@ -67,7 +67,8 @@ def changes(of: Compared) -> Changes:
     own = [recorded_configuration(run.summary) for run in of.runs]
     section = next((s["fit"] for s in own if "fit" in s), None)
     if section is None:
-        return Changes((), "No parameters: neither run has a [fit] section.", (), "No margins: they need a fit.")
+        words = "No parameters: neither run has a [fit] section (`livebode new --fit auto` writes one)."
+        return Changes((), words, (), "No margins: they need a fit.")
     model = FitSection.model_validate(section)
     try:
         fits = [

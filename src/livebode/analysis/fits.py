@@ -51,7 +51,7 @@ def _best(of: Averaged, section: FitSection) -> Fit:
     taken = _taken(best)
     return best.refused(
         f"as a {taken} the output differs from the {best.model.name} model by {100 * best.epsilon:.0f} % of |G| (limit "
-        f"{100 * _WRONG:.0f} %), so its parameters have no meaning: specify the kind, or fit another model"
+        f"{100 * _WRONG:.0f} %), so its parameters have no meaning: set fit.output, or fit another model"
     )
 
 

@@ -29,7 +29,9 @@ _ROLES = ("output", "input", "excitation", "schedule")
 _RADIUS_M = 1.0
 
 
-def learn(paths: Sequence[str | PathLike[str]], report: Callable[[str], None] = lambda _: None) -> Baseline:
+def learn(
+    paths: str | PathLike[str] | Sequence[str | PathLike[str]], report: Callable[[str], None] = lambda _: None
+) -> Baseline:
     """The Baseline of runs of the healthy machine, all with the same lines and signals; as `livebode learn`.
 
     Tables are learned from the runs' responses. With a torque and a scheduling position, a model of the moving machine
@@ -50,6 +52,8 @@ def learn(paths: Sequence[str | PathLike[str]], report: Callable[[str], None] = 
     >>> baseline.tables[0].names[:3], baseline.hop
     (('20 Hz', '30 Hz', '40 Hz'), 100)
     """
+    if isinstance(paths, str | PathLike):
+        paths = [paths]
     if not paths:
         raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
     runs = [RunRecord.open(Path(path)) for path in paths]
@@ -110,7 +114,7 @@ def _axis(run: RunRecord) -> Axis:
         raise BaselineError(
             "run-averaged",
             f"{str(run.path)!r} was created with tracking.average, so that each response contains those before it",
-            "learn from a run of the same recording without it",
+            "learn from a run with tracking.average = false, or compare two averaged runs (livebode compare)",
             path=str(run.path),
         )
     return axis
@@ -214,9 +218,15 @@ def _machine(
 def _samples(run: RunRecord, axis: Axis) -> Callable[[], Iterator[Block]]:
     names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule, *axis.monitoring.covariates]
 
+    ready = axis.ready
+
     def blocks() -> Iterator[Block]:
         log = open_recording(axis)
         part = run.found.get("part")
-        return (log if part is None else log.part(part["first"], part["stop"])).blocks(names)
+        log = log if part is None else log.part(part["first"], part["stop"])
+        if ready is None:
+            return log.blocks(names)
+        each = log.blocks(list(dict.fromkeys([*names, ready.channel])))
+        return (part for block in each for part in ready.parts(block))
 
     return blocks

@@ -9,6 +9,7 @@ import numpy as np
 
 from livebode.analysis.fits import fit_run
 from livebode.configuration.axis import Axis, FitSection
+from livebode.configuration.ready import ReadyCondition
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Block, FitError, RecordError, SignalError, UsageError
 from livebode.records import RunRecord
@@ -29,8 +30,8 @@ def validate_run(
 
     Rate, loop and channels are those of the run's configuration; `channels` can replace output, input or excitation.
     The excitation may be missing in `log`. Of a recording with gaps or samples that are not finite, the longest clean
-    stretch is used; of that the last `samples`, where the transient has decayed. The remarks report this, models that
-    were not fitted, and whether the recording is that of the run.
+    stretch in which the machine is ready is used; of that the last `samples`, where the transient has decayed. The
+    remarks report this, models that were not fitted, and whether the recording is that of the run.
 
     Raises
     ------
@@ -49,7 +50,9 @@ def validate_run(
             "create it with `livebode run`",
             path=str(directory),
         )
-    axis = Axis.of({key: own_words[key] for key in ("source", "signals", "loop") if key in own_words}, str(directory))
+    axis = Axis.of(
+        {key: own_words[key] for key in ("source", "signals", "loop", "monitoring") if key in own_words}, str(directory)
+    )
     named = {role: name for role, name in (channels or {}).items() if name}
     signals = axis.signals.model_copy(update=named)
     if signals.input is None:
@@ -67,9 +70,16 @@ def validate_run(
         notes.append(f"{log.name} has no channel {signals.excitation!r}: judged without the excitation w")
         signals = signals.model_copy(update={"excitation": None})
     names = [name for name in (signals.input, signals.output, signals.excitation) if name]
-    block, recorded = clean_stretch(opened, names)
+    ready = axis.ready
+    if ready is not None and not opened.has(ready.channel):
+        notes.append(f"{log.name} has no channel {ready.channel!r}: judged as if the machine was always ready")
+        ready = None
+    block, recorded = clean_stretch(opened, names, ready)
     if len(block) < recorded:
-        notes.append(f"gaps or samples that are not finite: the longest clean stretch, {len(block)} of {recorded}")
+        also = "" if ready is None else ", or samples at which the machine is not ready"
+        notes.append(
+            f"gaps or samples that are not finite{also}: the longest clean stretch, {len(block)} of {recorded}"
+        )
     if samples is not None:
         if samples > len(block):
             raise UsageError(
@@ -97,14 +107,19 @@ def _freshness(own: Sequence[Path], log: Path) -> list[str]:
     return [f"{log.name} is the recording of the run: this is not independent data, because the model was fitted to it"]
 
 
-def clean_stretch(opened: Log, names: list[str]) -> tuple[Block, int]:
-    """The longest stretch of a recording without gaps and with finite samples only, and the number of all samples."""
+def clean_stretch(opened: Log, names: list[str], ready: ReadyCondition | None = None) -> tuple[Block, int]:
+    """The longest stretch of a recording without gaps and with finite samples only, and the number of all samples.
+
+    With `ready`, the machine is ready at each of its samples.
+    """
     best: list[Block] = []
     now: list[Block] = []
     recorded = 0
-    for block in opened.blocks(names):
+    for block in opened.blocks(names if ready is None else list(dict.fromkeys([*names, ready.channel]))):
         recorded += len(block)
         broken = ~np.isfinite(block.data).all(axis=0)
+        if ready is not None:
+            broken |= ~ready.holds(block[ready.channel])
         edges = np.flatnonzero(np.diff(np.concatenate([[1], broken, [1]])))
         for first, last in zip(edges[::2], edges[1::2]):
             if first > 0 or block.gap or not now or now[-1].stop != block.start:

@@ -6,6 +6,6 @@ import os
 # ten times as long as the product takes.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from livebode.cli.app import app, main
+from livebode.cli.start import main
 
-__all__ = ["app", "main"]
+__all__ = ["main"]

@@ -2,7 +2,7 @@
 
 Commands: measure (run, demo), look at recordings and runs (inspect, query), evaluate runs (fit, margins, validate,
 learn), export, check the installation (doctor). Exit codes: 0 success, 1 internal error, 2 usage error, 3 no model
-fits, 130 and above stopped by a signal.
+fits, 4 a limit is not met (report --check), 130 and above stopped by a signal.
 """
 
 from __future__ import annotations
@@ -11,44 +11,23 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, cast
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from livebode.cli.compare_command import compare_command
-from livebode.cli.demo_command import demo_command
-from livebode.cli.design_command import design_command
-from livebode.cli.doctor_command import doctor_command
-from livebode.cli.export_command import export_command
+from livebode.cli.commands import SUMMARIES, command
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
-from livebode.cli.fit_command import fit_command
-from livebode.cli.inspect_command import inspect_command
-from livebode.cli.learn_command import learn_command
+from livebode.cli.first_page import ABOUT, OPTIONS
 from livebode.cli.log_options import File, Level, LogOptions, with_log
-from livebode.cli.margins_command import margins_command
-from livebode.cli.plc_command import plc_command
-from livebode.cli.query_command import query_command
-from livebode.cli.report_command import report_command
-from livebode.cli.run_command import run_command
-from livebode.cli.schema_command import schema_command
 from livebode.cli.terminal import protect, unchecked_output
-from livebode.cli.validate_command import validate_command
-from livebode.cli.view_command import view_command
 from livebode.core import DamageWarning, LivebodeError
-from livebode.records import to_json
+from livebode.version import __version__
 
+_HELP = {"help_option_names": ["--help", "-h"]}
+_OPTIONS = {names.split()[0] for names in OPTIONS}
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-
-
-class _HelpGroup(TyperGroup):
-    """The group of commands, with help in colour."""
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Format the help; escape codes pass unchecked because the texts belong to the program."""
-        with unchecked_output():
-            super().format_help(ctx, formatter)
 
 
 class _Command(TyperCommand):
@@ -79,33 +58,59 @@ class _Command(TyperCommand):
             raise
 
 
+class _Commands(Mapping[str, TyperCommand]):
+    """The commands by name; the module of one is loaded when it is used."""
+
+    def __getitem__(self, name: str) -> TyperCommand:
+        if name not in SUMMARIES:
+            raise KeyError(name)
+        alone = typer.Typer(add_completion=False)
+        alone.command(name, cls=_Command, context_settings=_HELP)(with_log(command(name)))
+        return cast("TyperCommand", typer.main.get_command(alone))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(SUMMARIES)
+
+    def __len__(self) -> int:
+        return len(SUMMARIES)
+
+
+class _Group(TyperGroup):
+    """The group of commands, with help in colour."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.commands = _Commands()  # type: ignore[assignment]
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
+        """The names in the order of the help."""
+        return list(SUMMARIES)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:  # noqa: ARG002
+        """A command as a list of commands shows it; its options are not needed for that, nor is its module."""
+        return TyperCommand(name=cmd_name, help=SUMMARIES[cmd_name]) if cmd_name in SUMMARIES else None
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the arguments begin with, to be run or completed."""
+        if f"--{args[0]}" in _OPTIONS and args[0] not in SUMMARIES:
+            ctx.fail(f"No such command {args[0]!r}. Did you mean 'livebode --{args[0]}'?")
+        name, listed, rest = super().resolve_command(ctx, args)
+        return name, listed and self.commands[listed.name or ""], rest
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Format the help; escape codes pass unchecked because the texts belong to the program."""
+        with unchecked_output():
+            super().format_help(ctx, formatter)
+
+
 app = typer.Typer(
-    cls=_HelpGroup,
-    help="The Bode plot of a machine while the machine works.",
+    cls=_Group,
+    help=ABOUT,
+    context_settings=_HELP,
     no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
 )
-_COMMANDS: dict[str, Callable[..., None]] = {
-    "run": run_command,
-    "fit": fit_command,
-    "inspect": inspect_command,
-    "demo": demo_command,
-    "design": design_command,
-    "query": query_command,
-    "export": export_command,
-    "margins": margins_command,
-    "validate": validate_command,
-    "learn": learn_command,
-    "plc": plc_command,
-    "report": report_command,
-    "compare": compare_command,
-    "view": view_command,
-    "doctor": doctor_command,
-    "schema": schema_command,
-}
-for _name, _command in _COMMANDS.items():
-    app.command(_name, cls=_Command)(with_log(_command))
 
 
 @app.callback(invoke_without_command=True)
@@ -116,14 +121,12 @@ def _version(
     log_file: File = None,
 ) -> None:
     if version:
-        from livebode import __version__
-
         typer.echo(f"livebode {__version__}")
         raise typer.Exit
     context.obj = LogOptions(log_level, log_file)
 
 
-def main() -> None:
+def run_application() -> None:
     """Run the command line and exit with its code."""
     _prepare_process()
     try:
@@ -144,6 +147,8 @@ def _fail(error: Exception) -> None:
     if disk_full(error):
         _discard_output()
     failure = failure_of(error)
+    from livebode.records import to_json  # loads Arrow and pydantic, which not every command needs
+
     _stop(to_json({"error": failure.error}) if json_requested() else failure.text, failure.exit_code)
 
 

@@ -88,6 +88,8 @@ def table_of(threads: list[AxisThread]) -> Table:
         table.add_column(column, justify="right" if column in _COLUMNS[2:8] else "left", no_wrap=True)
     for thread in threads:
         table.add_row(*map(Text, _row(thread)))
+    # In a narrow terminal everything else may be shortened.
+    table.columns[0].min_width = max((len(thread.name) for thread in threads), default=0)
     return table
 
 

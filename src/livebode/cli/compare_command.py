@@ -11,7 +11,22 @@ from typing import Annotated
 import typer
 
 from livebode.cli.documents import write_documents
-from livebode.cli.options import Json, Language
+from livebode.cli.options import Json
+from livebode.cli.report_options import (
+    Appendix,
+    Ask,
+    Company,
+    Conditions,
+    Customer,
+    LogoFile,
+    Machine,
+    Operator,
+    PaperSize,
+    ReportLanguage,
+    SerialNumber,
+    Template,
+    header,
+)
 from livebode.core import UsageError
 from livebode.language import in_language
 from livebode.records import to_json
@@ -26,22 +41,43 @@ def compare_command(
         typer.Option(metavar="SIZE", help="Smallest change of a line that matters, as 0.5dB or 5%. \\[default: any]"),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
-    language: Language = "en",
+    template: Template = None,
+    machine: Machine = None,
+    serial_number: SerialNumber = None,
+    operator: Operator = None,
+    company: Company = None,
+    customer: Customer = None,
+    conditions: Conditions = None,
+    logo: LogoFile = None,
+    paper: PaperSize = None,
+    language: ReportLanguage = None,
+    ask: Ask = False,
+    appendix: Appendix = False,
     as_json: Json = False,
 ) -> None:
     """Find the lines, parameters and margins that differ between two runs, with amounts and bounds.
 
     A line differs if chance does not explain it; with --ignore-below only if |after/before − 1| is that large too.
-    Runs with a schedule, such as a position, are compared by place and direction, and over all places.
+    Runs with a schedule, such as a position, are compared by place and direction, and over all places. The first page
+    of the files is as in `livebode report`; limits apply to AFTER.
     """
     from livebode.reporting.compare_report import Comparison
+    from livebode.reporting.first_page import header_of
 
     found = Comparison.of(before, after, ignore_below=_share(ignore_below))
     files: list[Path] = []
     remark = ""
+    options = {
+        "machine": machine, "serial_number": serial_number, "operator": operator, "company": company,
+        "customer": customer, "conditions": conditions, "logo": logo, "paper": paper,
+    }  # fmt: skip
+    if out is None and (template is not None or ask or appendix or language or any(options.values())):
+        raise _needs_out()
     if out is not None:
-        with in_language(language):
-            files, remark = write_documents(found.document(datetime.now(UTC)), out, force=force)
+        first = header(header_of(found.found.runs[1].summary), template, ask, options)
+        with in_language(language or first.language or "en"):
+            document = found.document(datetime.now(UTC), header=first, appendix=appendix)
+            files, remark = write_documents(document, out, force=force)
     if as_json:
         print(to_json(found.plain()))
         return
@@ -49,8 +85,19 @@ def compare_command(
         print(finding.text)
     for table in found.tables:
         print(f"\n{table}")
+    if not found.changes.parameters:
+        print(found.changes.parameter_words)
     for line in filter(None, (*files, remark)):
         print(line)
+
+
+def _needs_out() -> UsageError:
+    return UsageError(
+        "missing",
+        "the options of the first page belong to the files of --out, which is missing",
+        "add --out FILE",
+        argument="out",
+    )
 
 
 def _share(text: str | None) -> float:

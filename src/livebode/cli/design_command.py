@@ -82,8 +82,8 @@ def _show(design: Design) -> None:
 
     console = terminal.console(markup=False)
     table = _table()
-    table.add_column("chosen")
-    table.add_column("value")
+    table.add_column("chosen", overflow="fold")
+    table.add_column("value", overflow="fold")
     table.add_column("why", overflow="fold")
     for choice in design.choices:
         table.add_row(choice.what, choice.value, choice.why)
@@ -109,7 +109,7 @@ def _show_lines(console: Console, design: Design) -> None:
     first = int(relative.argmax()) % each
     table = _table()
     for head in ("line", "in the spectrum", "σ of a window", f"95 % bound, {counted(windows, 'window')}"):
-        table.add_column(head, justify="right")
+        table.add_column(head, justify="right", overflow="fold")
     counts, reached = design.encoder_counts, design.accuracy.reached(windows)
     if counts is not None:
         table.add_column("at the encoder", justify="right")

@@ -15,6 +15,7 @@ from livebode.records import to_json
 if TYPE_CHECKING:
     from livebode.doctor import Check
 
+_TABLE_COLUMNS = 80  # of a terminal; in a narrower one a table has no room for a sentence
 _STYLES = {"not applicable": "dim", "ok": "green", "warning": "yellow", "failed": "bold red"}
 
 
@@ -56,6 +57,11 @@ def doctor_command(
 def _show(checks: list[Check]) -> None:
     from rich.table import Table
 
+    if terminal.is_terminal() and (console := terminal.console(markup=False)).width < _TABLE_COLUMNS:
+        for check in checks:
+            console.print(Text.assemble(f"{check.name}: ", (check.verdict, _STYLES[check.verdict])))
+            console.print(f"  {check.message}" + (f"\n  → {check.remedy}" if check.remedy else ""), soft_wrap=True)
+        return
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("check", no_wrap=True)
     table.add_column("verdict", no_wrap=True)

@@ -1,4 +1,4 @@
-"""The documents of `livebode report` and `livebode compare`: one HTML file, and a PDF if ReportLab is installed."""
+"""The documents of `livebode report` and `livebode compare`: one HTML file, and a PDF if Typst is installed."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from pathlib import Path
 
 from livebode.core import OutputError
 from livebode.core.document import Document
+from livebode.core.installing import install_command
 
-_NO_PDF = "no PDF: ReportLab is not installed; pip install 'livebode[pdf]', or print the page from a browser"
+_NO_PDF = "no PDF: Typst is not installed; run {}, or print the page from a browser"
 
 
 def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list[Path], str]:
@@ -20,6 +21,7 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
     """
     from livebode.export import save
     from livebode.report.html import to_html
+    from livebode.report.svg import pictures_svg
 
     base = out.with_suffix("") if out.suffix.lower() in (".html", ".pdf") else out
     page, paper = (base.with_name(base.name + ending) for ending in (".html", ".pdf"))
@@ -30,10 +32,16 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
             "choose another --out, or replace it with --force",
             path=str(paper),
         )
-    save(page, lambda partial: partial.write_text(to_html(document), encoding="utf-8"), force=force)
+    drawn = pictures_svg(document)
+    save(page, lambda partial: partial.write_text(to_html(document, drawn), encoding="utf-8"), force=force)
     try:
         from livebode.report.pdf import save_pdf
     except ImportError:
-        return [page], _NO_PDF
-    save(paper, lambda partial: save_pdf(document, partial), force=force)
+        return [page], _NO_PDF.format(install_command("pdf"))
+    try:
+        save(paper, lambda partial: save_pdf(document, partial, drawn), force=force)
+    except OutputError as error:
+        if error.code == "output.no-font":
+            return [page], f"no PDF: {error}"
+        raise
     return [page, paper], ""

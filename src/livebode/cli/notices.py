@@ -11,9 +11,9 @@ _KINDS = {
     "roles-doubtful", "transient", "outlying-periods", "phase-slip", "phase-slips", "restart", "replaced",
     "computer-clock", "foreign", "backlog", "backlog-cleared", "waiting", "window-doubtful",
     "drift", "not-periodic", "distortion-levels", "best-linear-approximation", "recordings-differ",
-    "uneven-clock",
+    "uneven-clock", "suppressed",
 }  # fmt: skip
-_ONCE = {"foreign"}
+_ONCE = {"foreign", "suppressed"}
 
 
 class NoticePrinter:

@@ -59,8 +59,9 @@ Port = Annotated[
 Serve = Annotated[bool, typer.Option("--serve", help="Show the run in a browser while it is recorded.")]
 
 
-def _language(code: str) -> str:
-    if code not in available():
+def known_language(code: str | None) -> str | None:
+    """The code of a language; UsageError for another one."""
+    if code is not None and code not in available():
         raise UsageError(
             "not-one-of",
             f"--language={code!r} is not one of the languages",
@@ -70,13 +71,3 @@ def _language(code: str) -> str:
             allowed=list(available()),
         )
     return code
-
-
-Language = Annotated[
-    str,
-    typer.Option(
-        metavar="CODE",
-        callback=_language,
-        help=f"Language of the document: {', '.join(available())}. Terminal and JSON output are English.",
-    ),
-]

@@ -2,14 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from livebode.cli.documents import write_documents
-from livebode.cli.options import Json, Language
+from livebode.cli.options import Json
+from livebode.cli.report_options import (
+    Appendix,
+    Ask,
+    Company,
+    Conditions,
+    Customer,
+    LogoFile,
+    Machine,
+    Operator,
+    PaperSize,
+    ReportLanguage,
+    SerialNumber,
+    Template,
+    header,
+)
+
+if TYPE_CHECKING:
+    from livebode.reporting.report_data import Judged
+
+_NOT_ALL_MET = 4
 
 
 def report_command(
@@ -24,33 +45,84 @@ def report_command(
         Path | None, typer.Option(metavar="FILE", help="File name without suffix. \\[default: RUN/report]")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing report at --out.")] = False,
-    language: Language = "en",
+    template: Template = None,
+    machine: Machine = None,
+    serial_number: SerialNumber = None,
+    operator: Operator = None,
+    company: Company = None,
+    customer: Customer = None,
+    conditions: Conditions = None,
+    logo: LogoFile = None,
+    paper: PaperSize = None,
+    language: ReportLanguage = None,
+    ask: Ask = False,
+    appendix: Appendix = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Exit code 4 unless all limits are met; without limits, a usage error.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
-    """Write the measurement, its settings and its results as report.html and report.pdf.
+    """Write the measurement and its results as report.html and report.pdf, with the verdict on page 1.
 
-    An existing report in the run directory is replaced. The PDF needs the extra `pdf`.
+    The first page and the limits are from the [report] of the axis.toml with which the run was recorded, from
+    --template, and from the options. An existing report in the run directory is replaced. The PDF needs the extra
+    `pdf`. Without --check the exit code does not depend on the limits.
     """
     from livebode.core.clock import moments_by
     from livebode.language import in_language
     from livebode.records import RunRecord, to_json
-    from livebode.reporting.report_data import Judged
-    from livebode.reporting.run_report import run_report
+    from livebode.reporting.first_page import header_of
+    from livebode.reporting.report_data import read
+    from livebode.reporting.run_report import report_of
 
-    judged = None
-    if on is not None:
-        from livebode.analysis.validation import validate_run
-        from livebode.configuration.axis import FitSection
-        from livebode.configuration.recorded import recorded_configuration
-
-        section = FitSection.model_validate(recorded_configuration(RunRecord.open(directory).summary).get("fit", {}))
-        found, notes = validate_run(directory, on, [section])
-        judged = Judged(on.name, tuple(found), tuple(notes))
-    with moments_by(RunRecord.open(directory, on_damage=lambda _: None).clock), in_language(language):
-        document = run_report(directory, judged, made=datetime.now(UTC))
+    run = RunRecord.open(directory, on_damage=lambda _: None)
+    options = {
+        "machine": machine, "serial_number": serial_number, "operator": operator, "company": company,
+        "customer": customer, "conditions": conditions, "logo": logo, "paper": paper,
+    }  # fmt: skip
+    first = header(header_of(run.summary), template, ask, options)
+    if check and not first.limits:
+        raise _no_limits()
+    judged = None if on is None else _judged(directory, on)
+    with moments_by(run.clock), in_language(language or first.language or "en"):
+        of = read(directory, judged, first)
+        document = report_of(of, made=datetime.now(UTC), appendix=appendix)
         files, remark = write_documents(document, out or directory / "report", force=force or out is None)
+    results = [a.result for a in of.accepted]
     if as_json:
-        print(to_json({"files": list(map(str, files))}))
-        return
-    for line in filter(None, (*files, remark)):
-        print(line)
+        found = {"files": list(map(str, files)), "verdict": document.result[0].tone}
+        print(to_json(found | ({"limits": [a.plain() for a in of.accepted]} if of.accepted else {})))
+    else:
+        for line in filter(None, (*files, remark, _counted(results))):
+            print(line)
+    if check and set(results) != {"pass"}:
+        raise typer.Exit(_NOT_ALL_MET)
+
+
+def _counted(results: Sequence[str]) -> str:
+    words = {"pass": "met", "fail": "failed", "undecided": "not decided"}
+    counts = [f"{results.count(result)} {word}" for result, word in words.items() if result in results]
+    return f"limits: {', '.join(counts)}" if counts else ""
+
+
+def _no_limits() -> Exception:
+    from livebode.core import UsageError
+
+    return UsageError(
+        "missing",
+        "--check needs limits, and neither the run nor a template has any",
+        "add [[report.limits]] to the axis.toml, or use --template",
+        argument="--check",
+    )
+
+
+def _judged(directory: Path, on: Path) -> Judged:
+    from livebode.analysis.validation import validate_run
+    from livebode.configuration.axis import FitSection
+    from livebode.configuration.recorded import recorded_configuration
+    from livebode.records import RunRecord
+    from livebode.reporting.report_data import Judged
+
+    section = FitSection.model_validate(recorded_configuration(RunRecord.open(directory).summary).get("fit", {}))
+    found, notes = validate_run(directory, on, [section])
+    return Judged(on.name, tuple(found), tuple(notes))

@@ -34,6 +34,7 @@ from livebode.runtime import (
     run_output_only,
 )
 from livebode.runtime.documents import TrackerResults
+from livebode.sources.formats import read_head
 
 T = TypeVar("T")
 
@@ -167,8 +168,8 @@ def run_command(
     }
     specified = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
     over = {section: values for section, values in specified.items() if values} | ({"record": {}} if go_on else {})
-    over |= _output_only(output_only, output or [], band)
     target = targets[0]
+    over |= _output_only(target, output_only, output or [], band)
     if len(targets) > 1 and any(path.suffix.lower() == ".toml" for path in targets):
         raise UsageError(
             "conflict",
@@ -198,11 +199,15 @@ def run_command(
             _run_axes(axes, directory, force, as_json, file, lambda name: subscribers_of(name or target.stem))
 
 
-def _output_only(chosen: bool, outputs: list[str], band: str | None) -> dict[str, Any]:
+def _output_only(target: Path, chosen: bool, outputs: list[str], band: str | None) -> dict[str, Any]:
     """The section of an output-only run; nothing for another one, and UsageError if that has a band."""
     if chosen:
         others = {"others": outputs[1:]} if outputs[1:] else {}
         return {"output_only": others | ({"band_hz": parsed_band(band)} if band else {})}
+    if band and target.suffix.lower() == ".toml":
+        axes = ConfigurationFile(target, {}).read().values()
+        if all(axis.output_only is not None for axis in axes):
+            return {"output_only": {"band_hz": parsed_band(band)}}
     if band:
         raise UsageError(
             "conflict",
@@ -245,10 +250,12 @@ def _axes(recordings: list[Path], specified: dict[str, dict[str, Any]], outputs:
 def _axis(recordings: list[Path], specified: dict[str, dict[str, Any]]) -> Axis:
     """The configuration of recordings from the options."""
     if "output" not in specified.get("signals", {}):
+        for recording in recordings:
+            read_head(recording)  # a file that is missing or a directory is the first thing to mend
         raise UsageError(
             "missing",
             "the output channel is not named",
-            "give --output CHANNEL (livebode inspect lists the channels)",
+            "give --output CHANNEL (livebode inspect lists the channels, livebode new proposes their roles)",
             argument="output",
         )
     log = recordings if len(recordings) > 1 else recordings[0]

@@ -9,23 +9,36 @@ import typer
 
 from livebode.cli.options import Port
 from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
-from livebode.configuration import Axis
-from livebode.configuration.axis import ServeSection
+from livebode.configuration.axis import ServeSection, serve_section
 
 
 def view_command(
     runs: Annotated[
-        list[Path], typer.Argument(metavar="RUN...", help="Run directories; also of runs that are still recording.")
+        list[Path],
+        typer.Argument(
+            metavar="RUN...",
+            help="Run directories, also of runs that are still recording; or one directory that contains runs.",
+        ),
     ],
     port: Port = None,
     axis: Annotated[
-        Path | None, typer.Option(metavar="AXIS.toml", help="Read \\[serve] from this file: address, tokens, TLS.")
+        Path | None,
+        typer.Option(
+            metavar="AXIS.toml",
+            help="Read \\[serve] from this file, which may have nothing else: address, tokens, TLS.",
+        ),
     ] = None,
 ) -> None:
-    """Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still recording."""
-    dashboard = dashboard_of(ServeSection() if axis is None else Axis.read(axis).serve, port)
-    for run in runs:
-        dashboard.view(run)
+    """Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still recording.
+
+    Of a directory that contains runs, show a list of them, to search, tag, compare and delete, and their trends.
+    """
+    dashboard = dashboard_of(ServeSection() if axis is None else serve_section(axis), port)
+    if len(runs) == 1 and runs[0].is_dir() and not (runs[0] / "run.json").exists():
+        dashboard.view_all(runs[0])
+    else:
+        for run in runs:
+            dashboard.view(run)
     with dashboard:
         print_line(f"the dashboard is at {dashboard.url}")
         wait_for_the_end()

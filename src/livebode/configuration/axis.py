@@ -6,12 +6,14 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.configuration.output_only import check_output_only
+from livebode.configuration.ready import ReadyCondition, ready_condition
+from livebode.configuration.report_section import ReportSection, report_error
+from livebode.configuration.section import File, Language
 from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, Quantity, counted, nearest_name
-from livebode.language import available
 from livebode.output_only import OUTPUTS_MAX
 from livebode.sources.live import SourceSettings, checked_address
 
@@ -22,16 +24,7 @@ MAY_BE_SECRET = {
     *("token_env", "token_file", "viewer_token_env", "viewer_token_file"),
 }
 Ticks = Annotated[int, Field(ge=0)]
-File = Annotated[Path, Field(strict=False)]
-
-
-def _known_language(code: str) -> str:
-    if code not in available():
-        raise ValueError(f"is not one of the languages {', '.join(available())}")
-    return code
-
-
-Language = Annotated[str, AfterValidator(_known_language)]
+Bits = Annotated[int, Field(ge=0, lt=1 << 53)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -53,12 +46,17 @@ class SignalsSection(_Section):
         Channel w, the excitation that is added in the loop. Required by the estimators "joint" and "indirect".
     schedule
         Channel over which responses are shown, such as the position.
+    ready
+        Channel that shows whether the machine is ready (drive on, homed, not stopped): not zero, or see
+        monitoring.ready_mask. A missing value is not ready. A response whose window contains a sample that is not
+        ready is recorded and shown, but not assessed, and its alarms are suppressed. Default: always ready.
     """
 
     output: str
     input: str | None = None
     excitation: str | None = None
     schedule: str | None = None
+    ready: str | None = None
 
 
 class LinesSection(_Section):
@@ -181,11 +179,18 @@ class MonitoringSection(_Section):
         learned. A run with a baseline uses the covariates of the baseline.
     false_alarm_interval_days
         Mean time between false alarms, at least, in days of judged motion.
+    ready_mask
+        Bits of signals.ready that are compared with ready_value, if it is a status word: of CiA 402 (object 0x6041)
+        ready_mask = 0x6F and ready_value = 0x27 are "operation enabled". Default: all bits.
+    ready_value
+        Value of these bits if the machine is ready. Default: all of ready_mask.
     """
 
     baseline: File | None = None
     covariates: Annotated[list[str], Field(max_length=4)] = []
     false_alarm_interval_days: Positive = 30.0
+    ready_mask: Bits | None = None
+    ready_value: Bits | None = None
 
 
 class _ControllerSection(_Section):
@@ -481,6 +486,8 @@ class Axis(_Section):
         Comparison with a baseline.
     serve
         Address of the dashboard, and access to it.
+    report
+        The first page of the report, and the limits that the machine must meet.
     """
 
     source: SourceSettings
@@ -494,6 +501,7 @@ class Axis(_Section):
     output_only: OutputOnlySection | None = None
     monitoring: MonitoringSection = MonitoringSection()
     serve: ServeSection = ServeSection()
+    report: ReportSection | None = None
 
     @classmethod
     def read(cls, path: Path) -> Axis:
@@ -536,14 +544,45 @@ class Axis(_Section):
             check_output_only(axis, origin)
         return axis
 
+    @property
+    def ready(self) -> ReadyCondition | None:
+        """At which samples the machine is ready; None without such a channel. ConfigError as `ready_condition`."""
+        of, averages = self.monitoring, self.tracking.average
+        return ready_condition(self.signals.ready, of.ready_mask, of.ready_value, averages=averages)
+
     def beside(self, folder: Path) -> Axis:
         """The same with relative paths from `folder`."""
         axis = self.model_copy(update={"source": self.source.beside(folder), "serve": self.serve.beside(folder)})
+        if self.report is not None:
+            axis = axis.model_copy(update={"report": self.report.beside(folder)})
         baseline = axis.monitoring.baseline
         if baseline is None:
             return axis
         monitoring = axis.monitoring.model_copy(update={"baseline": folder / baseline})
         return axis.model_copy(update={"monitoring": monitoring})
+
+
+class _ServeOnly(_Section):
+    """A file with nothing but [serve]."""
+
+    serve: ServeSection
+
+
+def serve_section(path: Path) -> ServeSection:
+    """[serve] of a configuration, or of a file that has only this section, as `livebode view` needs it.
+
+    Raises
+    ------
+    ConfigError
+        As of `Axis.read`.
+    """
+    data = read_table(path)
+    if set(data) != {"serve"}:
+        return Axis.of(data, str(path)).beside(path.parent).serve
+    try:
+        return _ServeOnly.model_validate(data).serve.beside(path.parent)
+    except ValidationError as error:
+        raise _first_of(error).at(str(path)) from None
 
 
 def _of_one_recording(axis: Axis) -> list[str]:
@@ -562,6 +601,8 @@ def _of_one_recording(axis: Axis) -> list[str]:
 def _first_of(error: ValidationError) -> ConfigError:
     """The first error, with its key and value; missing keys last, because a misspelt key also causes a missing one."""
     first = min(error.errors(include_url=False), key=lambda one: one["type"] == "missing")
+    if first["loc"][:1] == ("report",):
+        return report_error(first)
     # After a union, pydantic adds the name of the type that it tried.
     place = one_line(".".join(str(part) for part in first["loc"] if part != "int" and "[" not in str(part)))
     if first["type"] == "extra_forbidden":

@@ -7,9 +7,10 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from livebode.configuration.axis import FitSection, LoopSection
+from livebode.configuration.report_section import ReportSection
 from livebode.core import RecordError
 
-_SECTIONS: dict[str, type[BaseModel]] = {"fit": FitSection, "loop": LoopSection}
+_SECTIONS: dict[str, type[BaseModel]] = {"fit": FitSection, "loop": LoopSection, "report": ReportSection}
 
 
 def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:

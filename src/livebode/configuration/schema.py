@@ -62,11 +62,13 @@ def axis_schema() -> Schema:
     """Schema of axis.toml, with one axis or with several in [axes]."""
     found = schema_of(Axis, "axis")
     found["$defs"]["FitSection"]["properties"]["model"]["enum"] = ["auto", *MODELS]
-    found["$defs"]["ServeSection"]["properties"]["language"]["enum"] = [*available()]
+    for section in ("ServeSection", "ReportSection"):
+        found["$defs"][section]["properties"]["language"]["enum"] = [*available()]
     required = _required(found, found["$defs"])
     # A key that an axis needs may be in a common section, or in the axis's own.
     for table in (found, *found["$defs"].values()):
         table.pop("required", None)
+    found["$defs"]["LimitSection"]["required"] = ["quantity"]
     found["$defs"]["Axis"] = {key: found[key] for key in ("type", "additionalProperties", "description", "properties")}
     axes = {
         "description": "Several axes by name; the sections outside [axes] apply to all of them.",

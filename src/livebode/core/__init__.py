@@ -1,5 +1,7 @@
 """The types that all other packages use: samples, lines, responses, loops, events, errors."""
 
+import logging
+
 from livebode.core._block import Block, Channel, nearest_name
 from livebode.core._event import Emit, Event, hand_over, ignore
 from livebode.core._frequency_response import PER_LINE, Quantity
@@ -36,6 +38,9 @@ from livebode.core.model import Gain, Model, as_model
 from livebode.core.parameters import Parameters
 from livebode.core.rows import RowArrays
 from livebode.core.state import Stage, Stateful, StatefulBase
+
+# Here because every module that logs uses this package, and `livebode --version` does not.
+logging.getLogger("livebode").addHandler(logging.NullHandler())
 
 __all__ = [
     "LEFT_OUT",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from livebode.core.errors import ExtraError
+from livebode.core.installing import not_installed
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -24,6 +24,7 @@ _NAMES = {
     "schedule": "scheduling signal at time_s",
     "first": "number of the oldest sample in the window",
     "sample": "number of the newest sample in the window",
+    "ready": "whether the machine was ready in the whole window",
     "time_s": "centre of the window",
     "frequency_hz": "line",
 }
@@ -34,13 +35,7 @@ def imported(package: str, extra: str, shown: str = "") -> Any:
     try:
         return import_module(package)
     except ImportError:
-        raise ExtraError(
-            "not-installed",
-            f"{shown or package} is not installed",
-            f"pip install 'livebode[{extra}]'",
-            package=package,
-            extra=extra,
-        ) from None
+        raise not_installed(f"{shown or package} is not installed", package=package, extra=extra) from None
 
 
 def dataset(responses: Responses) -> Dataset:
@@ -54,7 +49,7 @@ def dataset(responses: Responses) -> Dataset:
         attrs = {"long_name": _NAMES[name]} | ({} if name == "schedule" else {"units": units.get(name) or "1"})
         return dims, values, attrs
 
-    per_row = ("time_s", "schedule", "first", "sample")
+    per_row = ("time_s", "schedule", "first", "sample", "ready")
     coords = {name: labelled(time, name, getattr(responses, name)) for name in per_row}
     coords["frequency_hz"] = labelled("frequency_hz", "frequency_hz", responses.frequency_hz)
     variables = {name: labelled(both, name, getattr(responses, name)) for name in ("sigma", "coherence", "valid")}

@@ -31,13 +31,15 @@ def of_responses(many: Responses) -> str:
     """
     >>> from livebode import example_responses
     >>> example_responses()
-    <Responses: 40 of plant in rad/s/(N m), 37 valid, 13 lines, 20 … 140 Hz, -0.03 s … 0.95 s>
+    <Responses: 40 of plant in rad/s/(N m), 37 valid, 13 lines, 20 … 140 Hz, 0.05 s … 0.95 s>
     """
     if not len(many):
         return f"<Responses: none of {_named(many)}, {_span(many.lines)}>"
-    known = int(np.count_nonzero(many.valid.any(axis=1)))
-    times = f"{moment(many.time_s[0], 2)} … {moment(many.time_s[-1], 2)}"
-    return f"<Responses: {len(many)} of {_named(many)}, {known} valid, {_span(many.lines)}, {times}>"
+    valid = np.flatnonzero(many.valid.any(axis=1))
+    # The windows of the first responses begin before the recording, and so may their effective times.
+    time_s = many.time_s[valid] if valid.size else many.time_s
+    times = f"{moment(time_s[0], 2)} … {moment(time_s[-1], 2)}"
+    return f"<Responses: {len(many)} of {_named(many)}, {len(valid)} valid, {_span(many.lines)}, {times}>"
 
 
 def table_of_response(one: Response) -> str:

@@ -77,6 +77,9 @@ class Response(FrequencyResponse):
         Error of the value from effects that repeat with the excitation but are not linear (friction, backlash, encoder
         steps), unit of `value`. `sigma` includes it; NaN where it cannot be measured, infinite at a line that is
         invalid because of such an effect (distortion, mains hum, sensor steps).
+    ready
+        False where the machine was not ready at a sample of the window (`signals.ready`): the response is not
+        assessed. True without such a channel.
 
     Examples
     --------
@@ -105,6 +108,7 @@ class Response(FrequencyResponse):
     input_coherence: Floats = None  # type: ignore[assignment]
     weight: NDArray[np.complex128] = None  # type: ignore[assignment]
     distortion: Floats = None  # type: ignore[assignment]
+    ready: bool = True
 
     def __post_init__(self) -> None:
         _fill_unknown(self)
@@ -152,7 +156,7 @@ class Response(FrequencyResponse):
         return _description.table_of_response(self)
 
 
-PER_RESPONSE = ("dof", "first", "sample", "time_s", "schedule")
+PER_RESPONSE = ("dof", "first", "sample", "time_s", "schedule", "ready")
 """Attributes with one value for the response."""
 
 _PER_ROW = PER_LINE + PER_RESPONSE
@@ -164,6 +168,8 @@ def _fill_unknown(of: Response | Responses) -> None:
         if getattr(of, name) is None:
             kind = np.complex128 if name == "weight" else np.float64
             object.__setattr__(of, name, np.full(np.shape(of.value), np.nan, dtype=kind))
+    if getattr(of, "ready", True) is None:
+        object.__setattr__(of, "ready", np.ones(len(of.value), dtype=np.bool_))
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +206,7 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
     input_coherence: Floats = None  # type: ignore[assignment]
     weight: NDArray[np.complex128] = None  # type: ignore[assignment]
     distortion: Floats = None  # type: ignore[assignment]
+    ready: NDArray[np.bool_] = None  # type: ignore[assignment]
 
     _SHARED = ("lines", "quantity", "unit")
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Any, Literal
 
 from livebode.language import marked
 
-Tone = Literal["ok", "check", "alarm", "differs", "open"]
-"""Nothing to do; a person should look; an alarm is active; two runs differ; not assessed."""
+Tone = Literal["ok", "check", "alarm", "differs", "open", "pass", "fail", "undecided"]
+"""Nothing to do; a person should look; an alarm is active; two runs differ; not assessed; and the three results of a
+limit: inside by more than the bound, outside by more than the bound, too close to decide."""
+
+Paper = Literal["a4", "letter"]
 
 TONES: Mapping[str, str] = {
     "ok": marked("OK"),
@@ -17,6 +21,9 @@ TONES: Mapping[str, str] = {
     "alarm": marked("ALARM"),
     "differs": marked("differs"),
     "open": marked("not assessed"),
+    "pass": marked("PASS"),
+    "fail": marked("FAIL"),
+    "undecided": marked("not decided"),
 }
 """The verdict that is printed for each tone."""
 
@@ -74,8 +81,17 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Logo:
+    """The bytes of a picture, "png" or "svg", and the text that replaces it for a screen reader."""
+
+    data: bytes
+    kind: Literal["png", "svg"]
+    text: str
+
+
+@dataclass(frozen=True)
 class Document:
-    """A report: title, facts of the title block, the verdict, and sections.
+    """A report: a first page with the result, findings, sections, and an appendix.
 
     Attributes
     ----------
@@ -92,9 +108,23 @@ class Document:
     foot
         Printed at the end, and at the foot of each page of a PDF.
     heading
-        Heading of the verdict.
+        Heading of the findings.
     tones
         The verdict that is printed for each tone, so that it is legible without colours.
+    result
+        The findings of the first page: the first is the verdict of the report.
+    picture
+        The picture of the first page.
+    signatures
+        What each signature line is for.
+    appendix
+        Sections after the report itself: raw configuration, versions.
+    logo
+        Shown at the top of the first page.
+    paper
+        Size of the pages.
+    made
+        Time at which the report was written.
     """
 
     kind: str
@@ -105,3 +135,17 @@ class Document:
     foot: str = ""
     heading: str = ""
     tones: Mapping[str, str] = field(default_factory=lambda: TONES)
+    result: tuple[Finding, ...] = ()
+    picture: Picture | None = None
+    signatures: tuple[str, ...] = ()
+    appendix: tuple[Section, ...] = ()
+    logo: Logo | None = None
+    paper: Paper = "a4"
+    made: datetime = datetime(1970, 1, 1, tzinfo=UTC)
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """All pictures, in the order of reading."""
+        first = (self.picture,) if self.picture is not None else ()
+        sections = (*self.sections, *self.appendix)
+        return (*first, *(p for section in sections for p in section.parts if isinstance(p, Picture)))

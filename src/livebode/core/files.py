@@ -105,6 +105,15 @@ def whole_directory(path: Path, remove: Callable[[Path], None]) -> Iterator[Path
         shutil.rmtree(partial, ignore_errors=True)
 
 
+def move_directory(path: Path, folder: Path) -> Path:
+    """Move a directory into another one of the same file system, synced; return its new place; OSError if refused."""
+    to = folder / path.name
+    path.rename(to)
+    for changed in (folder, path.parent):
+        sync_directory(changed)
+    return to
+
+
 def write_all(file: int, data: bytes | memoryview) -> None:
     """Write all bytes to a descriptor; a part may be written where OSError is raised."""
     rest = memoryview(data)
@@ -114,7 +123,7 @@ def write_all(file: int, data: bytes | memoryview) -> None:
 
 def sync_directory(path: Path) -> None:
     """Sync a directory, so that its names survive a power cut."""
-    if os.name == "nt":  # which opens no directory
+    if not hasattr(os, "O_DIRECTORY"):  # Windows opens no directory
         return
     directory = os.open(path, os.O_RDONLY)
     try:

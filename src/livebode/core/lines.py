@@ -110,6 +110,13 @@ class Lines:
         livebode.GridError: the line 25 Hz is not on the 10 Hz grid of window=400 at 4000 Hz; the \
 nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
         """
+        if not isinstance(text, str):
+            raise UsageError(
+                "unreadable",
+                f"the lines {text!r} are not text",
+                "write frequencies in Hz as '20:140:20' or '35, 40', or give bins to Lines",
+                argument="text",
+            )
         check_window(window, rate_hz)
         required = [f for item in text.split(",") for f in _frequencies(item.strip(), text, rate_hz, window)]
         resolution_hz = Fraction(rate_hz) / window
@@ -175,7 +182,7 @@ def check_window(window: int, rate_hz: float) -> None:
             window=window,
             window_max=WINDOW_MAX,
         )
-    if not (np.isfinite(rate_hz) and rate_hz > 0):
+    if not (isinstance(rate_hz, (int, float, np.number)) and np.isfinite(rate_hz) and rate_hz > 0):
         raise UsageError(
             "out-of-range",
             f"{rate_hz=} is not a positive number of samples per second",

@@ -16,55 +16,84 @@ from livebode import export
 from livebode.core import LivebodeError, Responses, ServerError
 from livebode.dashboard import queries
 from livebode.dashboard.access import COOKIE, SESSION_S
+from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
 from livebode.dashboard.client import Client
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
 from livebode.dashboard.past import Past
 from livebode.dashboard.places import ClientPlace
+from livebode.dashboard.runs_pages import RunsPages
+from livebode.dashboard.saved import applied, listed
 from livebode.dashboard.settings import Serving
+from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
 from livebode.language import for_page, negotiated
+from livebode.records.saved_curves import change_saved, read_saved
 
 _HERE = Path(__file__).parent
 _FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
 
-def application(board: Board, serving: Serving) -> Guard:
-    """The ASGI application."""
-    pages = _Pages(board, serving)
+def application(board: Board, serving: Serving, directory: Path | None = None) -> Guard:
+    """The ASGI application: the page of the board, or all runs of a directory, each with a board of its own."""
+    pages = _Pages(board, serving, _files())
     routes: list[BaseRoute] = [
-        Route("/", pages.page),
         Route("/login", pages.login_page, methods=["GET"]),
         Route("/login", pages.login, methods=["POST"]),
         Route("/catalogue", pages.catalogue),
         Route("/logout", pages.logout, methods=["POST"]),
-        Route("/api/past", pages.past),
-        Route("/api/moment", pages.moment),
-        Route("/api/export", pages.export),
-        Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
-        WebSocketRoute("/live", pages.live),
         Route("/static/{name:path}", pages.static),
     ]
-    handlers = {LivebodeError: _sorry}
-    return Guard(Starlette(routes=routes, exception_handlers=handlers), serving.names, serving.tls is not None)
+    if directory is None:
+        routes += _page_routes(pages)
+    else:
+        routes += RunsPages(
+            directory,
+            board,
+            lambda one: _app(_page_routes(_Pages(one, serving, pages.files))),
+            pages.file,
+            serving.language,
+        ).routes
+    return Guard(_app(routes), serving.names, serving.tls is not None)
+
+
+def _app(routes: list[BaseRoute]) -> Starlette:
+    return Starlette(routes=routes, exception_handlers={LivebodeError: _sorry})
+
+
+def _page_routes(pages: _Pages) -> list[BaseRoute]:
+    """The page of one board."""
+    return [
+        Route("/", pages.page),
+        Route("/api/past", pages.past),
+        Route("/api/moment", pages.moment),
+        Route("/api/signals", pages.signals),
+        Route("/api/export", pages.export),
+        Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
+        Route("/api/shelve", pages.shelve, methods=["POST"]),
+        Route("/api/unshelve", pages.unshelve, methods=["POST"]),
+        Route("/api/saved", pages.saved, methods=["GET"]),
+        Route("/api/saved", pages.change_saved, methods=["POST"]),
+        WebSocketRoute("/live", pages.live),
+    ]
 
 
 class _Pages:
     """The handlers of the routes."""
 
-    def __init__(self, board: Board, serving: Serving) -> None:
+    def __init__(self, board: Board, serving: Serving, files: dict[str, tuple[bytes, str]]) -> None:
         self._board, self._secure, self._language = board, serving.tls is not None, serving.language
-        self._files = _files()
+        self.files = files
 
     async def page(self, request: Request) -> Response:
         if self._role(request) is None:
             return RedirectResponse("/login", 303)
-        return self._file("index.html")
+        return self.file("index.html")
 
     async def login_page(self, _request: Request) -> Response:
-        return self._file("login.html")
+        return self.file("login.html")
 
     async def login(self, request: Request) -> Response:
         data = await body(request)
@@ -93,7 +122,7 @@ class _Pages:
         return answer
 
     async def static(self, request: Request) -> Response:
-        return self._file(request.path_params["name"])
+        return self.file(request.path_params["name"])
 
     async def past(self, request: Request) -> Response:
         """Rows of a span of time."""
@@ -111,6 +140,14 @@ class _Pages:
         found = await self._board.elsewhere(Past.of(state).at, span.from_s)
         data = state.frames_of("moment", found, span.quantity)
         return Response(data, media_type="application/octet-stream")
+
+    async def signals(self, request: Request) -> Response:
+        """Raw signals or their spectrum, live or at a time in the record."""
+        if self._role(request) is None:
+            return _unknown()
+        asked = queries.signals_asked(request.query_params, len(self._board.states))
+        found = await signals(self._board, self._begun(asked.axis), asked)
+        return Response(found, media_type="application/octet-stream")
 
     async def export(self, request: Request) -> Response:
         """Responses of a span of time as a file; a single response if the span has no length."""
@@ -136,6 +173,39 @@ class _Pages:
         )
 
     async def acknowledge(self, request: Request) -> Response:
+        return await self._act(request, "acknowledge")
+
+    async def shelve(self, request: Request) -> Response:
+        return await self._act(request, "shelve")
+
+    async def unshelve(self, request: Request) -> Response:
+        return await self._act(request, "unshelve")
+
+    async def _act(self, request: Request, act: Act) -> Response:
+        data = await self._order(request)
+        if isinstance(data, Response):
+            return data
+        self._board.act(act, alarm_request(data, len(self._board.states), act))
+        return JSONResponse({}, 202)
+
+    async def saved(self, request: Request) -> Response:
+        """The references and annotations that are saved with a run."""
+        if (state := self._asked_state(request)) is None:
+            return _unknown()
+        return JSONResponse(listed(await self._board.elsewhere(read_saved, _directory(state))))
+
+    async def change_saved(self, request: Request) -> Response:
+        """Save a reference or an annotation with a run, or remove one."""
+        data = await self._order(request)
+        if isinstance(data, Response):
+            return data
+        change = queries.saved_change(data, len(self._board.states))
+        state = self._begun(change.axis)
+        job = applied(change, Past.of(state), state)
+        return JSONResponse(listed(await self._board.elsewhere(change_saved, _directory(state), job)))
+
+    async def _order(self, request: Request) -> bytes | Response:
+        """The JSON of an operator, or the answer to somebody else."""
         role = self._role(request)
         if role is None:
             return _unknown()
@@ -145,12 +215,10 @@ class _Pages:
         if data is None or request.headers.get("content-type", "").partition(";")[0] != "application/json":
             raise ServerError(
                 "request-malformed",
-                "the acknowledgement is not a short JSON object",
+                "the request is not a short JSON object",
                 "send it with the type application/json",
             )
-        axis, event = queries.acknowledged(data, len(self._board.states))
-        self._board.acknowledge(axis, event)
-        return JSONResponse({}, 202)
+        return data
 
     async def live(self, socket: WebSocket) -> None:
         headers = socket.headers
@@ -173,8 +241,9 @@ class _Pages:
         finally:
             self._board.places.leave(place)
 
-    def _file(self, name: str) -> Response:
-        content, kind = self._files.get(name, (b"not found\n", ""))
+    def file(self, name: str) -> Response:
+        """A static file."""
+        content, kind = self.files.get(name, (b"not found\n", ""))
         return Response(content, 200 if kind else 404, media_type=kind or "text/plain")
 
     def _role(self, request: Request) -> str | None:
@@ -185,7 +254,10 @@ class _Pages:
         """The state of the axis of a query, if its run has started; None without access."""
         if self._role(request) is None:
             return None
-        state = self._board.states[queries.span(request.query_params, len(self._board.states)).axis]
+        return self._begun(queries.span(request.query_params, len(self._board.states)).axis)
+
+    def _begun(self, axis: int) -> State:
+        state = self._board.states[axis]
         state.refresh()
         if state.quantities is None:
             raise ServerError("not-begun", "the run has not begun", "wait for its first samples")
@@ -205,6 +277,11 @@ def _files() -> dict[str, tuple[bytes, str]]:
 def _as(state: State, responses: Responses, span: queries.Span) -> Responses:
     assert state.quantities is not None
     return state.quantities.of_responses(responses, span.quantity)
+
+
+def _directory(state: State) -> Path:
+    assert state.directory is not None  # the run has begun
+    return state.directory
 
 
 def _address(request: Request) -> str:

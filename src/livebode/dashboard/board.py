@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
-from livebode.core import LivebodeError, ServerError
+from livebode.core import Event, LivebodeError, ServerError
 from livebode.dashboard.access import Access
-from livebode.dashboard.notices import acknowledgement
+from livebode.dashboard.alarm import AlarmShelf
+from livebode.dashboard.alarm_actions import acknowledgement, shelving, unshelving
+from livebode.dashboard.alarm_requests import Act, AlarmRequest
+from livebode.dashboard.notices import Notice
 from livebode.dashboard.places import Places
 from livebode.dashboard.state import State
+from livebode.dashboard.verdict import verdict
 from livebode.dashboard.viewed import Viewed
 
 UPDATES_PER_S = 30.0
@@ -72,6 +77,7 @@ class Board:
             began = clock()
             for state in self.states:
                 state.refresh()
+                state.end_shelves()
             if self._viewed and began - looked >= _VIEW_EVERY_S:
                 looked = began
                 await self._follow()
@@ -89,7 +95,15 @@ class Board:
 
     def health(self, state: State) -> dict[str, Any]:
         """Health of an axis and of the dashboard."""
-        return state.health() | {"browsers": len(self.places), "refused": self.access.refused}
+        return state.health() | {
+            "verdict": verdict(state).plain(),
+            "browsers": len(self.places),
+            "refused": self.access.refused,
+        }
+
+    def verdicts(self) -> list[dict[str, Any]]:
+        """Name and verdict of every axis."""
+        return [{"name": state.name, "live": state.live, **verdict(state).plain()} for state in self.states]
 
     async def elsewhere(self, job: Callable[..., T], *arguments: Any) -> T:
         """Run a long job in another thread; ServerError if too many are waiting."""
@@ -101,25 +115,26 @@ class Board:
         finally:
             self._jobs -= 1
 
-    def acknowledge(self, axis: int, key: str) -> None:
-        """Record that a person has seen an event and all earlier ones of the same cause; ServerError if impossible."""
-        state = self.states[axis]
-        found = state.notices.of(key)
+    def act(self, act: Act, asked: AlarmRequest) -> None:
+        """Record what a person does with the alarm of an event; ServerError if impossible.
+
+        An acknowledgement includes all earlier events of the same cause.
+        """
+        state = self.states[asked.axis]
+        found = state.notices.of(asked.event)
         if found is None:
-            raise ServerError("event-unknown", f"there is no event {key!r}", "reload the page", event=key)
+            raise ServerError(
+                "event-unknown", f"there is no event {asked.event!r}", "reload the page", event=asked.event
+            )
         if state.hub is None or state.finished:
             raise ServerError(
                 "run-ended",
                 "the run has ended, and its record is closed",
                 "acknowledge events while a run continues",
-                event=key,
+                event=asked.event,
             )
-        notice, count = found
-        if notice.seen >= count:
-            return
-        newest = state.newest
-        sample, time_s = (int(newest.sample[0]), float(newest.time_s[0])) if newest is not None else (0, 0.0)
-        if not state.hub.record(acknowledgement(notice, key, count, sample, time_s)):
+        event = _event_of(act, asked, state, *found)
+        if event is not None and not state.hub.record(event):
             raise ServerError("busy", "too many acknowledgements wait to be recorded", "try again in a moment")
 
     def close(self) -> None:
@@ -142,3 +157,18 @@ class Board:
             for row in rows:
                 state.trends.add(*row)
             state.renewed(summary, finished)
+
+
+def _event_of(act: Act, asked: AlarmRequest, state: State, notice: Notice, count: int) -> Event | None:
+    """The event that records an action; None if there is nothing to record."""
+    cause, at = notice.cause, state.position
+    if act == "acknowledge":
+        if notice.seen >= count:
+            return None
+        return acknowledgement(notice, asked.event, count, *at, asked.by, asked.words)
+    if notice.alarm is None:
+        raise ServerError("no-alarm", "this event is not an alarm", "shelve alarms only", event=asked.event)
+    if act == "shelve":
+        shelf = AlarmShelf(asked.by, round(time.time() + 60 * asked.minutes, 3), asked.words)
+        return shelving(cause, shelf, *at, notice)
+    return unshelving(cause, *at, notice, asked.by) if state.notices.shelf(cause) is not None else None

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from livebode.core import LivebodeError, Responses, ServerError
-from livebode.dashboard.frames import frame
+from livebode.dashboard.frames import frame, reference_kind
+from livebode.dashboard.message_times import with_times
 from livebode.dashboard.past import Past
 from livebode.dashboard.queries import ClientMessage, client_message
 from livebode.records import to_json
+from livebode.records.saved_curves import read_saved
 
 if TYPE_CHECKING:
     from livebode.dashboard.board import Board
@@ -38,7 +40,7 @@ class Client:
         self._restart = True
         self._paused = False
         self._displaced = asyncio.Event()
-        self._reference: Responses | None = None
+        self._references: dict[int, Responses] = {}
         self._sent: dict[str, Any] = {}
 
     async def run(self) -> None:
@@ -92,23 +94,32 @@ class Client:
             if asked.quantity and state.quantities is not None:
                 state.quantities.check(asked.quantity)
             if asked.axis != self._watched.axis:
-                self._reference = None
+                self._references.clear()
             self._watched, self._restart = asked, True
         elif asked.kind in ("pause", "resume"):
             self._paused = asked.kind == "pause"
             self._sent.pop("newest", None)
         elif asked.kind == "unfreeze":
-            self._reference = None
-        else:
-            self._reference = await self._frozen(asked.time_s)
-            self._sent.pop("reference", None)
+            for slot in [asked.slot] if asked.slot else list(self._references):
+                self._references.pop(slot, None)
+        elif (found := await self._frozen(asked)) is not None:
+            slot = asked.slot or 1
+            self._references[slot] = found
+            self._sent.pop(reference_kind(slot), None)
         self._board.pulse_now()
 
-    async def _frozen(self, time_s: float | None) -> Responses | None:
+    async def _frozen(self, asked: ClientMessage) -> Responses | None:
         state = self._state
-        if time_s is None or state.newest is None:
+        if asked.saved is not None and state.directory is not None:
+            saved = (await self._board.elsewhere(read_saved, state.directory)).reference(asked.saved)
+            if saved is None:
+                raise ServerError(
+                    "reference-unknown", f"no reference {asked.saved!r} is saved with this run", "reload the page"
+                )
+            return saved.response
+        if asked.time_s is None or state.newest is None:
             return state.newest
-        return await self._board.elsewhere(Past.of(state).at, time_s)
+        return await self._board.elsewhere(Past.of(state).at, asked.time_s)
 
     @property
     def _state(self) -> State:
@@ -134,10 +145,12 @@ class Client:
         """Send all changes, in at most two messages."""
         news: dict[str, Any] = {}
         if state.notices.version != self._sent["notices"]:
-            news["notices"] = state.notices.since(self._sent["notices"])
+            news["notices"] = with_times(state.notices.since(self._sent["notices"]))
+            news["forgotten"] = state.notices.forgotten(self._sent["notices"])
+            news["history"] = with_times(state.notices.history.since(self._sent["notices"]))
             self._sent["notices"] = state.notices.version
         if self._due("health", HEALTH_EVERY_S):
-            news |= {"health": self._board.health(state), "span": state.span()}
+            news |= {"health": self._board.health(state), "span": state.span(), "verdicts": self._board.verdicts()}
         if state.trends.version != self._sent["trends"] and self._due("trend", TRENDS_EVERY_S):
             news["newest"] = state.trends.plain(whole=False)
             self._sent["trends"] = state.trends.version
@@ -153,11 +166,12 @@ class Client:
         if not self._paused and self._sent.get("newest") != state.version:
             self._sent["newest"] = state.version
             found += state.newest_frames(quantity)
-        if self._reference is not None and not state.quantities.fit(self._reference):
-            self._reference = None  # it belongs to a previous run
-        if self._reference is not None and "reference" not in self._sent:
-            self._sent["reference"] = True
-            found += frame("reference", state.axis, state.quantities.of_responses(self._reference, quantity))
+        for slot, reference in list(self._references.items()):
+            if not state.quantities.fit(reference):
+                del self._references[slot]  # it belongs to a previous run
+            elif (kind := reference_kind(slot)) not in self._sent:
+                self._sent[kind] = True
+                found += frame(kind, state.axis, state.quantities.of_responses(reference, quantity))
         if state.recent.count > self._sent["rows"] and self._due("row", ROWS_EVERY_S):
             rows = state.rows(self._sent["rows"], _ROWS_AT_ONCE)
             self._sent["rows"] = state.recent.count

@@ -12,7 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
-from livebode.core import ExtraError, ServerError
+from livebode.core import RecordError, ServerError
+from livebode.core.installing import not_installed
 from livebode.dashboard.access import Access
 from livebode.dashboard.hub import Hub
 from livebode.dashboard.settings import Serving
@@ -52,6 +53,7 @@ class Dashboard:
         self._serving, self._hears = serving, report
         self._states: list[State] = []
         self._viewed: dict[int, Viewed] = {}
+        self._runs: Path | None = None
         self._server: Any = None
         self._thread: threading.Thread | None = None
         self._socket: socket.socket | None = None
@@ -75,6 +77,25 @@ class Dashboard:
         self._viewed[len(self._states)] = viewed
         self._states.append(state)
 
+    def view_all(self, directory: Path) -> None:
+        """Show the list of all runs in a directory, instead of axes; each run is read when its page is opened.
+
+        Raises
+        ------
+        RecordError
+            If it contains no run.
+        """
+        from livebode.dashboard.run_catalogue import runs_in
+
+        if not runs_in(directory):
+            raise RecordError(
+                "not-a-run",
+                f"{str(directory)!r} is not the directory of a run: it has no run.json, and no directory in it has one",
+                "give the directory of a run, or a directory that contains runs",
+                path=str(directory),
+            )
+        self._runs = directory
+
     @property
     def url(self) -> str:
         """The address of the page."""
@@ -97,12 +118,10 @@ class Dashboard:
             from livebode.dashboard.patience import IDLE_S, PatientProtocol
             from livebode.dashboard.server import Server
         except ImportError as error:
-            raise ExtraError(
-                "not-installed",
+            raise not_installed(
                 f"the dashboard needs {error.name}, which is not installed",
-                "pip install 'livebode[dashboard]'",
                 extra="dashboard",
-                package=error.name,
+                package=error.name or "uvicorn",
             ) from None
         self._socket = listening(self._serving)
         tls = self._serving.tls or (None, None)
@@ -159,7 +178,9 @@ class Dashboard:
         self._hears(sentence)
 
     def _run(self) -> None:
-        asyncio.run(self._work())
+        # The default loop of Windows cannot wait for a socket that is not its own.
+        with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
+            runner.run(self._work())
 
     async def _work(self) -> None:
         from livebode.dashboard.app import application
@@ -169,7 +190,7 @@ class Dashboard:
         self._faults = Faults(self._report)
         asyncio.get_running_loop().set_exception_handler(self._faults.handler)
         board = Board(self._states, self._viewed, Access(self._serving, self._report))
-        self._application = application(board, self._serving)
+        self._application = application(board, self._serving, self._runs)
         beating = asyncio.create_task(board.run())
         beating.add_done_callback(self._stopped)
         try:

@@ -3,18 +3,20 @@
 | byte | type | what |
 |---|---|---|
 | 0 | 4 bytes | `LBCV` |
-| 4 | u8 | version, 1 |
+| 4 | u8 | version, 2 |
 | 5 | u8 | kind, an index into `KINDS` |
 | 6 | u8 | quantity, an index into plant, open loop, closed loop, sensitivity |
 | 7 | u8 | axis |
 | 8 | u32 | rows |
 | 12 | u32 | columns: lines, or points of the model's grid |
 | 16 | f64 × rows, each | time in s, schedule, dof |
-| then | f32 × rows × columns, each | magnitude in dB, phase in degrees, reach, coherence |
+| then | f32 × rows × columns, each | magnitude in dB, phase in degrees, reach, reach of the noise alone, coherence |
 | end | | zeros up to a multiple of 8 bytes, where the next frame may begin |
 
 Numbers are little endian, in row order. `reach` is 3σ/|value|: the edges of the ±3σ band are
-magnitude + 20·log10(1 ± reach) and phase ± arcsin(reach), undefined for reach ≥ 1. Unknown values are NaN.
+magnitude + 20·log10(1 ± reach) and phase ± arcsin(reach), undefined for reach ≥ 1. The reach of the noise alone leaves
+out what repeats with the excitation (friction, backlash, encoder steps), and is unknown where that is unknown. Unknown
+values are NaN.
 """
 
 from __future__ import annotations
@@ -28,11 +30,20 @@ from livebode.core import Quantity, Responses
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.drawing import unwrapped
 
-KINDS = ("newest", "moment", "reference", "baseline", "model", "rows", "history")
+REFERENCES_MAX = 8
+KINDS = (
+    *("newest", "moment", "reference", "baseline", "model", "rows", "history"),
+    *(f"reference {slot}" for slot in range(2, REFERENCES_MAX + 1)),
+)
 SIGMAS = 3.0
 _HEADER = struct.Struct("<4sBBBBII")
-_MAGIC, _VERSION = b"LBCV", 1
+_MAGIC, _VERSION = b"LBCV", 2
 _WHOLE_PHASE_ROWS = 8  # up to this many rows the phase is unwrapped over frequency
+
+
+def reference_kind(slot: int) -> str:
+    """The kind of the frame of a reference; slots begin at 1."""
+    return "reference" if slot == 1 else f"reference {slot}"
 
 
 def frame(kind: str, axis: int, responses: Responses) -> bytes:
@@ -43,12 +54,13 @@ def frame(kind: str, axis: int, responses: Responses) -> bytes:
         size = np.where(use, np.abs(responses.value), np.nan)
         magnitude = 20 * np.log10(size)
         reach = SIGMAS * responses.sigma / size
+        noise = SIGMAS * np.sqrt(np.maximum(responses.sigma**2 - responses.distortion**2, 0.0)) / size
         phase = np.where(use, np.degrees(np.angle(responses.value)), np.nan)
     if rows <= _WHOLE_PHASE_ROWS:
         phase = np.array([unwrapped(p, np.nan_to_num(r) >= 1) for p, r in zip(phase, reach)]).reshape(rows, columns)
     head = header(kind, axis, responses.quantity, rows, columns)
     times = (responses.time_s, responses.schedule, responses.dof)
-    curves = (magnitude, phase, reach, np.where(use, responses.coherence, np.nan))
+    curves = (magnitude, phase, reach, noise, np.where(use, responses.coherence, np.nan))
     return _packed(head, times, curves)
 
 
@@ -60,7 +72,7 @@ def curve(kind: str, axis: int, quantity: Quantity, time_s: float, value: np.nda
     nothing = np.full(len(value), np.nan)
     one = np.array([np.nan])
     head = header(kind, axis, quantity, 1, len(value))
-    return _packed(head, (np.array([time_s]), one, one), (magnitude, phase, nothing, nothing))
+    return _packed(head, (np.array([time_s]), one, one), (magnitude, phase, nothing, nothing, nothing))
 
 
 def header(kind: str, axis: int, quantity: Quantity, rows: int, columns: int) -> bytes:

@@ -94,7 +94,7 @@ def _with_headers(send: Send, tls: bool) -> Send:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             for name, value in _HEADERS.items():
-                headers[name] = value
+                headers.setdefault(name, value)  # a report has a policy of its own
             if tls:
                 headers["strict-transport-security"] = f"max-age={_YEAR_S}"
             headers.setdefault("cache-control", "no-store")
@@ -111,13 +111,13 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: 
     await PlainTextResponse(why + "\n", status)(scope, receive, send)
 
 
-async def body(request: Any) -> bytes | None:
+async def body(request: Any, bytes_max: int = BODY_BYTES_MAX) -> bytes | None:
     """The body of a request; None if it is too long or incomplete."""
     data = b""
     try:
         async for part in request.stream():
             data += part
-            if len(data) > BODY_BYTES_MAX:
+            if len(data) > bytes_max:
                 return None
     except ClientDisconnect:
         return None

@@ -11,7 +11,16 @@ from typing import Any
 
 from livebode.analysis.overview import Overview
 from livebode.core import Block, Event, Parameters, Responses
-from livebode.runtime.documents import ClockSet, Document, FitResults, RunEnded, RunStarted, TrackerResults
+from livebode.dashboard.signal_tap import SignalTap
+from livebode.runtime.documents import (
+    Channels,
+    ClockSet,
+    Document,
+    FitResults,
+    RunEnded,
+    RunStarted,
+    TrackerResults,
+)
 from livebode.runtime.run_control import RunControl
 from livebode.sources.live import Health, LiveBlock
 
@@ -44,6 +53,7 @@ class Hub:
         self.clock: Sequence[tuple[float, float]] = ()
         """Time of day of the run's seconds, as in `RunClock`."""
         self.delays_s: deque[float] = deque(maxlen=_DELAYS)
+        self.signals = SignalTap()
         self._lock = threading.Lock()
         self._rows: deque[Responses | tuple[Parameters, ...]] = deque()
         self._values = 0
@@ -68,6 +78,8 @@ class Hub:
                 self._count(block)
             case RunStarted():
                 self._begin(document)
+            case Channels(used):
+                self.signals.begin(used, (self.begun or {}).get("found", {}).get("window", 0))
             case ClockSet(pieces):
                 self.clock = pieces
             case RunEnded(summary):
@@ -94,6 +106,7 @@ class Hub:
         now_s = time.monotonic()
         self.intervals_s.append(now_s - self.followed_s)
         self.followed_s = now_s
+        self.signals.take(block, now_s)
         if isinstance(block, LiveBlock):
             self.delays_s.append(self.followed_s - block.arrived_s)
 

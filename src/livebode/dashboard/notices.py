@@ -1,20 +1,25 @@
-"""Notices: the events of a run as the page shows them, one for each cause, with the number acknowledged."""
+"""Notices: the events of a run as the page shows them, one for each cause, with the state of its alarm."""
 
 from __future__ import annotations
 
 import hashlib
-from collections import OrderedDict
+import time
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 from livebode.core import Event
-from livebode.records.grouped_events import event_counts, group_of
+from livebode.dashboard.alarm import OPEN, AlarmShelf, AlarmState, AlarmStatus, number_in, text_in
+from livebode.dashboard.alarm_history import AlarmHistory, What
+from livebode.dashboard.alarm_kinds import ALARMS, FAR, PRIORITIES, RETURNS, SOURCE, cause_of
+from livebode.records.grouped_events import each_event, event_counts, group_of
+from livebode.runtime.readiness import ENDED, SUPPRESSED
 
-ACKNOWLEDGED = "acknowledged"
+ACKNOWLEDGED, SHELVED, UNSHELVED = "acknowledged", "shelved", "unshelved"
 CAUSES_MAX = 500
 _KNOWN_MAX = 4096
 _PLAIN_MAX = 4000  # letters of a message
-_SUBJECTS = ("what", "reason", "status", "channel")
 
 
 @dataclass
@@ -33,33 +38,31 @@ class Notice:
         Number of events, and of acknowledged events.
     changed
         Version of the last change.
+    alarm
+        Of this cause; None if no event of it was an alarm.
     """
 
     cause: str
-    id: str
-    kind: str
-    message: str
     first_s: float
     last_s: float
+    id: str = ""
+    kind: str = ""
+    message: str = ""
     count: int = 0
     seen: int = 0
     changed: int = 0
     kinds: set[str] = field(default_factory=set)
-    _group: str = ""
-    _before: int = 0
+    alarm: AlarmStatus | None = None
 
-    def take(self, event: Event) -> None:
-        """Add an event, or as many as a grouped event counts."""
+    def take(self, event: Event, times: int, key: str) -> None:
+        """Add an event, or as many like it."""
         if self.seen >= self.count:
             self.kinds = set()
-        self.kinds |= event_counts(event).keys()
-        self.id, self.kind, self.message = event_id(event), event.kind, event.message[:_PLAIN_MAX]
-        if (group := group_of(event)) is not None:
-            if group[0] != self._group:  # the same cause again, after a pause
-                self._group, self._before = group[0], self.count
-            self.count = max(self.count, self._before + group[1])
-        else:
-            self.count += 1
+        self.kinds.add(event.kind)
+        self.id = key
+        if self.alarm is None or event.kind in ALARMS:  # its end is shown with what has ended
+            self.kind, self.message = event.kind, event.message[:_PLAIN_MAX]
+        self.count += times
         self.last_s = max(self.last_s, event.time_s)
 
     def plain(self) -> dict[str, Any]:
@@ -69,45 +72,45 @@ class Notice:
 
 
 class EventCauses:
-    """The causes of a run's events, the newest last."""
+    """The causes of a run's events, the newest last, and the states of their alarms.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    clock
+        Seconds since 1970, for the end of shelves.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.time) -> None:
         self.version = 0
         self.counts: dict[str, int] = {}
-        self.changed: set[str] = set()
-        """Names of the active differences from the baseline."""
+        self.history = AlarmHistory()
+        self.shelves: dict[str, AlarmShelf] = {}
+        """Shelves by cause; one whose time has passed remains until its end is recorded."""
+        self._clock = clock
         self._shown: OrderedDict[str, Notice] = OrderedDict()
         self._known: OrderedDict[str, tuple[str, int]] = OrderedDict()  # cause, and which of its events
+        self._forgotten: deque[tuple[int, str]] = deque(maxlen=CAUSES_MAX)
+        self._groups: OrderedDict[str, int] = OrderedDict()  # events of a group so far
+        self._source_sample: int | None = None  # at which a silent source returned
+        self.suppressed_s: float | None = None
+        """Time of the run since which the machine is not ready; None if it is ready."""
+
+    @property
+    def changed(self) -> set[str]:
+        """Names of the active differences from the baseline."""
+        alarms = [one.alarm for one in self._shown.values() if one.cause.partition(":")[0] == "change"]
+        return {str(one.facts.get("what", "machine")) for one in alarms if one is not None and one.active}
 
     def take(self, event: Event) -> None:
-        """Take an event or an acknowledgement."""
+        """Take an event, or an action of a person."""
         self.version += 1
         if event.kind == ACKNOWLEDGED:
-            self._acknowledged(event)
-            return
-        key = event_id(event)
-        if key in self._known:
-            return
-        cause = cause_of(event)
-        if event.kind in ("change", "change-corrected"):
-            self.changed.add(str(event.details.get("what", "machine")))
-        elif event.kind == "change-cleared":
-            self.changed.discard(str(event.details.get("what", "machine")))
-        notice = self._shown.get(cause)
-        if notice is None:
-            first_s = event.details.get("first_s")
-            began_s = float(first_s) if isinstance(first_s, int | float) else event.time_s
-            notice = Notice(cause, key, event.kind, "", began_s, event.time_s)
-            self._shown[cause] = notice
-        before = notice.count
-        notice.take(event)
-        self.counts[event.kind] = self.counts.get(event.kind, 0) + notice.count - before
-        notice.changed = self.version
-        self._shown.move_to_end(cause)
-        self._known[key] = cause, notice.count
-        for held, most in ((self._shown, CAUSES_MAX), (self._known, _KNOWN_MAX)):
-            if len(held) > most:
-                held.popitem(last=False)
+            self._acknowledge(event)
+        elif event.kind in (SHELVED, UNSHELVED):
+            self._shelve(event)
+        else:
+            for one, times in self._new(event):
+                self._add(one, times, event)
 
     def of(self, key: str) -> tuple[Notice, int] | None:
         """The notice of an event, and the number of the event in it."""
@@ -115,45 +118,223 @@ class EventCauses:
         notice = self._shown.get(cause)
         return None if notice is None else (notice, number)
 
+    def named(self, cause: str) -> Notice | None:
+        """The notice of a cause."""
+        return self._shown.get(cause)
+
+    def state(self, notice: Notice) -> AlarmState | None:
+        """AlarmState of the alarm of a notice; None if it has none."""
+        alarm = notice.alarm
+        if alarm is None:
+            return None
+        if self.shelf(notice.cause) is not None:
+            return "shelved"
+        if self.suppressed_s is not None and alarm.active and alarm.kind.of_response:
+            return "suppressed"
+        return alarm.condition(notice.seen)
+
+    def shelf(self, cause: str) -> AlarmShelf | None:
+        """The shelf of a cause until its time has passed."""
+        found = self.shelves.get(cause)
+        return found if found is not None and self._clock() < found.until_s else None
+
+    def expired(self) -> list[str]:
+        """Causes whose shelf has ended by itself, until that is recorded."""
+        return [cause for cause in self.shelves if self.shelf(cause) is None]
+
+    def alarms(self) -> Iterator[tuple[Notice, AlarmStatus, AlarmState]]:
+        """Every alarm that is not normal, with its state."""
+        for notice in self._shown.values():
+            if notice.alarm is not None and (state := self.state(notice)) not in (None, "normal"):
+                assert state is not None
+                yield notice, notice.alarm, state
+
     def since(self, version: int) -> list[dict[str, Any]]:
         """Notices that are new or changed after `version`, oldest first."""
-        return [notice.plain() for notice in self._shown.values() if notice.changed > version]
+        return [self._plain(notice) for notice in self._shown.values() if notice.changed > version]
 
-    def _acknowledged(self, event: Event) -> None:
+    def forgotten(self, version: int) -> list[str]:
+        """Causes that were forgotten after `version`."""
+        return [cause for at, cause in self._forgotten if at > version]
+
+    def _plain(self, notice: Notice) -> dict[str, Any]:
+        if notice.alarm is None:
+            return notice.plain() | {"alarm": None}
+        shelf = self.shelf(notice.cause)
+        alarm = notice.alarm.plain() | {"state": self.state(notice), "shelf": shelf and shelf.plain()}
+        return notice.plain() | {"alarm": alarm}
+
+    def _new(self, event: Event) -> list[tuple[Event, int]]:
+        """The events of a line that were not taken yet, each with how many like it there were."""
+        group = group_of(event)
+        if group is None:
+            return [] if event_id(event) in self._known else [(event, 1)]
+        name, count = group
+        new = count - self._groups.get(name, 0)
+        if new <= 0:
+            return []
+        self._groups[name] = count
+        self._groups.move_to_end(name)
+        if len(self._groups) > _KNOWN_MAX:
+            self._groups.popitem(last=False)
+        each = list(each_event(event))
+        counted = event_counts(event)
+        counted.subtract(one.kind for one in each)
+        found, left = [(one, 1) for one in each[-new:]], new - len(each)
+        for kind, number in counted.items():
+            if (times := min(number, left)) > 0:
+                found.insert(0, (Event(kind, event.sample, event.time_s, event.message, {}), times))
+                left -= times
+        if left > 0:  # of lines that never arrived
+            found[-1] = found[-1][0], 1 + left
+        return found
+
+    def _add(self, event: Event, times: int, line: Event) -> None:
+        cause = self._cause(event, line)
+        notice = self._shown.get(cause)
+        if notice is None:
+            first_s = number_in(line, "first_s")
+            began_s = event.time_s if first_s is None else first_s
+            notice = self._shown[cause] = Notice(cause, began_s, event.time_s)
+        key = event_id(line, cause)
+        notice.take(event, times, key)
+        self.counts[event.kind] = self.counts.get(event.kind, 0) + times
+        self._judge(notice, event, times)
+        self._touch(notice)
+        for name in (key, event_id(line)):
+            self._known[name] = cause, notice.count
+        self._limit()
+
+    def _cause(self, event: Event, line: Event) -> str:
+        """Cause of an event; what is lost while the source is silent belongs to the silence."""
+        group = {name: line.details[name] for name in ("group", "count") if name in line.details}
+        cause = cause_of(Event(event.kind, event.sample, event.time_s, "", event.details | group))
+        if event.kind in ("loss", "gap", "overflow", "restart") and SOURCE in self._shown:
+            missing = event.details.get("missing_samples", 0)
+            began = event.sample - (missing if isinstance(missing, int) else 0)
+            silent = (alarm := self._shown[SOURCE].alarm) is not None and alarm.active
+            if silent or (self._source_sample is not None and began <= self._source_sample):
+                return SOURCE
+        return cause
+
+    def _judge(self, notice: Notice, event: Event, times: int) -> None:
+        """The state of the alarm after an event of its cause."""
+        if (kind := ALARMS.get(event.kind)) is not None:
+            self._raise(notice, event, times)
+            if notice.cause.startswith("change: ") and notice.cause != FAR and FAR in self._shown:
+                self._return(self._shown[FAR], event)
+            if kind.cause == SOURCE:
+                self._source_sample = None
+        elif event.kind in RETURNS:
+            self._return(notice, event)
+        elif event.kind in (SUPPRESSED, ENDED):
+            self._suppress(event)
+
+    def _suppress(self, event: Event) -> None:
+        """Suppress the alarms of the response, or no longer."""
+        since_s = number_in(event, "since_s")
+        begins = event.kind == SUPPRESSED
+        self.suppressed_s = (event.time_s if since_s is None else since_s) if begins else None
+        for notice in self._shown.values():
+            alarm = notice.alarm
+            if alarm is None or not (alarm.active and alarm.kind.of_response):
+                continue
+            if not alarm.suppressions:  # a drive that is switched off in each cycle would fill the history
+                self._log(notice, "suppressed" if begins else "unsuppressed", event)
+            alarm.suppressions += not begins
+            self._touch(notice, newest=False)
+
+    def _raise(self, notice: Notice, event: Event, times: int) -> None:
+        kind = ALARMS[event.kind]
+        if notice.alarm is None:
+            notice.alarm = AlarmStatus(kind)
+        alarm = notice.alarm
+        if notice.cause == SOURCE and kind.cause != SOURCE:
+            return  # it follows from the silence, which is announced
+        before = alarm.active
+        alarm.raise_by(event, kind, times, notice.count)
+        if not before or event.kind != "change-corrected":
+            self._log(notice, "raised", event, times)
+
+    def _return(self, notice: Notice, event: Event) -> None:
+        alarm = notice.alarm
+        if alarm is not None and alarm.active:
+            alarm.end_at(event.time_s)
+            if notice.cause == SOURCE:
+                self._source_sample = event.sample
+            self._log(notice, "returned", event)
+            self._touch(notice)
+
+    def _acknowledge(self, event: Event) -> None:
         found = self.of(str(event.details.get("event")))
         # Earlier versions used other names for the events of a group.
-        known = self._shown.get(str(event.details.get("cause"))) if found is None else found[0]
-        if known is None:
+        notice = self._shown.get(str(event.details.get("cause"))) if found is None else found[0]
+        if notice is None:
             return
-        notice, count = known, event.details.get("count")
+        count, alarm = event.details.get("count"), notice.alarm
+        open_before = alarm is not None and alarm.condition(notice.seen) in OPEN
         # Runs from before the grouping of causes acknowledge each event individually.
         seen = max(notice.seen, count) if isinstance(count, int) else notice.seen + 1
-        notice.seen, notice.changed = min(seen, notice.count), self.version
+        notice.seen = min(seen, notice.count)
+        if alarm is not None and open_before and notice.seen >= alarm.raised:
+            alarm.acknowledge(event)
+            self._log(notice, "acknowledged", event)
+        self._touch(notice, newest=False)
+
+    def _shelve(self, event: Event) -> None:
+        cause, until_s = str(event.details.get("cause")), number_in(event, "until_s")
+        if event.kind == UNSHELVED:
+            self.shelves.pop(cause, None)
+        elif until_s is not None and len(self.shelves) < CAUSES_MAX:
+            self.shelves[cause] = AlarmShelf(text_in(event, "by"), until_s, text_in(event, "reason"))
+        if (notice := self._shown.get(cause)) is not None:
+            self._log(notice, "shelved" if event.kind == SHELVED else "unshelved", event)
+            self._touch(notice, newest=False)
+
+    def _log(self, notice: Notice, what: What, event: Event, times: int = 1) -> None:
+        alarm = notice.alarm
+        chatters = alarm is not None and what in ("raised", "returned") and alarm.chatters_at(event.time_s)
+        acted = what not in ("raised", "returned")
+        facts = {
+            "cause": notice.cause,
+            "kind": notice.kind if acted else event.kind,
+            "message": notice.message if acted else event.message,
+            "state": self.state(notice) or "",
+            "by": text_in(event, "by"),
+            "comment": text_in(event, "comment") or text_in(event, "reason"),
+            "count": times,
+        }
+        self.history.add(self.version, what, event.time_s, chatters=chatters, **facts)
+
+    def _touch(self, notice: Notice, *, newest: bool = True) -> None:
+        notice.changed = self.version
+        if newest:
+            self._shown.move_to_end(notice.cause)
+
+    def _importance(self, cause: str) -> int:
+        notice = self._shown[cause]
+        if notice.alarm is None or self.state(notice) == "normal":
+            return 0
+        return 3 - PRIORITIES.index(notice.alarm.kind.priority)
+
+    def _limit(self) -> None:
+        """Forget the oldest causes, first those that need nothing, then those of low priority."""
+        while len(self._shown) > CAUSES_MAX:
+            cause = min(self._shown, key=self._importance)
+            del self._shown[cause]
+            self._forgotten.append((self.version, cause))
+        while len(self._known) > _KNOWN_MAX:
+            self._known.popitem(last=False)
 
 
-def cause_of(event: Event) -> str:
-    """The common cause of events that are shown as one: their group in the run, or kind and subject.
+def event_id(event: Event, cause: str = "") -> str:
+    """A name of an event that is the same whenever the record is read; in a group, of it and all earlier ones.
 
-    >>> cause_of(Event("gap", 7, 1.0, "a gap", {"group": "loss@7", "count": 1}))
-    'loss'
-    >>> cause_of(Event("change", 7, 1.0, "changed", {"what": "stiffness"}))
-    'change: stiffness'
+    `cause` distinguishes the causes of a line with events of several.
     """
-    if (group := group_of(event)) is not None:
-        return group[0].partition("@")[0]
-    subjects = [str(event.details[name]) for name in _SUBJECTS if name in event.details]
-    return ": ".join([event.kind, *subjects[:1]])[:200]
-
-
-def event_id(event: Event) -> str:
-    """A name of an event that is the same whenever the record is read; in a group, of it and all earlier ones."""
     group = group_of(event)
-    text = f"{event.kind}\0{event.sample}\0{event.time_s!r}\0{event.message}" if group is None else f"{group}"
+    if group is None:
+        text = f"{event.kind}\0{event.sample}\0{event.time_s!r}\0{event.message}"
+    else:
+        text = f"{group}" if cause in ("", group[0].partition("@")[0]) else f"{group}\0{cause}"
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:16]
-
-
-def acknowledgement(notice: Notice, key: str, count: int, sample: int, time_s: float) -> Event:
-    """The event that records the acknowledgement of `count` events of a cause, of which `key` is the last."""
-    details = {"event": key, "kind": notice.kind, "time_s": notice.last_s, "cause": notice.cause, "count": count}
-    often = f" ({count} events of this cause)" if count > 1 else ""
-    return Event(ACKNOWLEDGED, sample, time_s, f"acknowledged: {notice.message}{often}", details)

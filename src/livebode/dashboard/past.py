@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -66,16 +66,26 @@ class Past:
         within = self.overview.between(from_s, to_s)
         if (to_s - from_s) >= _WHOLE * (self.last_s - self.first_s):
             return _thinned(within, rows)
-        if self.recent is not None and len(self.recent) and from_s >= self.recent.time_s[0]:
-            return _thinned(self.recent.between(from_s, to_s), rows)
+        newest = within[0:0]
+        if self.recent is not None and len(self.recent):
+            newest = self.recent.between(from_s, to_s)
+            # It has at most 20 responses per second: a short span has more of them in the record.
+            if from_s >= self.recent.time_s[0] and (len(newest) >= rows or not self.readable):
+                return _thinned(newest, rows)
         if not self.readable:
             return _thinned(within, rows)
-        found = Overview()
-        found.add(within[0:0])
+        recorded = self._recorded(from_s, to_s)
+        if recorded is None:
+            return _thinned(newest if len(newest) else within, rows)
+        behind = newest[np.flatnonzero(newest.time_s > recorded.time_s[-1])]  # of a segment that is being written
+        return _thinned(Responses.join([recorded, replace(behind, unit=recorded.unit)]), rows)
+
+    def _recorded(self, from_s: float, to_s: float) -> Responses | None:
+        found, rows = Overview(), 0
         for part in RunRecord.open(self.directory).between(from_s, to_s):
             found.add(part)
-        recorded = found.responses()
-        return _thinned(recorded if len(recorded) else within, rows)
+            rows += len(part)
+        return found.responses() if rows else None
 
     def all_between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """All responses of a span, in parts: from the record if it can be read, otherwise those in memory."""

@@ -56,6 +56,12 @@ class Places:
         if place in self._taken:
             self._taken.remove(place)
 
+    def displace_all(self) -> None:
+        """End all browsers: what they show is gone."""
+        for place in list(self._taken):
+            self.leave(place)
+            place.leave()
+
     def _displaceable(self, newcomer: ClientPlace) -> ClientPlace | None:
         if not self._open:
             viewers = [place for place in self._taken if place.role == "viewer"]

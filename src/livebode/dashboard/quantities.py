@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,13 +13,16 @@ from numpy.typing import NDArray
 
 from livebode.configuration.axis import LoopSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Lines, Loop, PlantKinds, Quantity, Responses, ServerError
+from livebode.core import Lines, Loop, PlantKinds, Quantity, Responses, ServerError, split_plant_unit
 from livebode.estimation.quantities import convert
 from livebode.records.run import kinds_in, lines_in
 
 Complex = NDArray[np.complex128]
 
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
+POWERS = range(-2, 3)
+_SECONDS = re.compile(r"(.*[^/])/s(?:\^?([2-9])|([²³⁴]))?")
+_RAISED = str.maketrans("²³⁴", "234")
 _UNKNOWN, _REMEDY = "the run's configuration contains no controllers", "describe its controllers under [loop]"
 
 
@@ -73,6 +77,10 @@ class Quantities:
         """The unit of a quantity; empty if it has none or is unknown."""
         return self.unit if quantity == self.own else ""
 
+    def units_of(self, quantity: Quantity) -> list[str]:
+        """The units of a quantity times (jω)ⁿ for n from −2 to 2: of derivatives and integrals."""
+        return [per_seconds(self.unit_of(quantity), power) for power in POWERS]
+
     def fit(self, responses: Responses) -> bool:
         """Whether responses have this run's quantity and frequencies; those of a previous run may differ."""
         at_hz = responses.lines.frequency_hz
@@ -88,6 +96,7 @@ class Quantities:
             responses,
             value=value,
             sigma=responses.sigma * np.abs(slope),
+            distortion=responses.distortion * np.abs(slope),
             quantity=quantity,
             unit=self.unit_of(quantity),
         )
@@ -114,3 +123,23 @@ def _plant(quantity: Quantity, value: Complex, feedback: Complex) -> tuple[Compl
     if quantity == "sensitivity":
         return (1 / value - 1) / feedback, -1 / (feedback * value**2)
     return value / (feedback * (1 - value)), 1 / (feedback * (1 - value) ** 2)
+
+
+def per_seconds(unit: str, power: int) -> str:
+    """The unit of a plant times (jω) to a power: the seconds belong to the unit of its output.
+
+    >>> per_seconds("rad/s/(N m)", 1), per_seconds("rad/s/(N m)", -1), per_seconds("m/(A)", 2), per_seconds("", -1)
+    ('rad/s²/(N m)', 'rad/(N m)', 'm/s²/(A)', 's')
+    """
+    output, input = split_plant_unit(unit)
+    behind = f"/({input})" if input else ""
+    output = output or unit
+    found = _SECONDS.fullmatch(output)
+    own, exponent = (found[1], int((found[2] or found[3] or "1").translate(_RAISED))) if found else (output, 0)
+    exponent += power
+    if exponent == 0:
+        return own + behind
+    seconds = "s" + {1: "", 2: "²", 3: "³", 4: "⁴"}[abs(exponent)] if abs(exponent) <= 4 else f"s^{abs(exponent)}"
+    if exponent > 0:
+        return f"{own or '1'}/{seconds}{behind}"
+    return f"{own} {seconds}".strip() + behind

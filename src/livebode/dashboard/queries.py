@@ -6,15 +6,19 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast, get_args
 
 from livebode.core import Quantity, ServerError, UsageError
+from livebode.dashboard.frames import REFERENCES_MAX
 from livebode.dashboard.quantities import QUANTITIES
+from livebode.dashboard.signal_answer import Picture
+from livebode.records.saved_curves import TEXT_MAX
 
 MESSAGE_BYTES_MAX = 1024
 _FORMATS = ("csv", "mat")
 _KINDS = ("watch", "pause", "resume", "freeze", "unfreeze")
 _TIME_S_MAX = 1e12
+_ID_MAX = 64
 
 
 @dataclass(frozen=True)
@@ -34,13 +38,35 @@ class ClientMessage:
     """A message on the web socket.
 
     `watch` selects axis and quantity (default: the quantity of the run), `pause` stops and `resume` continues updates,
-    `freeze` makes the newest response, or the one at `time_s`, the reference, `unfreeze` removes it.
+    `freeze` makes the newest response, the one at `time_s`, or the one that was `saved` with the run under this id, the
+    reference of a slot (1 to 8), `unfreeze` removes that of a slot, or all.
     """
 
     kind: str
     axis: int = 0
     quantity: Quantity | None = None
     time_s: float | None = None
+    slot: int | None = None
+    saved: str | None = None
+
+
+@dataclass(frozen=True)
+class SignalsAsked:
+    """A query for raw signals: axis, picture, and the time in the record; None for the newest ones."""
+
+    axis: int
+    picture: Picture
+    at_s: float | None
+
+
+@dataclass(frozen=True)
+class SavedChange:
+    """A change of what is saved with a run: a reference at a time, an annotation at a frequency, or a removal by id."""
+
+    axis: int
+    kind: str
+    text: str = ""
+    at: float = 0.0
 
 
 def span(query: Mapping[str, str], axes: int) -> Span:
@@ -69,9 +95,29 @@ def span(query: Mapping[str, str], axes: int) -> Span:
             value=format[:20],
             allowed=list(_FORMATS),
         )
-    rows = _whole(query.get("rows", "1200"), 1, 1 << 20, "rows")
-    axis = _whole(query.get("axis", "0"), 0, axes - 1, "axis")
+    rows = whole_number(query.get("rows", "1200"), 1, 1 << 20, "rows")
+    axis = whole_number(query.get("axis", "0"), 0, axes - 1, "axis")
     return Span(axis, _quantity(query.get("quantity", "plant")), from_s, to_s, rows, format)
+
+
+def signals_asked(query: Mapping[str, str], axes: int) -> SignalsAsked:
+    """Parse a query for raw signals; LivebodeError if it is invalid.
+
+    >>> signals_asked({"axis": "0", "picture": "log", "at": "2.5"}, axes=1).at_s
+    2.5
+    """
+    picture = query.get("picture", "time")
+    if picture not in get_args(Picture):
+        raise UsageError(
+            "not-one-of",
+            f"picture={picture[:20]!r} is not one of {', '.join(get_args(Picture))}",
+            "choose one of them",
+            argument="picture",
+            value=picture[:20],
+            allowed=list(get_args(Picture)),
+        )
+    axis = whole_number(query.get("axis", "0"), 0, axes - 1, "axis")
+    return SignalsAsked(axis, cast(Picture, picture), _time(query["at"]) if "at" in query else None)
 
 
 def client_message(text: str, axes: int) -> ClientMessage:
@@ -95,16 +141,16 @@ def client_message(text: str, axes: int) -> ClientMessage:
             raise UsageError("unreadable", "axis is not a whole number", "give the number of an axis", argument="axis")
         quantity = message.get("quantity")
         asked_for = None if quantity is None else _quantity(quantity)
-        return ClientMessage(kind, _whole(str(axis)[:10], 0, axes - 1, "axis"), asked_for)
-    if kind in ("pause", "resume", "unfreeze"):
+        return ClientMessage(kind, whole_number(str(axis)[:10], 0, axes - 1, "axis"), asked_for)
+    if kind in ("pause", "resume"):
         return ClientMessage(kind)
+    if kind == "unfreeze":
+        return ClientMessage(kind, slot=_slot(message) if "slot" in message else None)
     if kind == "freeze":
-        time_s = message.get("time_s")
-        if time_s is not None:
-            if isinstance(time_s, bool) or not isinstance(time_s, int | float):
-                raise UsageError("unreadable", "time_s is not a number", "give seconds", argument="time_s")
-            time_s = _time(str(time_s)[:40])
-        return ClientMessage(kind, time_s=time_s)
+        saved = message.get("saved")
+        if saved is not None and not (isinstance(saved, str) and len(saved) <= _ID_MAX):
+            raise UsageError("unreadable", "saved is not the id of a reference", "give its id", argument="saved")
+        return ClientMessage(kind, time_s=_optional_time(message), slot=_slot(message), saved=saved)
     raise UsageError(
         "not-one-of",
         f"the message's kind {str(kind)[:20]!r} is not known",
@@ -115,13 +161,50 @@ def client_message(text: str, axes: int) -> ClientMessage:
     )
 
 
-def acknowledged(data: bytes, axes: int) -> tuple[int, str]:
-    """Axis and event of an acknowledgement; LivebodeError if it is invalid."""
+def _slot(message: Mapping[str, Any]) -> int:
+    slot = message.get("slot", 1)
+    if isinstance(slot, bool) or not isinstance(slot, int):
+        raise UsageError("unreadable", "slot is not a whole number", "give the number of a slot", argument="slot")
+    return whole_number(str(slot)[:10], 1, REFERENCES_MAX, "slot")
+
+
+def _optional_time(message: Mapping[str, Any]) -> float | None:
+    time_s = message.get("time_s")
+    if time_s is None:
+        return None
+    if isinstance(time_s, bool) or not isinstance(time_s, int | float):
+        raise UsageError("unreadable", "time_s is not a number", "give seconds", argument="time_s")
+    return _time(str(time_s)[:40])
+
+
+def saved_change(data: bytes, axes: int) -> SavedChange:
+    """Parse a change of what is saved with a run; LivebodeError if it is invalid.
+
+    >>> saved_change(b'{"axis": 0, "kind": "annotation", "text": "belt", "frequency_hz": 62.5}', axes=1).at
+    62.5
+    """
     message = plain(data)
-    axis, event = message.get("axis"), message.get("event")
-    if isinstance(axis, bool) or not isinstance(axis, int) or not isinstance(event, str) or len(event) > 64:
-        raise ServerError("request-malformed", "the acknowledgement does not have an axis and an event", "send both")
-    return _whole(str(axis)[:10], 0, axes - 1, "axis"), event
+    axis, kind = message.get("axis"), message.get("kind")
+    place = {"reference": "time_s", "annotation": "frequency_hz", "remove": None}
+    text = message.get("text")
+    known = isinstance(kind, str) and kind in place and isinstance(axis, int) and not isinstance(axis, bool)
+    if not known or not isinstance(text, str) or not text.strip() or len(text) > TEXT_MAX:
+        raise ServerError(
+            "request-malformed",
+            f"a change needs axis, kind ({', '.join(place)}) and a text of at most {TEXT_MAX} characters",
+            "send them",
+        )
+    number = whole_number(str(axis)[:10], 0, axes - 1, "axis")
+    name = place[str(kind)]
+    if name is None:
+        return SavedChange(number, str(kind), text)
+    at = message.get(name)
+    if isinstance(at, bool) or not isinstance(at, int | float):
+        raise UsageError("unreadable", f"{name} is not a number", "give a number", argument=name)
+    found = _time(str(at)[:40])
+    if kind == "annotation" and found <= 0:
+        raise UsageError("unreadable", "frequency_hz is not positive", "give a frequency", argument=name)
+    return SavedChange(number, str(kind), text.strip(), found)
 
 
 def plain(data: bytes | str, what: str = "body") -> dict[str, Any]:
@@ -164,7 +247,8 @@ def _time(text: str) -> float:
     return value
 
 
-def _whole(text: str, low: int, high: int, name: str) -> int:
+def whole_number(text: str, low: int, high: int, name: str) -> int:
+    """Parse a whole number; UsageError outside of its range."""
     if text.isascii() and text.isdigit() and len(text) <= 10 and low <= int(text) <= high:
         return int(text)
     raise UsageError(

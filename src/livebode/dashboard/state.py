@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -18,6 +19,8 @@ from livebode.analysis.overview import Overview
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Event, LivebodeError, Quantity, Responses
 from livebode.core.clock import RunClock
+from livebode.dashboard.alarm import AlarmShelf
+from livebode.dashboard.alarm_actions import shelving, unshelving
 from livebode.dashboard.frames import curve, frame
 from livebode.dashboard.hub import Hub, Item
 from livebode.dashboard.notices import EventCauses
@@ -27,10 +30,12 @@ from livebode.dashboard.recent import RecentResponses
 from livebode.dashboard.trends import Trends
 from livebode.margins import peak_sensitivity_at_lines
 from livebode.records import RunRecord, to_json
+from livebode.runtime import RunControl
 
 _SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _PACE_S = 3.0
 _SILENT_S = 2.0
+_BACKLOG_S = 2.0
 _GROWS_S = 10.0
 _SENT = 90  # responses that were sent in three seconds: one that a person freezes is among them
 
@@ -47,6 +52,7 @@ class State:
         self.quantities: Quantities | None = None
         self.version = self.runs = 0
         self._begun: Mapping[str, Any] | None = None
+        self._control: RunControl | None = None  # the same one while runs continue each other
         self._empty()
         self._summary: Mapping[str, Any] = {}
         self._fitted: FittedCurve | None = None
@@ -61,11 +67,12 @@ class State:
         self._shared = None if self.hub is None else self.hub.overview
         self.overview = self._shared or Overview()
         self.trends, self.notices = Trends(), EventCauses()
-        self.first_s = self.last_s = float("nan")
+        self.first_s = self.last_s = self.start_s = float("nan")
         self.finished = False
         self._seen = 0
         self._pace: deque[tuple[float, int]] = deque(maxlen=128)
         self.sent: deque[Responses] = deque(maxlen=_SENT)
+        self._ending: set[str] = set()  # causes whose unshelving waits to be recorded
 
     @property
     def live(self) -> bool:
@@ -99,10 +106,13 @@ class State:
         if hub is None:
             return
         if hub.begun is not self._begun and hub.begun is not None and hub.directory is not None:
-            self._begun = hub.begun
+            self._begun, shelves = hub.begun, self.notices.shelves
+            continues, self._control = hub.control is self._control, hub.control
             self._empty()
             self.begin(hub.directory, hub.begun)
             self._before()
+            if continues:
+                self._shelve_again(shelves)
         ended = hub.ended
         self.take(hub.take())
         if ended is not None and not self.finished:
@@ -114,6 +124,28 @@ class State:
             return
         with suppress(LivebodeError):  # it has just started
             self.take(list(RunRecord.open(self.directory).events()))
+
+    def _shelve_again(self, shelves: Mapping[str, AlarmShelf]) -> None:
+        """Shelve in a run that continues another one what is shelved there."""
+        assert self.hub is not None
+        for cause, shelf in shelves.items():
+            if time.time() < shelf.until_s:
+                self.hub.record(shelving(cause, shelf, *self.position))
+
+    def end_shelves(self) -> None:
+        """Record the end of shelves whose time has passed."""
+        if self.hub is None or self.finished:
+            return
+        for cause in set(self.notices.expired()) - self._ending:
+            if self.hub.record(unshelving(cause, *self.position, self.notices.named(cause))):
+                self._ending.add(cause)
+        self._ending &= self.notices.shelves.keys()
+
+    @property
+    def position(self) -> tuple[int, float]:
+        """Sample and time of the newest response; zeros before the first."""
+        newest = self.newest
+        return (0, 0.0) if newest is None else (int(newest.sample[0]), float(newest.time_s[0]))
 
     def renewed(self, summary: Mapping[str, Any], finished: bool) -> None:
         """Take the current run.json."""
@@ -141,8 +173,18 @@ class State:
         at = int(use[-1]) if use.size else len(responses) - 1
         self.newest = responses[at : at + 1]
         self.version += 1
+        self._take_times(responses)
+
+    def _take_times(self, responses: Responses) -> None:
+        """First windows begin before the recording: their centres are no times at which anything was measured."""
+        if not np.isfinite(self.start_s):
+            middle = (responses.first[0] + responses.sample[0]) / 2
+            self.start_s = float(responses.time_s[0] - middle / responses.lines.rate_hz)
         if not np.isfinite(self.first_s):
-            self.first_s = float(responses.time_s[0])
+            whole = np.flatnonzero((responses.first >= 0) | responses.valid.any(axis=1))
+            if not whole.size:
+                return
+            self.first_s = float(responses.time_s[whole[0]])
         self.last_s = float(responses.time_s[-1])
 
     def shown(self, quantity: Quantity | None) -> Quantity:
@@ -202,6 +244,7 @@ class State:
         return facts | {
             "begun": True,
             "directory": str(self.directory),
+            "version": version("livebode"),
             "frequency_hz": q.lines.frequency_hz.tolist(),
             "grid_hz": grid_hz(q.lines).tolist(),
             "rate_hz": q.lines.rate_hz,
@@ -209,7 +252,13 @@ class State:
             "format": found.get("format", ""),
             "quantity": q.own,
             "quantities": [
-                {"name": name, "symbol": _SYMBOLS[name], "unit": q.unit_of(name), "why_not": q.why_not(name)}
+                {
+                    "name": name,
+                    "symbol": _SYMBOLS[name],
+                    "unit": q.unit_of(name),
+                    "units": q.units_of(name),
+                    "why_not": q.why_not(name),
+                }
                 for name in QUANTITIES
             ],
             "signals": words.get("signals", {}),
@@ -226,6 +275,7 @@ class State:
             "last_s": self.last_s,
             "live": self.live,
             "growing": self.growing,
+            "start_s": self.start_s,
             "clock": self.clock,
         }
 
@@ -252,7 +302,6 @@ class State:
             "responses": self._seen,
             "responses_per_s": gone / (now - then) if now > then and before >= 0 else None,
             "events": self.notices.counts,
-            "alarms": sorted(self.notices.changed),
             "ms_at_lines": self._largest_sensitivity(),
         }
         hub = self.hub
@@ -260,13 +309,38 @@ class State:
             return found | {"counts": self._summary.get("counts"), "source": self._summary.get("source")}
         delays = np.array(hub.delays_s) * 1e3
         found |= {"samples": hub.samples, "gaps": hub.gaps, "given_up": hub.given_up}
-        silent_s, usual_s = now - hub.followed_s, median([*hub.intervals_s, 0.0])
-        found |= {"silent_s": silent_s, "stale": silent_s > max(_SILENT_S, 3 * usual_s)}
+        silent_s, stale = self.silence()
+        found |= {"silent_s": silent_s, "stale": stale, "backlog_s": self.backlog_s()}
         if delays.size:
             found |= {"behind_ms": float(np.median(delays)), "behind_p99_ms": float(np.quantile(delays, 0.99))}
         if (health := hub.health) is not None:
             found["source"] = asdict(health)
         return found
+
+    def silence(self) -> tuple[float, bool]:
+        """How long no samples have arrived, and whether that is longer than usual."""
+        assert self.hub is not None
+        silent_s, usual_s = time.monotonic() - self.hub.followed_s, median([*self.hub.intervals_s, 0.0])
+        return silent_s, silent_s > max(_SILENT_S, 3 * usual_s)
+
+    def backlog_s(self) -> float | None:
+        """How far tracking is behind the source, if that is more than a person expects."""
+        health = None if self.hub is None else self.hub.health
+        late = health is not None and health.waiting_s is not None and health.waiting_s > _BACKLOG_S
+        return health.waiting_s if health is not None and late else None
+
+    @property
+    def has_baseline(self) -> bool:
+        """Whether the run is compared with a baseline, also where that cannot be drawn."""
+        configured = self._summary.get("configuration", {}).get("monitoring") or {}
+        found = self._summary.get("monitoring") or {}
+        return self._healthy is not None or bool(configured.get("baseline") or found.get("baseline"))
+
+    @property
+    def judged(self) -> bool:
+        """Whether anything was compared with the baseline; True during the run, when it is not known."""
+        monitoring = self._summary.get("monitoring") or {}
+        return "judged_s" not in monitoring or bool(monitoring["judged_s"])
 
     def _largest_sensitivity(self) -> dict[str, float] | None:
         """The largest |S| at a line, without a model."""

@@ -14,7 +14,6 @@ from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
-from livebode import __version__
 from livebode.core import LivebodeError
 from livebode.doctor.check import Check, worst
 from livebode.doctor.secrets import Secrets
@@ -22,6 +21,7 @@ from livebode.doctor.subject import Subject
 from livebode.export import save
 from livebode.kernel import instruction_sets
 from livebode.records import RunRecord, to_json
+from livebode.version import __version__
 
 PART_BYTES_MAX = 2 << 20
 """Of each file in the bundle, before it is compressed."""

@@ -7,14 +7,18 @@ from importlib.metadata import PackageNotFoundError, metadata, requires, version
 
 from packaging.requirements import Requirement
 
+from livebode.core.installing import install_command
 from livebode.doctor.check import Check
 
 NAME = "extras"
+_ALL = "all"  # the extra of all others
 
 
 def check_extras() -> Check:
     """The extras of the installed livebode, by its own metadata."""
-    found: dict[str, list[str]] = {extra: [] for extra in metadata("livebode").get_all("Provides-Extra") or ()}
+    found: dict[str, list[str]] = {
+        extra: [] for extra in metadata("livebode").get_all("Provides-Extra") or () if extra != _ALL
+    }
     required = [Requirement(text) for text in requires("livebode") or ()]
     for extra in found:
         own = [one for one in required if one.marker and one.marker.evaluate({"extra": extra})]
@@ -34,8 +38,8 @@ def judged(problems: dict[str, list[str]]) -> Check:
         parts.append(f"{_listed(missing)} not installed")
     if old:
         parts.append("; ".join(text for extra in old for text in problems[extra]))
-        return Check(NAME, "warning", "; ".join(parts), f"run {_install(old)}", facts)
-    remedy = f"for what is missing and needed run {_install(missing)}" if missing else ""
+        return Check(NAME, "warning", "; ".join(parts), f"run {install_command(*old)}", facts)
+    remedy = f"for what is missing and needed run {install_command(*missing)}" if missing else ""
     return Check(NAME, "ok", "; ".join(parts), remedy, facts)
 
 
@@ -51,7 +55,3 @@ def _problem(requirement: Requirement) -> str:
 
 def _listed(names: Sequence[str]) -> str:
     return ", ".join(names)
-
-
-def _install(extras: Sequence[str]) -> str:
-    return f"pip install 'livebode[{','.join(extras)}]'"

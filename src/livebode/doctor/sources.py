@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import socket
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 from livebode.configuration.axis import Axis
 from livebode.core import LivebodeError
 from livebode.doctor.check import Check
+from livebode.doctor.recordings import check_recording
 from livebode.sources.live import make_source
 from livebode.sources.live.address import Address
-from livebode.sources.live.settings import SourceSettings
 
 NAME = "source"
 TIMEOUT_S = 3.0
@@ -25,14 +23,14 @@ def check_sources(axes: Mapping[str, Axis]) -> list[Check]:
     if not axes:
         return [Check(NAME, "not applicable", "there is no valid configuration of an axis that still runs")]
     with ThreadPoolExecutor(_AT_ONCE, "livebode doctor") as threads:
-        return list(threads.map(_check, axes, [axis.source for axis in axes.values()]))
+        return list(threads.map(_check, axes, axes.values()))
 
 
-def _check(axis: str, settings: SourceSettings) -> Check:
-    name = f"{NAME} of {axis}" if axis else NAME
+def _check(of: str, axis: Axis) -> Check:
+    name, settings = f"{NAME} of {of}" if of else NAME, axis.source
     try:
         if settings.url is None:
-            found = [_recording(name, path) for path in settings.logs]
+            found = [check_recording(name, axis, path) for path in settings.logs]
             return next((check for check in found if check.verdict != "ok"), found[0])
         address = make_source(settings).address
     except LivebodeError as error:
@@ -40,15 +38,6 @@ def _check(axis: str, settings: SourceSettings) -> Check:
     if address.scheme == "stdin":
         return Check(name, "not applicable", "samples come from standard input")
     return _receiving(name, address) if address.scheme == "udp" else _connecting(name, address)
-
-
-def _recording(name: str, path: Path) -> Check:
-    facts = {"path": str(path)}
-    if not path.exists():
-        return Check(name, "failed", f"there is no recording {path}", "check source.log", facts)
-    if not os.access(path, os.R_OK):
-        return Check(name, "failed", f"{path} cannot be read", "check its permissions", facts)
-    return Check(name, "ok", f"{path} can be read", facts=facts)
 
 
 def _receiving(name: str, address: Address) -> Check:

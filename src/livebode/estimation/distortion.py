@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import gcd
 
 import numpy as np
@@ -10,10 +12,11 @@ from numpy.typing import NDArray
 
 from livebode.core import Lines
 from livebode.estimation.bounds import power
-from livebode.estimation.detection import Groups, Interpolation
+from livebode.estimation.detection import Groups, Interpolation, times
 from livebode.estimation.moments import Moments
 
 Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 _INSIDE_MIN = 2  # smallest number of detection lines between the outermost lines for an estimate in the band
 _OUTSIDE = 6  # more of them on each side
@@ -28,7 +31,7 @@ than the rms of the lines, as at a resonance, changes more in the same proportio
 """
 _STEPS_MARGIN = 3.0  # ratio to uniform rounding that the steps of a sensor may have at a few bins
 _POWERLESS = 1e-4
-_SMOOTH = np.ones(5)  # detection lines over which the noise is averaged before it is compared with
+_SMOOTH = 5  # detection lines over which the noise is averaged before it is compared with
 _CHANCE = 1e-4  # of noise alone to be significant in one verdict
 
 
@@ -72,62 +75,102 @@ class Distortion:
         self._groups = Groups(at, self.bins)
         self.dof = float(self._groups.dof.min())
 
-    def variance(
-        self, moments: Moments, lines: slice, beside: slice, instrument: bool, steps: Floats
-    ) -> tuple[Floats, bool]:
-        """Shape (lines,), and whether what repeats is significant, from Moments of one row at the lines and at `bins`.
+    def repeats(
+        self, moments: Moments, pair: Complex, lines: slice, beside: slice, instrument: bool, steps: Floats
+    ) -> Repeats:
+        """What repeats without being a linear response.
 
-        `steps` (lines,) is the possible variance of the sensor steps. They do not change the gain, because the other
-        lines act as dither, so the factor of three does not apply to them.
+        Parameters
+        ----------
+        moments, pair
+            Moments at the lines and at `bins`, and their means of numerator and denominator, shape (2, rows, bins).
+        lines, beside
+            The places of the lines and of `bins` in these.
+        instrument
+            Whether the reference is the excitation, so that a bin at which it has power is excited.
+        steps
+            Possible variance of the sensor steps, shape (rows, lines). They do not change the gain, because the other
+            lines act as dither, so the factor of three does not apply to them.
         """
-        numerator, denominator = moments.pair[:, 0]
-        ratio = numerator[lines] / denominator[lines]
-        everywhere = np.concatenate([ratio, self._interpolation.at(ratio)])
-        model = everywhere[len(ratio) :]
-        mean = power(numerator[beside] - model * denominator[beside])
-        scatter = moments.unexplained(_placed(everywhere, lines, beside))[0, beside]
-        noise = scatter / moments.unbiased[0] * moments.of_mean[0]
+        numerator, denominator = pair
+        ratio = numerator[:, lines] / denominator[:, lines]
+        model = self._interpolation.at(ratio)
+        mean = power(numerator[:, beside] - times(model, denominator[:, beside]))
+        scatter = replace(moments, scatter=moments.scatter[:, :, beside]).unexplained(model)
+        noise = scatter / moments.unbiased[:, np.newaxis] * moments.of_mean[:, np.newaxis]
         if instrument:
-            reference = moments.power[0, 0]
-            mean = np.where(reference[beside] > _POWERLESS * reference[lines].mean(), np.nan, mean)
-        gain = power(model)
-        as_output = self._groups.at((mean - noise)[np.newaxis])[0]
-        as_input = self._groups.at(((mean - noise) / gain)[np.newaxis])[0] * power(ratio)
+            reference = moments.power[0]
+            excited = reference[:, beside] > _POWERLESS * _mean(reference[:, lines])
+            mean = np.where(excited, np.nan, mean)
+        as_output = self._groups.at(mean - noise)
+        as_input = self._groups.at((mean - noise) / power(model)) * power(ratio)
         found = np.maximum(np.fmax(as_output, as_input), 0.0)
-        strength = power(numerator[lines])
-        stronger = np.maximum(strength / strength.mean(), 1.0)
+        strength = power(numerator[:, lines])
+        stronger = np.maximum(strength / _mean(strength), 1.0)
         coherent = (_COHERENT**2 * stronger - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
         known = np.isfinite(mean) & np.isfinite(noise)
         over = _over_noise(mean, noise, known)
-        return np.asarray(_share(over) * (found + coherent)), over > _by_chance(int(known.sum()), float(moments.dof[0]))
+        variance = _share(over)[:, np.newaxis] * (found + coherent)
+        return Repeats(variance, over, np.count_nonzero(known, axis=1), moments.dof)
 
 
-def _placed(everywhere: NDArray[np.complex128], lines: slice, beside: slice) -> NDArray[np.complex128]:
-    placed = np.zeros((1, beside.stop), dtype=np.complex128)
-    placed[0, lines], placed[0, beside] = everywhere[: lines.stop], everywhere[lines.stop :]
-    return placed
+@dataclass(frozen=True, eq=False)
+class Repeats:
+    """Result of `Distortion`, one row for each mean over periods.
+
+    Attributes
+    ----------
+    variance
+        Shape (rows, lines).
+    over_noise
+        Power that repeats over that of the noise beside it, mean over the detection lines that are known, (rows,).
+    known, dof
+        Number of these, and degrees of freedom of the noise at one of them, (rows,).
+    """
+
+    variance: Floats
+    over_noise: Floats
+    known: NDArray[np.int64]
+    dof: Floats
+
+    def is_significant(self, row: int) -> bool:
+        """Whether noise alone has this power with a probability below 1e-4."""
+        return bool(self.over_noise[row] > _by_chance(int(self.known[row]), float(self.dof[row])))
 
 
-def _over_noise(mean: Floats, noise: Floats, known: NDArray[np.bool_]) -> float:
-    """Power that repeats over that of the noise beside it, mean over the detection lines that are known."""
-    if not known.any():
-        return 0.0
-    smooth = np.convolve(np.where(known, noise, 0.0), _SMOOTH, "same") / np.convolve(known * 1.0, _SMOOTH, "same")
-    return float(np.divide(mean, smooth, out=np.full(mean.shape, np.inf), where=smooth > 0)[known].mean())
+def _mean(rows: Floats) -> Floats:
+    return np.asarray(np.ascontiguousarray(rows).mean(axis=1, keepdims=True))
 
 
-def _share(over_noise: float) -> float:
+def _over_noise(mean: Floats, noise: Floats, known: NDArray[np.bool_]) -> Floats:
+    """Power that repeats over that of the noise beside it, mean over the detection lines that are known, (rows,)."""
+    smooth = _summed(np.where(known, noise, 0.0)) / _summed(known.astype(np.float64))
+    ratio = np.divide(mean, smooth, out=np.full(mean.shape, np.inf), where=smooth > 0)
+    if known.all():
+        return np.asarray(ratio.mean(axis=1))
+    return np.array([row[at].mean() if at.any() else 0.0 for row, at in zip(ratio, known)])
+
+
+def _summed(rows: Floats) -> Floats:
+    """Sum over five neighbouring detection lines, fewer at the ends."""
+    padded = np.pad(rows, ((0, 0), (_SMOOTH // 2, _SMOOTH // 2)))
+    shifted = (padded[:, at : at + rows.shape[1]] for at in range(_SMOOTH))
+    return np.asarray(sum(shifted, start=np.zeros_like(rows)))
+
+
+def _share(over_noise: Floats) -> Floats:
     """Significance of the repeating part: the square of its share of the total power, 0 … 1.
 
     Squared, so that noise that repeats by chance widens a bound by at most a few percent.
     """
-    return max(0.0, 1 - 1 / over_noise) ** 2 if over_noise > 0 else 0.0
+    return np.where(over_noise > 0, np.fmax(0.0, 1 - 1 / over_noise) ** 2, 0.0)
 
 
+@lru_cache(maxsize=1024)
 def _by_chance(known: int, dof: float) -> float:
     """What noise alone exceeds over itself with a probability of 1e-4: a quantile of the F distribution.
 
     Of as many detection lines as the noise is averaged over; the mean over more of them exceeds it less often.
     """
-    independent = 2 * min(known, _SMOOTH.size)
+    independent = 2 * min(known, _SMOOTH)
     return float(scipy.special.fdtri(independent, independent * dof, 1 - _CHANCE))

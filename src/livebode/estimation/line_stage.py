@@ -137,6 +137,7 @@ class LineStage(StatefulBase):
         channels: Sequence[Channel],
         repeating: Repeating | None = None,
         ripple: Floats | None = None,
+        aside: NDArray[np.bool_] | None = None,
     ) -> Responses:
         """Responses of consecutive spectra.
 
@@ -154,9 +155,13 @@ class LineStage(StatefulBase):
             Errors that repeat with the excitation, from the previous periods; None where there are no samples.
         ripple
             Largest power of a ripple that is added to the input, at each line, (rows, lines); None where none is known.
+        aside
+            Windows that do not enter the moments of later ones, (rows,); None for none.
         """
         with np.errstate(all="ignore"):  # an incomplete window has no defined value, so it becomes NaN
-            return self._responses(rows, place, centre, response_unit(channels, self._settings), repeating, ripple)
+            return self._responses(
+                rows, place, centre, response_unit(channels, self._settings), repeating, ripple, aside
+            )
 
     def _responses(
         self,
@@ -166,6 +171,7 @@ class LineStage(StatefulBase):
         unit: str,
         repeating: Repeating | None,
         ripple: Floats | None,
+        aside: NDArray[np.bool_] | None,
     ) -> Responses:
         s = self._settings
         spectrum = self._hann.combine(rows.spectrum, place) if self._hann else rows.spectrum
@@ -173,6 +179,8 @@ class LineStage(StatefulBase):
         pair, reference, powers = self._seen(signals)
         excited = self._excited(powers[0], rows.whole)
         usable = rows.clean & excited.any(axis=1)
+        if aside is not None:
+            usable &= ~aside
         series = int(place[0] // s.step - 1) % self._places if usable.size else 0
         moving = self._moves(series, centre, rows.sample) if usable.size else usable
         first = rows.sample - s.lines.window + 1

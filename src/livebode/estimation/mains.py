@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import gcd
 
 import numpy as np
@@ -62,12 +63,12 @@ class Mains:
         return bool(self._any.any())
 
     def seen(self, output: Floats) -> NDArray[np.bool_]:
-        """Lines that may contain hum, (lines,), by the power of the mean output at `bins`."""
+        """Lines that may contain hum, (rows, lines), by the power of the mean output at `bins`, (rows, bins)."""
         if not self.any:
-            return self._any
-        least = _MATTERS * output[self._excited.tones].max()
-        found = [bool((group.stand_out(output) & (output[group.tones] > least)).any()) for group in self._free]
-        return np.asarray((self.lines & np.array(found)[:, np.newaxis]).any(axis=0))
+            return np.zeros((len(output), self._any.size), dtype=np.bool_)
+        least = _MATTERS * output[:, self._excited.tones].max(axis=1, keepdims=True)
+        found = [(group.stand_out(output) & (output[:, group.tones] > least)).any(axis=1) for group in self._free]
+        return np.asarray((self.lines & np.array(found).T[:, :, np.newaxis]).any(axis=1))
 
     def alone(self, output: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """In a period without excitation: the power at each line, and whether it is that of a tone there.
@@ -77,6 +78,12 @@ class Mains:
         if not self.any:
             return np.zeros(self._any.size), self._any
         return output[self._excited.tones], self._any & self._excited.stand_out(output)
+
+
+@lru_cache(maxsize=64)
+def mains_of(lines: Lines) -> Mains:
+    """The Mains of these lines; several trackers of the same lines have the same one."""
+    return Mains(lines)
 
 
 class _Neighbours:
@@ -102,9 +109,9 @@ class _Neighbours:
         self.tones, self._beside = np.searchsorted(bins, self.tones), np.searchsorted(bins, self._beside)
 
     def stand_out(self, power: Floats) -> NDArray[np.bool_]:
-        """Bins whose power exceeds that of their neighbours by more than chance, (tones,)."""
-        level = np.where(self._usable, power[self._beside], 0.0).sum(axis=1) / self._count
-        return np.asarray(self._enough & (power[self.tones] > self._times * level))
+        """Bins whose power exceeds that of their neighbours by more than chance, (…, bins) to (…, tones)."""
+        level = np.where(self._usable, np.take(power, self._beside, axis=-1), 0.0).sum(axis=-1) / self._count
+        return np.asarray(self._enough & (power[..., self.tones] > self._times * level))
 
 
 def prominence(neighbours: int) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import ceil, log
 
@@ -111,6 +113,10 @@ class Moments:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.unbiased**2 / (two - 2 * three / one + (two / one) ** 2))
 
+    def rows(self, at: NDArray[np.int64]) -> Moments:
+        """Some of the rows."""
+        return Moments(*(np.take(part, at, axis=1) for part in (self.means, self.scatter, self.moment, self.weights)))
+
     def unexplained(self, ratio: Complex) -> Floats:
         """Σλ^i|δnum − ratio·δden|², shape (rows, lines)."""
         numerator, denominator, re, im = self.scatter
@@ -143,7 +149,7 @@ class PeriodMoments(StatefulBase):
 
     def __init__(self, places: int, lines: int, forgetting: float, *, own: bool) -> None:
         self._own = own
-        self._weights = Weights(forgetting)
+        self._weights = weights_of(forgetting)
         self._count = np.zeros(places, dtype=np.int64)
         self._means = np.zeros((_MEANS, places, lines))
         self._scatter = np.zeros((_SCATTER, places, lines))
@@ -178,6 +184,13 @@ class PeriodMoments(StatefulBase):
         moment = self._take_moment(parts, moment, share)
         return Moments(means, scatter, moment, self._weights.after(after if self._own else before))
 
+    def copy(self) -> PeriodMoments:
+        """The same moments, which are updated on their own."""
+        other = copy(self)
+        other._count, other._means = self._count.copy(), self._means.copy()
+        other._scatter, other._moment = self._scatter.copy(), self._moment.copy()
+        return other
+
     def _counts(self, parts: list[_Part], rows: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Number of windows added at the place of each row, without and with this row."""
         before, after = np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64)
@@ -190,15 +203,17 @@ class PeriodMoments(StatefulBase):
     def _take_means(self, parts: list[_Part], new: Floats, share: Floats) -> tuple[Floats, Floats]:
         kept, deviation = np.empty_like(new), np.zeros_like(new)
         column = share[:, np.newaxis]
+        unknown = bool(np.isnan(new[_NOISE]).any() or np.isnan(self._means[_NOISE]).any())
         for places, at, usable in parts:
             means = self._means[:, places]
             if not self._own:
                 kept[:, at] = means
             if usable:
-                known, now = means[_NOISE], new[_NOISE, at]
-                # A window with the start or the end of the excitation has no noise estimate: the mean is of the others.
-                means[_NOISE] = np.where(np.isnan(known), now, known)
-                new[_NOISE, at] = np.where(np.isnan(now) & (column[at] < 1), means[_NOISE], now)
+                if unknown:
+                    known, now = means[_NOISE], new[_NOISE, at]
+                    # A window with the start or end of the excitation has no noise estimate: the mean is of the others.
+                    means[_NOISE] = np.where(np.isnan(known), now, known)
+                    new[_NOISE, at] = np.where(np.isnan(now) & (column[at] < 1), means[_NOISE], now)
                 np.subtract(new[:, at], means, out=deviation[:, at])
                 means += deviation[:, at] * column[at]
             if self._own:
@@ -206,6 +221,11 @@ class PeriodMoments(StatefulBase):
         return kept, deviation
 
     def _take_scatter(self, parts: list[_Part], products: Floats) -> Floats:
+        if self._count.size == 1 and self._weights.forgetting == 1:
+            products[:, [not usable for *_, usable in parts]] = 0.0
+            sums = np.cumsum(np.concatenate([self._scatter, products], axis=1), axis=1)
+            self._scatter = sums[:, -1:].copy()
+            return sums[:, 1:] if self._own else sums[:, :-1]
         kept = np.empty_like(products)
         for places, at, usable in parts:
             scatter = self._scatter[:, places]
@@ -219,7 +239,7 @@ class PeriodMoments(StatefulBase):
         return kept
 
     def _take_moment(self, parts: list[_Part], moment: Floats, share: Floats) -> Floats:
-        if not self._own:
+        if not self._own or not (moment.any() or self._moment.any()):
             return moment
         kept = np.empty_like(moment)
         for places, at, usable in parts:
@@ -244,7 +264,7 @@ class Weights:
     def after(self, count: NDArray[np.int64]) -> Floats:
         """The three sums, shape (3, rows)."""
         if self.forgetting == 1:
-            return np.tile(count.astype(np.float64), (3, 1))
+            return np.repeat(count.astype(np.float64)[np.newaxis], 3, axis=0)
         return np.asarray(self._table[:, np.minimum(count, self._enough + 1)])
 
     def shares(self, count: NDArray[np.int64]) -> tuple[Floats, Floats]:
@@ -254,11 +274,14 @@ class Weights:
         return share, 1 - share
 
 
+weights_of = lru_cache(maxsize=4)(Weights)
 _Part = tuple[slice, slice, bool]
 
 
 def _parts(place: int, places: int, usable: NDArray[np.bool_]) -> list[_Part]:
     """Stretches of rows that lie in one period and are all usable or all not: their places, their rows, and which."""
+    if places == 1:
+        return [(slice(0, 1), slice(at, at + 1), bool(used)) for at, used in enumerate(usable)]
     rows = np.arange(1, usable.size)
     cut = (np.diff(usable.view(np.int8)) != 0) | ((place + rows) % places == 0)
     edges = [0, *(rows[cut]).tolist(), usable.size]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from livebode.core import Event, Lines, Stage, StatefulBase
 from livebode.core.errors.signal import ANY_EXCITATION
 from livebode.estimation.bounds import power
+from livebode.estimation.detection import times
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -21,6 +22,7 @@ _OF_DIFFERENCES = (
     2 / 3
 )  # degrees of freedom that differences of neighbours have of those of a scatter (von Neumann 1941)
 _FORGETTING = 0.95  # of a window relative to the next one: about forty windows
+_KEPT = np.array([[_FORGETTING], [_FORGETTING**2]])  # of Σλ^i and Σλ^2i
 # Mean share of a difference in the power of its two windows: 1 for noise, 1/(1 + SNR) for noise on what repeats.
 _SHARE, _SHARE_SPREAD = 0.5, 1.5
 # Radians by which the input turns from each window to the next, and standard deviations: the window is no whole period.
@@ -77,40 +79,37 @@ class Periodicity(StatefulBase):
         sample, centre_s
             Newest sample and time of the centre of each window, shape (rows,).
         """
-        places = len(self._before)
-        parts = [slice(at, at + places) for at in range(0, len(usable), places)]
-        found = np.concatenate(
-            [self._period(input_[part], usable[part]) for part in parts] or [np.zeros(input_.shape, dtype=np.bool_)]
-        )
+        found = self._found(input_, usable)
         self._counts[0] += np.count_nonzero(usable)
         self._counts[1] += np.count_nonzero(found, axis=0)
         self._report(found, sample, centre_s)
         return found
 
-    def _period(self, input_: Complex, usable: Flags) -> Flags:
-        """The same for at most one period."""
-        rows = slice(0, len(input_))
+    def _found(self, input_: Complex, usable: Flags) -> Flags:
+        rows, places = len(input_), len(self._before)
         now = np.where(usable[:, np.newaxis], input_, np.nan)
-        difference, every = power(now - self._before[rows]) / 2, power(now)
-        means, weights = self._means[:, rows], self._weights[:, rows]
-        scatter, repeating = means[0], means[1] - means[0]
-        count = (weights[0] ** 2 / weights[1])[:, np.newaxis]  # NaN before the first difference
-        dof = _OF_DIFFERENCES * count
-        explained = scatter * dof * (_CHANCE ** (-1 / dof) - 1)  # F(2, 2·dof)
-        most = (1 - 1 / (9 * dof) + _CHANCE_Z / (3 * np.sqrt(dof))) ** 3  # of chi², Wilson, Hilferty 1931
-        found = (2 * difference > _CHANGED * every) & (difference > explained) | (scatter > most * repeating)
-        found |= _turns(means, count) | (means[4] > _SHARE + _SHARE_SPREAD / np.sqrt(count))
-        product, both = now * self._before[rows].conj(), every + power(self._before[rows])
-        known = np.isfinite(difference[:, 0])
-        kept = np.array([_FORGETTING, _FORGETTING**2])
-        after = np.where(known, kept[:, np.newaxis] * weights + 1, weights)
+        every = np.concatenate([self._before, now])
+        before, self._before = every[:rows], every[rows:].copy()
+        difference, power_now, power_before = power(now - before) / 2, power(now), power(before)
+        product = times(now, before.conj())
+        both = power_now + power_before
         share = np.divide(2 * difference, both, out=np.zeros_like(both), where=both > 0)
-        new = np.stack([difference, every, product.real, product.imag, share])
-        means = np.where(known[:, np.newaxis], means + (new - means) / after[0, :, np.newaxis], means)
-        self._before = np.concatenate([self._before[rows.stop :], now])
-        self._means = np.concatenate([self._means[:, rows.stop :], means], axis=1)
-        self._weights = np.concatenate([self._weights[:, rows.stop :], after], axis=1)
-        return np.asarray(found & usable[:, np.newaxis])
+        new = np.stack([difference, power_now, product.real, product.imag, share])
+        known, means, weights = np.isfinite(difference[:, 0]), np.empty_like(new), np.empty((2, rows))
+        for first in range(0, rows, places):
+            part = slice(first, first + places)
+            means[:, part], weights[:, part] = self._take(new[:, part], known[part])
+        return _does_not_repeat(difference, power_now, means, weights) & usable[:, np.newaxis]
+
+    def _take(self, new: Floats, known: Flags) -> tuple[Floats, Floats]:
+        """Add at most one period to the means; return the means and weights without it."""
+        rows = len(known)
+        means, weights = self._means[:, :rows], self._weights[:, :rows]
+        after = np.where(known, _KEPT * weights + 1, weights)
+        next_means = np.where(known[:, np.newaxis], means + (new - means) / after[0, :, np.newaxis], means)
+        self._means = np.concatenate([self._means[:, rows:], next_means], axis=1)
+        self._weights = np.concatenate([self._weights[:, rows:], after], axis=1)
+        return means, weights
 
     def not_repeating_hz(self) -> list[float]:
         """Lines at which the input does not repeat in most of the windows."""
@@ -131,6 +130,17 @@ class Periodicity(StatefulBase):
         )
         details: dict[str, Any] = {"lines_hz": f[:_LISTED_MAX].tolist(), "window": self._lines.window}
         self._events.append(Event("not-periodic", int(sample[row]), float(centre_s[row]), message, details))
+
+
+def _does_not_repeat(difference: Floats, every: Floats, means: Floats, weights: Floats) -> Flags:
+    """Windows by half the power of their difference and their power, and by the means before them, (rows, lines)."""
+    scatter, repeating = means[0], means[1] - means[0]
+    count = (weights[0] ** 2 / weights[1])[:, np.newaxis]  # NaN before the first difference
+    dof = _OF_DIFFERENCES * count
+    explained = scatter * dof * (_CHANCE ** (-1 / dof) - 1)  # F(2, 2·dof)
+    most = (1 - 1 / (9 * dof) + _CHANCE_Z / (3 * np.sqrt(dof))) ** 3  # of chi², Wilson, Hilferty 1931
+    found = (2 * difference > _CHANGED * every) & (difference > explained) | (scatter > most * repeating)
+    return np.asarray(found | _turns(means, count) | (means[4] > _SHARE + _SHARE_SPREAD / np.sqrt(count)))
 
 
 def _turns(means: Floats, count: Floats) -> Flags:

@@ -172,6 +172,13 @@ class Settings:
                 )
 
     def _check_words(self) -> None:
+        if not isinstance(self.lines, Lines):
+            raise UsageError(
+                "unreadable",
+                f"lines={self.lines!r} are not Lines",
+                "give Lines.parse('20:140:20', rate_hz=…, window=…)",
+                argument="lines",
+            )
         for name, known in (
             ("estimator", (*ESTIMATORS, *NON_PERIODIC)),
             ("quantity", QUANTITIES),

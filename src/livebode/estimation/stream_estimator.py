@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Emit, Event, Responses, SignalError, Stateful, StatefulBase, ignore
+from livebode.estimation.set_aside import Integers
 from livebode.estimation.settings import Settings
 from livebode.estimation.stream_counters import StreamCounters
 
@@ -32,6 +33,8 @@ class Follower(Stateful, Protocol):
     def process(self, block: Block, emit: Emit = ignore, /) -> Responses: ...
 
     def finish(self, emit: Emit = ignore, /) -> Responses | None: ...
+
+    def set_aside(self, spans: Integers, /) -> None: ...
 
     def excitation_power(self) -> Floats: ...
 
@@ -73,6 +76,9 @@ class StreamEstimator(StatefulBase, Generic[W]):
     def repeatability(self) -> Floats:
         """Share of the reference's power that repeats from period to period, shape (lines,); see `LineStage`."""
         return self._lines.repeatability()
+
+    def set_aside(self, _spans: Integers, /) -> None:
+        """See `Tracker.set_aside`; no effect where a response does not depend on the windows before it."""
 
     def finish(self, _emit: Emit = ignore, /) -> Responses | None:
         """Remaining responses at the end: always an empty batch; None where no samples came."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Emit, Responses, Stage, StatefulBase, ignore
+from livebode.estimation.set_aside import Integers
 from livebode.estimation.tracker import Tracker
 
 
@@ -64,6 +65,11 @@ class SuccessiveTrackers(StatefulBase):
             self._trackers[self._now + 1].continue_levels(self._trackers[self._now])
             self._now += 1
         return self._trackers[self._now].process(block, emit)
+
+    def set_aside(self, spans: Integers, /) -> None:
+        """See `Tracker.set_aside`."""
+        for tracker in self._trackers:
+            tracker.set_aside(spans)
 
     def finish(self, emit: Emit = ignore, /) -> Responses | None:
         """An empty batch, None where no samples came; reports the distortion in all recordings."""

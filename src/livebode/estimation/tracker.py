@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.repeating import RepeatingErrors
 from livebode.estimation.ripple import RippleSpeed, ripple_power
+from livebode.estimation.set_aside import NOTHING, Integers, contains, positions
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
@@ -70,7 +72,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._speed = RippleSpeed(settings.lines) if settings.ripple else None
         self._repeating = RepeatingErrors(settings, self._events) if repeating else None
         self._watch = InputStatistics(self._events, window)
-        self._end = 0, 0.0
+        self._end, self._aside = (0, 0.0), NOTHING
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
@@ -100,6 +102,14 @@ class Tracker(StreamEstimator[InputStatistics]):
         """Numbers of samples, ascending: no window that contains one of them counts."""
         self._spectra.left_out = samples
 
+    def set_aside(self, spans: Integers, /) -> None:
+        """First sample of each stretch, and the one after its last, shape (spans, 2), as far as the next Block.
+
+        Windows with these samples have responses, but do not enter the noise and the verdicts of later windows: the
+        machine is off, or another one, there.
+        """
+        self._aside = spans
+
     def continue_levels(self, before: Tracker) -> None:
         """Add what `before` found of even and odd distortion in an earlier recording."""
         if self._repeating is not None and before._repeating is not None:
@@ -128,12 +138,17 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._watch.take(block, rows)
         centre_s = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
         centre = np.stack([centre_s, self._centre.at(schedule, rows.sample - block.start)])
-        repeating = None if self._repeating is None else self._repeating.process(channels, rows, schedule, block)
+        repeating = None
+        if self._repeating is not None:
+            at = positions(self._aside, block.start, block.stop)
+            judged = replace(rows, left_out=np.union1d(rows.left_out, at)) if at.size else rows
+            repeating = self._repeating.process(channels, judged, schedule, block)
         place = (rows.sample + 1) % s.lines.window
         ripple = None
         if self._speed is not None:
             ripple = ripple_power(s.ripple, s.lines, self._speed.at(schedule, rows.sample - block.start))
-        responses = self._lines.process(rows, place, centre, block.channels, repeating, ripple)
+        aside = contains(self._aside, rows.sample - s.lines.window + 1, rows.sample) if len(self._aside) else None
+        responses = self._lines.process(rows, place, centre, block.channels, repeating, ripple, aside)
         self._nothing = responses[0:0]
         self._end = block.stop - 1, block.origin_s + (block.stop - 1) / block.rate_hz
         hand_over(self._events, emit)

@@ -8,7 +8,7 @@ import numpy as np
 import scipy  # its parts are loaded when they are first used
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import SignalError, UsageError
+from livebode.core import Block, SignalError, UsageError
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ _PROMINENT = 10.0
 _STRAIGHT = 1e-12  # of the largest sample: the rounding of a ramp in double precision
 
 
-def checked(samples: ArrayLike, name: str) -> Floats:
+def checked(samples: ArrayLike | Block, name: str) -> Floats:
     """The recording as float64, shape (samples,), NaN where it is not finite.
 
     Raises
@@ -33,6 +33,14 @@ def checked(samples: ArrayLike, name: str) -> Floats:
     LivebodeError
         If it is not one-dimensional, empty, without a finite sample, or constant.
     """
+    if isinstance(samples, Block):
+        names = ", ".join(samples.names)
+        raise UsageError(
+            "wrong-shape",
+            f"the {name} is a Block with the channels {names}",
+            f"give the samples of one: block[{samples.names[0]!r}]",
+            argument=name,
+        )
     try:
         x = np.array(samples, dtype=np.float64)
     except (TypeError, ValueError):

@@ -228,7 +228,7 @@ def _no_line(period: int, periods: int) -> SignalError:
 
 def _checked_together(excitation: ArrayLike, rate_hz: float, output: ArrayLike | None) -> tuple[Floats, Floats | None]:
     given = checked(excitation, "excitation")
-    if not (np.isfinite(rate_hz) and rate_hz > 0):
+    if not (isinstance(rate_hz, (int, float, np.number)) and np.isfinite(rate_hz) and rate_hz > 0):
         raise UsageError(
             "out-of-range",
             f"{rate_hz=} is not a positive number of samples per second",

@@ -16,6 +16,7 @@ _REMEMBERED = 16  # periods in the expected one: a drifting clock is followed an
 _CLEAR = 16.0**2
 _CONFIRMED = 2  # consecutive periods with the same jump
 _ROUNDING = 1e-6  # of a period's energy
+_UNCHANGED = 1e-12  # of a period's energy: a shift by a whole period of all its lines differs only by rounding
 _STRANGE, _STRANGE_MAX = 4.0, 3  # times the noise, and periods in a row
 _AGREES = (
     1 / 8
@@ -100,7 +101,8 @@ class _Search:
             gain = 2 * (agreement[best] - agreement[shift % self._period])
             rest = self._energy[m] + own[0] - 2 * agreement[best]
             fits = rest <= self._noise * 2 + _AGREES * energy
-            clear = gain > energy / 2 and energy > _CLEAR * self._noise / self._period
+            least = max(_CLEAR * self._noise / self._period, _UNCHANGED * self._energy[m])
+            clear = gain > energy / 2 and energy > least
             if not here or not fits or not clear or (leap and here != leap):
                 return 0
             leap = here

@@ -21,9 +21,9 @@ def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] 
     """Write responses in long form, part by part.
 
     Columns: ``time [s]``, ``schedule``, ``frequency [Hz]``, ``re``, ``im``, ``magnitude [dB]``, ``phase [deg]``,
-    ``sigma``, ``dof``, ``coherence``, ``valid`` (1 or 0), ``first``, ``sample``; re, im and sigma with the
-    response's unit in brackets, where it has one. A number is the shortest decimal that gives the same double; an
-    unknown value is ``nan``.
+    ``sigma``, ``dof``, ``coherence``, ``valid`` (1 or 0), ``first``, ``sample``, ``ready`` (1 or 0); re, im and sigma
+    with the response's unit in brackets, where it has one. A number is the shortest decimal that gives the same double;
+    an unknown value is ``nan``.
 
     Raises
     ------
@@ -57,7 +57,18 @@ def begin(file: BinaryIO, header: list[str], schema: pa.Schema) -> CSVWriter:
 def _header(unit: str) -> list[str]:
     of = f" [{unit}]" if unit else ""
     complexes = [f"re{of}", f"im{of}", "magnitude [dB]", "phase [deg]", f"sigma{of}"]
-    return ["time [s]", "schedule", "frequency [Hz]", *complexes, "dof", "coherence", "valid", "first", "sample"]
+    return [
+        "time [s]",
+        "schedule",
+        "frequency [Hz]",
+        *complexes,
+        "dof",
+        "coherence",
+        "valid",
+        "first",
+        "sample",
+        "ready",
+    ]
 
 
 def _as_batch(part: Responses) -> pa.RecordBatch:
@@ -79,5 +90,6 @@ def _as_batch(part: Responses) -> pa.RecordBatch:
         "valid": part.valid.ravel().astype(np.int8),
         "first": np.repeat(part.first, lines),
         "sample": np.repeat(part.sample, lines),
+        "ready": np.repeat(part.ready.astype(np.int8), lines),
     }
     return pa.RecordBatch.from_arrays([from_numpy(c) for c in columns.values()], names=list(columns))

@@ -20,7 +20,7 @@ def write_mat(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
 
     Fields: ``H`` (1, 1, lines, responses) complex and ``w`` (lines, 1) in rad/s, for `frd(H, w)`;
     ``sigma``, ``coherence`` and ``valid`` (lines, responses); ``f_hz`` (lines, 1); ``time_s``, ``schedule``,
-    ``dof``, ``first``, ``sample`` (1, responses); ``Ts`` in seconds, ``window``, ``quantity``, ``unit``, and
+    ``dof``, ``first``, ``sample``, ``ready`` (1, responses); ``Ts`` in seconds, ``window``, ``quantity``, ``unit``, and
     ``run``, run.json as text. A single response has only its valid lines; several have NaN at invalid lines.
 
     Raises
@@ -43,7 +43,7 @@ def _struct(responses: Responses) -> dict[str, Any]:
     kept = responses.valid[0] if len(responses) == 1 else np.ones(len(lines), dtype=bool)
     frequency_hz = lines.frequency_hz[kept]
     over_lines = {name: getattr(responses, name).T[kept] for name in ("sigma", "coherence", "valid")}
-    over_time = {name: getattr(responses, name)[np.newaxis] for name in ("time_s", "schedule", "dof")}
+    over_time = {name: getattr(responses, name)[np.newaxis] for name in ("time_s", "schedule", "dof", "ready")}
     # MATLAB counts in doubles; with int64, every sum would become int64.
     samples = {name: getattr(responses, name)[np.newaxis].astype(np.float64) for name in ("first", "sample")}
     return {

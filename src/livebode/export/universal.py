@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import ExtraError, Response, Responses, SignalError
+from livebode.core import Response, Responses, SignalError
+from livebode.core.installing import not_installed
 from livebode.export.result import WriteResult
 
 _LABEL, _ID = 20, 80  # longest unit and line of text in the format
@@ -42,9 +43,7 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
     try:
         import pyuff
     except ImportError:
-        raise ExtraError(
-            "not-installed", "pyuff is not installed", "pip install 'livebode[uff]'", package="pyuff", extra="uff"
-        ) from None
+        raise not_installed("pyuff is not installed", package="pyuff", extra="uff") from None
     functions = left_out = 0
     with path.open("wb") as file, TemporaryDirectory(prefix=f"{path.name}-", dir=path.parent) as folder:
         # pyuff reads the file again after each set that it appends; sets can simply be concatenated.

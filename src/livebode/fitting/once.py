@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import ExtraError, FitError, Parameters, Response, Responses
+from livebode.core import FitError, Parameters, Response, Responses
+from livebode.core.installing import not_installed
 from livebode.fitting.competing import Allowed, Competitor, compete, competitor, mixed, positive
 from livebode.fitting.extended import WORDS
 from livebode.fitting.fitter import Fitter
@@ -181,13 +182,7 @@ class Fit:
         try:
             import control
         except ImportError:
-            raise ExtraError(
-                "not-installed",
-                "python-control is not installed",
-                "pip install 'livebode[control]'",
-                package="control",
-                extra="control",
-            ) from None
+            raise not_installed("python-control is not installed", package="control", extra="control") from None
         transfer = self.model.continuous(values)
         if discrete:
             late = float(values[self.model.names.index(DELAY)]) if DELAY in self.model.names else 0.0

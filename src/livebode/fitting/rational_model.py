@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import ExtraError, Parameters
+from livebode.core import Parameters
+from livebode.core.installing import not_installed
 from livebode.fitting.hold import to_continuous
 from livebode.fitting.transfer import Transfer
 
@@ -44,13 +45,7 @@ class Rational:
         try:
             import control
         except ImportError:
-            raise ExtraError(
-                "not-installed",
-                "python-control is not installed",
-                "pip install 'livebode[control]'",
-                package="control",
-                extra="control",
-            ) from None
+            raise not_installed("python-control is not installed", package="control", extra="control") from None
         return control.tf(self.numerator, self.denominator, 1 / self.rate_hz)
 
 

@@ -25,8 +25,8 @@ def in_language(language: str | Catalogue) -> Iterator[None]:
     """Within, and in this thread only, sentences are in this language, given by its code or as a catalogue.
 
     >>> with in_language("de"):
-    ...     tr("Report of a run"), number(1234.5, ",.1f")
-    ('Bericht eines Laufs', '1.234,5')
+    ...     tr("Findings"), number(1234.5, ",.1f")
+    ('Befunde', '1.234,5')
     """
     before = _USED.set(language if isinstance(language, Catalogue) else catalogue(language))
     try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from livebode.monitoring.ripple import Ripple
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.table import ScheduleTable
 from livebode.motion import MovingModel, PositionCurve
+from livebode.version import __version__
 
 ROLES = ("output", "input", "excitation", "schedule")
 
@@ -86,7 +86,7 @@ def _plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "format": _FORMAT,
         "version": _VERSION,
-        "livebode": version("livebode"),
+        "livebode": __version__,
         "runs": list(baseline["runs"]),
         "lines": {"bins": lines.bins, "quiet": lines.quiet, "window": lines.window, "rate_hz": lines.rate_hz},
         "hop": baseline["hop"],

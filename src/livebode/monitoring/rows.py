@@ -66,9 +66,9 @@ class NonOverlappingWindows(StatefulBase):
         self._sample, self._schedule = -2 * apart, np.nan  # no row is so far after it
 
     def of_responses(self, responses: Responses) -> WindowRows:
-        """Rows of complex values at the lines."""
+        """Rows of complex values at the lines; of a machine that was not ready, none is judged."""
         use = self._chosen(responses.sample)
-        ok = np.all(responses.valid[use] & np.isfinite(responses.sigma[use]), axis=1)
+        ok = np.all(responses.valid[use] & np.isfinite(responses.sigma[use]), axis=1) & responses.ready[use]
         return self._rows(
             responses.value[use], responses.sigma[use] ** 2, responses.schedule[use], responses.time_s[use],
             responses.sample[use], ok,

@@ -40,7 +40,7 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[WindowRows], ove
             "too-few-windows",
             f"the runs contain {windows} windows with valid {what} that do not overlap, less than the "
             f"{3 * WINDOWS_MIN} that a baseline needs",
-            "give longer runs",
+            "give longer runs, or more of them",
             quantity=what,
             windows=windows,
             windows_min=3 * WINDOWS_MIN,
@@ -54,8 +54,9 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[WindowRows], ove
     if not np.any(table.count >= WINDOWS_MIN):
         raise BaselineError(
             "too-few-windows",
-            f"no bin of the schedule has {WINDOWS_MIN} windows of {what}",
-            "give longer runs over the whole travel",
+            f"a baseline needs {WINDOWS_MIN} windows of {what} in a bin of the schedule, and no bin has more than "
+            f"{int(table.count.max())}",
+            "give longer runs over the whole travel, or more of them",
             quantity=what,
             windows_min=WINDOWS_MIN,
         )

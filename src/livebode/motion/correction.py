@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, Stage, StatefulBase, hand_over, ignore
 from livebode.estimation import Settings, Tracker
+from livebode.estimation.set_aside import NOTHING, contains
 from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, RecentSamples
 from livebode.motion.drive import drive_of
@@ -134,7 +135,7 @@ class MotionCorrection(StatefulBase):
         self._scatter = Scatter(settings)
         self._standstill = StandstillDetector(settings, self._events)
         self._ripple = RippleMonitor(settings)
-        self._from = 0
+        self._from, self._aside = 0, NOTHING
         self._parts: dict[str, StatefulBase] = {
             "tracker": self._tracker,
             "recorded": self._recorded,
@@ -202,6 +203,11 @@ class MotionCorrection(StatefulBase):
         hand_over(self._events, emit)
         return Responses.join(done) if done else tracked[0:0]
 
+    def set_aside(self, spans: NDArray[np.int64], /) -> None:
+        """See `Tracker.set_aside`; a chunk with these samples is not remembered."""
+        self._aside = spans
+        self._tracker.set_aside(spans)
+
     def finish(self, emit: Emit = ignore) -> Responses:
         """Responses of the remaining samples, fitted as a short chunk; the next Block starts a new chunk."""
         if not self._recorded:
@@ -252,12 +258,15 @@ class MotionCorrection(StatefulBase):
                 now = self._learner.completed(tracked, chunk, replay, now)
         left = without(now.left.velocity, held, chunk, self.settings.lines.window)
         seen, memory = self._scatter.then(left, chunk)
-        self._scatter.keep(memory)
+        aside = contains(self._aside, np.array([chunk.first]), np.array([chunk.stop - 1])).any()
+        if not aside:
+            self._scatter.keep(memory)
         seen = _rows_of(seen, tracked)
         value = self._value(now, tracked, chunk)
         valid = tracked.valid & seen.valid & np.isfinite(value)
         scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
-        self._ripple.take(left, chunk, now.model)
+        if not aside:
+            self._ripple.take(left, chunk, now.model)
         torque = chunk.torque(self.settings.lines, tracked.sample)
         with np.errstate(invalid="ignore", divide="ignore"):
             ripple = np.abs(value) * np.sqrt(self._ripple.power(chunk, tracked.sample)) / torque

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,14 +14,16 @@ LINES_MAX = 1000
 _POWER = 1e-3  # of the excitation's power, in the weakest bins, is left out
 
 
-def whole_stretch(signals: NDArray[np.float64], samples_min: int) -> slice:
-    """The longest stretch of samples that are finite in all signals, shape (signals, samples).
+def whole_stretch(signals: NDArray[np.float64], samples_min: int, seams: Sequence[int] = ()) -> slice:
+    """The longest stretch of samples that are finite in all signals, shape (signals, samples), and crosses no seam.
 
     SignalError if it has fewer samples than the minimum.
     """
-    finite = np.isfinite(signals.sum(axis=0))
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]])))
-    starts, stops = edges[::2], edges[1::2]
+    finite = np.concatenate([[False], np.isfinite(signals.sum(axis=0)), [False]])
+    cut = np.diff(finite)
+    cut[[seam for seam in seams if seam < cut.size]] = True
+    starts = np.flatnonzero(cut & finite[1:])
+    stops = np.flatnonzero(cut & finite[:-1])
     longest = int(np.argmax(stops - starts)) if starts.size else -1
     samples = int(stops[longest] - starts[longest]) if starts.size else 0
     if samples < samples_min:

@@ -118,8 +118,8 @@ def _nonperiodic_settings(axis: Axis, log: Log) -> Settings:
             key="signals.excitation",
         )
     names = list(dict.fromkeys(name for name in (reference, signals.input, signals.output) if name))
-    samples = beginnings(log, names, SEARCHED)
-    stretch = whole_stretch(samples, windows * (WINDOW_MIN if window == "auto" else window))
+    samples, seams = _joined(log, names, SEARCHED)
+    stretch = whole_stretch(samples, windows * (WINDOW_MIN if window == "auto" else window), seams)
     if window == "auto":
         window = (stretch.stop - stretch.start) // windows
         hop = axis.tracking.hop or windows * window
@@ -230,15 +230,22 @@ def beginning(log: Log, channel: str, samples: int = SEARCHED) -> np.ndarray:
 
 def beginnings(log: RecordedSource, channels: Sequence[str], samples: int) -> np.ndarray:
     """The same of several channels, shape (channels, samples)."""
+    return _joined(log, channels, samples)[0]
+
+
+def _joined(log: RecordedSource, channels: Sequence[str], samples: int) -> tuple[np.ndarray, list[int]]:
+    """The same, and the places of gaps in which no sample is missing, as between two records of one file."""
     parts: list[np.ndarray] = []
+    seams: list[int] = []
     size = 0
     for block in log.blocks(list(channels)):
         missing = block.start - log.first - size
+        seams += [size] * (block.gap and missing == 0)
         parts += [np.full((len(channels), missing), np.nan), np.array([block[name] for name in channels])]
         size = block.stop - log.first
         if size >= samples:
             break
-    return np.concatenate(parts, axis=1)[:, :samples] if parts else np.zeros((len(channels), 0))
+    return (np.concatenate(parts, axis=1)[:, :samples] if parts else np.zeros((len(channels), 0))), seams
 
 
 def roles_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[str]:
@@ -246,6 +253,13 @@ def roles_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[str]:
     names = {role: name for role in ROLES if (name := settings.channel(role))}
     samples = min(SEARCHED, max(_ROLES_SAMPLES, _ROLES_WINDOWS * settings.lines.window)) + 1
     channels = list(dict.fromkeys(names.values()))
-    rows = dict(zip(channels, beginnings(log, channels, samples)))
+    ready = axis.ready
+    data = beginnings(log, channels if ready is None else [*channels, ready.channel], samples)
+    if ready is not None:
+        holds = ready.holds(data[-1])
+        if not holds.any():
+            return []
+        data = np.where(holds, data[:-1], np.nan)
+    rows = dict(zip(channels, data))
     signals = {role: rows[name] for role, name in names.items()}
     return check_roles(signals, settings, accepted=axis.tracking.accept_roles)

@@ -30,6 +30,13 @@ def check_spectra(axis: Axis, layout: SpectraLayout, rate_hz: float) -> Lines:
             "remove it, or send samples",
             key="record.samples",
         )
+    if axis.signals.ready is not None:
+        raise ConfigError(
+            "needs-samples",
+            f"signals.ready = {axis.signals.ready!r} needs samples of the machine's state, but the drive sends spectra",
+            "remove it, or send samples",
+            key="signals.ready",
+        )
     if window not in ("auto", layout.window):
         raise _differs("lines.window", window, layout.window)
     if hop not in (None, layout.hop):

@@ -29,6 +29,7 @@ def check_uneven(axis: Axis) -> None:
         ),
         ("tracking.hann", tracking.hann, "a Hann window needs samples at regular times"),
         ("tracking.spikes", bool(tracking.spikes), "spikes are found in samples at regular times"),
+        ("signals.ready", axis.signals.ready is not None, "the machine's state is compared sample by sample"),
         ("tracking.dtype", tracking.dtype != "float64", "the least-squares fits are in float64"),
     ):
         if used:

@@ -10,8 +10,9 @@ import pyarrow as pa
 import pyarrow.dataset as ds
 from pyarrow.fs import LocalFileSystem
 
-from livebode.core import Event, ExtraError, UsageError
+from livebode.core import Event, UsageError
 from livebode.core.clock import RunClock, moment, moments_by
+from livebode.core.installing import not_installed
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, RunRecord
@@ -72,13 +73,7 @@ def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
     try:
         import duckdb
     except ImportError:
-        raise ExtraError(
-            "not-installed",
-            "DuckDB is not installed",
-            "pip install 'livebode[query]'",
-            package="duckdb",
-            extra="query",
-        ) from None
+        raise not_installed("DuckDB is not installed", package="duckdb", extra="query") from None
     with duckdb.connect(":memory:") as database:
         try:
             asked = {str(name).lower() for name in database.get_table_names(sql)} or set(_TABLES)

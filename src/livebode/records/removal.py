@@ -14,7 +14,7 @@ from livebode.records.summary_file import read_summary
 
 _SHOWN = 5
 _PARTIAL = r"\.partial(-[0-9a-f]{8})?"  # of livebode.core.files
-_REPLACED = r"(run|run-copy)\.json|report\.(html|pdf)|(bode|tracking|modes|margins|validation)\.png"
+_REPLACED = r"(run|run-copy|references|notes)\.json|report\.(html|pdf)|(bode|tracking|modes|margins|validation)\.png"
 _FILES = re.compile(rf"{_REPLACED}|\.({_REPLACED}){_PARTIAL}|(events|manifest)\.jsonl|(responses|parameters)\.parquet")
 _SEGMENT = re.compile(r"\d{6,9}\.parquet|\.\d{6,9}\.parquet\.partial")
 _JOURNAL = re.compile(r"\d{6,9}\.journal|\.\d{6,9}\.journal\.partial")

@@ -26,11 +26,15 @@ SCHEMA = pa.schema(
         ("weight_re", pa.float64()),
         ("weight_im", pa.float64()),
         ("distortion", pa.float64()),
+        ("ready", pa.bool_()),
     ]
 )
 """Columns: oldest and newest sample of the window, time of its centre (s), scheduling signal there, line (Hz), complex
 response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
-input, weight in a mean, distortion. NaN for missing values."""
+input, weight in a mean, distortion, whether the machine was ready in the whole window. NaN for missing values."""
+
+EARLIER = SCHEMA.names[:-1]
+"""Names of the columns of runs from before `signals.ready`: the machine was always ready."""
 
 RESPONSES = ColumnTable(SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
 
@@ -54,5 +58,6 @@ def as_batch(responses: Responses) -> pa.RecordBatch:
         responses.weight.real.ravel(),
         responses.weight.imag.ravel(),
         responses.distortion.ravel(),
+        np.repeat(responses.ready, lines),
     ]
     return pa.record_batch([from_numpy(c) for c in columns], schema=SCHEMA)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from math import nan
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ from livebode.core.clock import RunClock
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import StoredTable
-from livebode.records.response_table import SCHEMA
+from livebode.records.response_table import EARLIER, SCHEMA
 from livebode.records.segments import reading
 from livebode.records.segments.damage import KIND
 from livebode.records.segments.manifest import Manifest, Segment
@@ -86,7 +87,7 @@ class RunRecord:
 
     @classmethod
     def open(
-        cls, path: Path, on_damage: Callable[[Event], None] | None = None, *, output_only: bool = False
+        cls, path: str | PathLike[str], on_damage: Callable[[Event], None] | None = None, *, output_only: bool = False
     ) -> RunRecord:
         """The run in this directory; with `output_only` also one without responses, of which `lines` raises KeyError.
 
@@ -97,6 +98,7 @@ class RunRecord:
         GridError
             If the lines in run.json are not a valid grid.
         """
+        path = Path(path)
         summary, damaged = read_summary(path)
         run = cls(path, summary, on_damage=on_damage)
         if wrong := what_is_wrong(summary):
@@ -175,11 +177,15 @@ class RunRecord:
         return self._in_parts(self.tables("responses", size_bytes_max))
 
     def steady_batches(self) -> Iterator[Responses]:
-        """The same without a transient at the start of a live run; averaged responses are all included."""
+        """Those of a machine that was ready, without a transient at the start of a live run.
+
+        Averaged responses are all included.
+        """
         left_out = int(self.summary.get("left_out_samples") or 0)
         averages = (self.summary.get("configuration", {}).get("tracking") or {}).get("average")
         for part in self.batches():
-            yield part if averages or not left_out else part[np.flatnonzero(part.first >= left_out)]
+            steady = part.ready & (part.first >= left_out) if left_out and not averages else part.ready
+            yield part if steady.all() else part[np.flatnonzero(steady)]
 
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """Responses with an effective time in this span, including its ends, in parts; other segments are not read."""
@@ -191,7 +197,7 @@ class RunRecord:
         lines = self.lines
         rest: pa.Table | None = None
         for part in tables:
-            if part.schema.names != SCHEMA.names:
+            if part.schema.names not in (SCHEMA.names, EARLIER):
                 raise RecordError(
                     "unexpected-content",
                     f"the responses in {str(self.path)!r} have unexpected columns",
@@ -306,7 +312,7 @@ class RunRecord:
         per_line = {name: column[name] for name in PER_LINE if name in column}
         per_line["weight"] = np.empty(shape, dtype=np.complex128)
         per_line["weight"].real, per_line["weight"].imag = column["weight_re"], column["weight_im"]
-        per_row = {name: column[name][:, 0] for name in PER_RESPONSE}
+        per_row = {name: column[name][:, 0] for name in PER_RESPONSE if name in column}
         named = {"quantity": self.found["quantity"], "unit": self.found["unit"]}
         return Responses(lines=lines, value=value, **per_line, **per_row, **named)
 

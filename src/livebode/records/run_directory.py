@@ -19,6 +19,7 @@ from livebode.records.piece import parts_of
 from livebode.records.removal import check_removable, remove
 from livebode.records.response_table import RESPONSES, as_batch
 from livebode.records.segments.json_lines import to_line
+from livebode.records.segments.lock import Lock
 from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table_file import TableFile
 
@@ -135,6 +136,4 @@ class RunDirectory:
             )
         check_removable(self.path)
         if segments:
-            from livebode.records.segments.lock import Lock  # needs a POSIX system, as the run that wrote them did
-
             Lock(self.path).release()

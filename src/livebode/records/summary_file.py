@@ -8,18 +8,21 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from livebode.core import RecordError
+from livebode.core import RecordError, nearest_name
 from livebode.records.inside import read_bytes
 from livebode.records.plain_json import to_json
 from livebode.records.versions import check_version, format_of
 
 RUN, COPY = "run.json", "run-copy.json"
 _SIZE_BYTES_MAX = 64 << 20
+_LISTED_MAX = 20  # runs beside a missing one
 _CHECKSUM = re.compile(r',\n  "crc32": "([0-9a-f]{8})"\n\}\n?\Z')
 
 
-def to_document(summary: dict[str, Any]) -> bytes:
-    """The summary as JSON over several lines; its last key is the CRC-32 of the text without that key.
+def to_document(summary: dict[str, Any], name: str = "run") -> bytes:
+    """A document as JSON over several lines; its last key is the CRC-32 of the text without that key.
+
+    `name` is that of its format.
 
     >>> print(to_document({"found": {}}).decode(), end="")
     {
@@ -29,7 +32,7 @@ def to_document(summary: dict[str, Any]) -> bytes:
       "crc32": "d477367d"
     }
     """
-    text = to_json(format_of("run") | summary, indent=2)
+    text = to_json(format_of(name) | summary, indent=2)
     return f'{text[:-2]},\n  "crc32": "{zlib.crc32(text.encode()):08x}"\n}}\n'.encode()
 
 
@@ -71,12 +74,7 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
     try:
         return _read(run, RUN), ""
     except (FileNotFoundError, NotADirectoryError):
-        raise RecordError(
-            "not-a-run",
-            f"{str(run)!r} is not the directory of a run: it has no run.json",
-            "give the directory of a run",
-            path=str(run),
-        ) from None
+        raise _not_a_run(run) from None
     except RecordError as error:
         first = error
     except OSError as error:
@@ -88,6 +86,18 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
         return _read(run, COPY), f"{first.message}; its copy {COPY} is read instead"
     except (OSError, RecordError):
         raise first from None
+
+
+def _not_a_run(run: Path) -> RecordError:
+    message, remedy = f"{str(run)!r} is not the directory of a run: it has no run.json", "give the directory of a run"
+    if run.is_file():
+        message = f"{str(run)!r} is a file, not the directory of a run"
+    elif not run.exists():
+        message = f"there is no directory {str(run)!r}"
+        runs = [found.parent.name for found in sorted(run.parent.glob(f"*/{RUN}"))[:_LISTED_MAX]]
+        if runs:
+            remedy = nearest_name(run.name, runs, f"Runs in {run.parent}")
+    return RecordError("not-a-run", message, remedy, path=str(run))
 
 
 def _read(run: Path, name: str) -> dict[str, Any]:

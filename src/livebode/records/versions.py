@@ -7,8 +7,8 @@ from typing import Any
 
 from livebode.core import RecordError
 
-VERSIONS = {"run": 1, "manifest": 1, "journal": 1}
-"""Newest readable version of the layout of a run directory, of manifest.jsonl and of a journal."""
+VERSIONS = {"run": 1, "manifest": 1, "journal": 1, "references": 1, "notes": 1}
+"""Newest readable versions: layout of a run directory, manifest.jsonl, journal, references.json and notes.json."""
 
 
 def format_of(name: str) -> dict[str, Any]:

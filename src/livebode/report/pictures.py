@@ -36,8 +36,9 @@ def save_pictures(
     from livebode.report.bode import bode_figure
     from livebode.report.tracking import tracking_figure
 
+    assessed = responses[responses.ready] if responses.ready.any() else responses
     pictures = {
-        "bode.png": bode_figure(responses, title=title, names=names, fitted=fitted, dark=dark),
+        "bode.png": bode_figure(assessed, title=title, names=names, fitted=fitted, dark=dark),
         "tracking.png": tracking_figure(responses, title=title, schedule_name=schedule_name, dark=dark),
     }
     return [save(figure, Path(directory) / name, style(dark)) for name, figure in pictures.items()]

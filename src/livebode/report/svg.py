@@ -6,6 +6,8 @@ import io
 import re
 from typing import TYPE_CHECKING
 
+from livebode.core.document import Document
+from livebode.report.figures import drawn
 from livebode.report.style import DARK, LIGHT, Style, drawing, quiet_about_letters
 
 if TYPE_CHECKING:
@@ -21,18 +23,26 @@ _COLOUR = re.compile(r"#[0-9a-f]{6}")
 _FONT = "'DejaVu Sans'"
 
 
-def inline_svg(figure: Figure, label: str, salt: str) -> str:
-    """The figure, drawn in the light look, as an element of a page.
+def pictures_svg(document: Document) -> tuple[str, ...]:
+    """The pictures of the document in the light look, each as one SVG that names nothing as another one does."""
+    return tuple(_svg(drawn(picture), f"p{i}") for i, picture in enumerate(document.pictures))
+
+
+def themed_svg(svg: str, label: str) -> str:
+    """A picture as an element of a page, whose colours are the variables of `variables`.
 
     Parameters
     ----------
-    figure
-        Drawn with `LIGHT`; its colours become the variables of `variables`.
+    svg
+        From `pictures_svg`.
     label
         Text alternative for screen readers; already escaped.
-    salt
-        Makes the names in it different from those of the other figures of the page.
     """
+    svg = _SIZE.sub(rf'<svg class="figure" viewBox="\1" role="img" aria-label="{_literal(label)}">', svg, count=1)
+    return _STYLE.sub(lambda found: _themed(found.group()), svg)
+
+
+def _svg(figure: Figure, salt: str) -> str:
     import matplotlib
 
     text = io.StringIO()
@@ -41,9 +51,7 @@ def inline_svg(figure: Figure, label: str, salt: str) -> str:
 
         draw_svg(figure, text)
     svg = _METADATA.sub("", _PROLOGUE.sub("", text.getvalue(), count=1), count=1)
-    svg = _SIZE.sub(rf'<svg class="figure" viewBox="\1" role="img" aria-label="{_literal(label)}">', svg, count=1)
-    svg = _NAMED.sub("<g>", svg)
-    return _STYLE.sub(lambda found: _themed(found.group()), svg)
+    return _NAMED.sub("<g>", svg)
 
 
 def variables(look: Style) -> str:

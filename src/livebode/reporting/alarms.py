@@ -16,7 +16,7 @@ _ACTIVE_MAX = 5
 def alarms(run: RunRecord, event_summary: EventSummary) -> tuple[Finding, ...]:
     """The summary of the monitoring, then the active alarms."""
     monitoring: dict[str, Any] = run.summary.get("monitoring", {})
-    if not monitoring:
+    if not monitoring or (run.finished and monitoring.get("baseline") is None):
         return (_so_far(run, event_summary),)
     tone: Tone = "open"
     active = bool(monitoring.get("standing"))
@@ -45,7 +45,7 @@ def _so_far(run: RunRecord, event_summary: EventSummary) -> Finding:
     """The changes so far, if run.json does not contain a summary yet."""
     if run.finished:
         return Finding(
-            "open", tr("Changes are not assessed without a baseline; `livebode learn` creates one from healthy runs.")
+            "open", tr("Changes are not assessed: the run was not compared with a baseline of the healthy machine.")
         )
     came, cleared = event_summary.count("change"), event_summary.count("change-cleared")
     if not came:

@@ -12,17 +12,21 @@ from typing import Any
 
 import numpy as np
 
+from livebode.analysis.averaged import Averaged
 from livebode.analysis.changes import Changes, QuantityChange, changes, percent
 from livebode.analysis.difference import ALPHA, Compared, Difference, compare
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core.clock import date_and_time
+from livebode.configuration.report_section import ReportSection
 from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
 from livebode.language import marked, number, recognised, tr, trn
 from livebode.records import RunRecord
 from livebode.records.grouped_events import event_counts
-from livebode.reporting.comparison_verdict import verdict
-from livebode.reporting.report_data import written
-from livebode.reporting.wording import BOUND_95, decibels, polar, signed, with_bound
+from livebode.reporting import first_page
+from livebode.reporting.comparison_verdict import detectable, verdict
+from livebode.reporting.first_page import header_of
+from livebode.reporting.limits import limits
+from livebode.reporting.report_data import read, written
+from livebode.reporting.wording import BOUND_95, decibels, pairs, polar, signed, with_bound
 
 _TONES = {**TONES, "ok": marked("no difference shown")}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40
@@ -84,25 +88,67 @@ class Comparison:
             "sentences": [finding.text for finding in self.sentences],
         }
 
-    def document(self, made: datetime) -> Document:
-        """The report."""
-        one, other = self.found.runs
-        title = tr("{before} and {after}", before=one.path.resolve().name, after=other.path.resolve().name)
-        rows = (
-            (tr("before"), str(one.path)), (tr("after"), str(other.path)),
-            (tr("before written"), written(one.path / "run.json")),
-            (tr("after written"), written(other.path / "run.json")),
-            (tr("responses"), " / ".join(number(a.count, ",") for a in self.found.averages)),
-            (tr("compared at"), _span(self.found)), (tr("report written"), date_and_time(made.timestamp())),
-        )  # fmt: skip
-        sections = [self._response(), self._places(), self._parameters(), self._events(), _settings(one, other)]
-        there = tuple(section for section in sections if section is not None)
-        return Document(
-            tr("Before and after"), title, rows, self.sentences, there, f"{title} · livebode",
-            tr("What changed"), _TONES,
-        )  # fmt: skip
+    def document(
+        self, made: datetime, *, header: ReportSection | None = None, appendix: bool = False
+    ) -> Document:  # fmt: skip
+        """The report.
 
-    def _response(self) -> Section:
+        Parameters
+        ----------
+        made
+            Time of the report.
+        header
+            The first page, and limits for the later run. Default: the [report] of that run.
+        appendix
+            Add the settings that differ.
+        """
+        one, other = self.found.runs
+        header = header_of(other.summary) if header is None else header
+        accepted = read(other.path, header=header).accepted if header.limits else ()
+        title = header.machine or tr("{before} and {after}", before=_name(one), after=_name(other))
+        sections = [
+            limits(accepted), self._response(), self._places(), self._parameters(), self._how(), self._events(),
+        ]  # fmt: skip
+        return Document(
+            kind=tr("Before and after"),
+            title=title,
+            facts=first_page.facts(header, title, self._facts(), made),
+            verdict=self.sentences,
+            sections=tuple(section for section in sections if section is not None),
+            foot=" · ".join(filter(None, (title, header.serial_number, header.company))),
+            heading=tr("What changed"),
+            tones=_TONES,
+            result=first_page.result(self.sentences, accepted),
+            picture=self._picture(),
+            signatures=first_page.signatures(header),
+            appendix=self._appendix() if appendix else (),
+            logo=first_page.logo_of(header),
+            paper=header.paper,
+            made=made,
+        )
+
+    def _appendix(self) -> tuple[Section, ...]:
+        absent = (
+            (self.changes.parameter_words, self.changes.parameters), (self.changes.margin_words, self.changes.margins),
+        )  # fmt: skip
+        parts = tuple(Paragraph(recognised(words)) for words, table in absent if words and not table)
+        paths = pairs([(tr("before"), str(self.found.runs[0].path)), (tr("after"), str(self.found.runs[1].path))])
+        found = (Section(tr("Details of the measurement"), (paths,)), _settings(*self.found.runs))
+        return (*found, Section(tr("Not in this report"), parts)) if parts else found
+
+    def _facts(self) -> list[tuple[str, str]]:
+        rows = [
+            (tr("before"), _name(self.found.runs[0])), (tr("after"), _name(self.found.runs[1])),
+            *((words, _measured(run, average)) for words, run, average in zip(
+                (tr("before measured"), tr("after measured")), self.found.runs, self.found.averages
+            )),
+            (tr("responses"), " / ".join(number(a.count, ",") for a in self.found.averages)),
+            (tr("compared at"), _span(self.found)),
+            (tr("smallest detectable change"), detectable(self.found.overall)),
+        ]  # fmt: skip
+        return [(name, value) for name, value in rows if value]
+
+    def _picture(self) -> Picture:
         d = self.found.overall
         how = tr("means of the runs")
         if self.found.places:
@@ -112,14 +158,26 @@ class Comparison:
             "lines together with 95 %; filled marks differ.",
             how=how, m=d.m,
         )  # fmt: skip
-        picture = Picture("comparison", {"before": d.before, "after": d.after, "ratio": d.ratio, "bound": d.bound,
-                                         "differs": d.differs}, caption)  # fmt: skip
+        data = {"before": d.before, "after": d.after, "ratio": d.ratio, "bound": d.bound, "differs": d.differs}
+        return Picture("comparison", data, caption)
+
+    def _how(self) -> Section:
+        words = tr(
+            "The means of both runs are compared. A change is reported only if chance does not explain it. "
+            "“Detectable” is the smallest change that this comparison finds with a probability of 95 %: a smaller one "
+            "may be there and not be seen."
+        )  # fmt: skip
+        return Section(tr("How it was compared"), (Paragraph(words), Paragraph(_how_tested(self.found.overall.m))))
+
+    def _response(self) -> Section:
+        d = self.found.overall
         radius = [r.bound(BOUND_95) for r in (d.before, d.after)]
         rows = [
             (
                 number(f, "g"), *polar(complex(d.before.value[i]), float(radius[0][i]))[:2],
                 *polar(complex(d.after.value[i]), float(radius[1][i]))[:2],
-                *polar(complex(d.ratio[i]), float(d.bound[i])), _p(d.p[i]), tr("yes") if d.differs[i] else tr("no"),
+                *polar(complex(d.ratio[i]), float(d.bound[i])), _seen(d.seen[i]), _p(d.p[i]),
+                tr("yes") if d.differs[i] else tr("no"),
             )
             for i, f in enumerate(d.before.lines.frequency_hz)
         ]  # fmt: skip
@@ -129,11 +187,11 @@ class Comparison:
         if step > 1:
             note = tr("Only some of the lines are shown, and all that differ.") + " " + note
         headings = (
-            "Hz", tr("before dB"), "±", tr("after dB"), "±", tr("ratio dB"), "±", tr("ratio °"), "±", "p",
-            tr("differs"),
+            "Hz", tr("before dB"), "±", tr("after dB"), "±", tr("ratio dB"), "±", tr("ratio °"), "±",
+            tr("detectable %"), "p", tr("differs"),
         )  # fmt: skip
-        table = Table(headings, tuple(shown), tuple(range(10)), note)
-        return Section(tr("Frequency response"), (picture, Paragraph(_how_tested(d.m)), table))
+        table = Table(headings, tuple(shown), tuple(range(11)), note)
+        return Section(tr("Frequency response"), (table,))
 
     def _places(self) -> Section | None:
         places = self.found.places
@@ -158,8 +216,8 @@ class Comparison:
         if found:
             left_out = len(found) - _PLACES_SHOWN
             note = trn(
-                "{n:,} more row not shown; --json prints all.",
-                "{n:,} more rows not shown; --json prints all.",
+                "{n:,} more row is not listed; the picture shows all.",
+                "{n:,} more rows are not listed; the picture shows all.",
                 left_out,
             )
             headings = (tr("place"), tr("direction"), "Hz", tr("ratio dB"), "±", tr("ratio °"), "±", "p")
@@ -167,23 +225,25 @@ class Comparison:
             parts.append(Table(headings, shown, tuple(range(2, 8)), note if left_out > 0 else ""))
         return Section(tr("By place"), tuple(parts))
 
-    def _parameters(self) -> Section:
+    def _parameters(self) -> Section | None:
+        if not (self.changes.parameters or self.changes.margins):
+            return None
         parts: list[Part] = []
         for words, table in (
             (self.changes.parameter_words, self.changes.parameters),
             (self.changes.margin_words, self.changes.margins),
         ):
-            parts += [Paragraph(recognised(words))] if words else []
             if table:
+                parts += [Paragraph(recognised(words))] if words else []
                 headings = (
                     "", tr("before"), "±", tr("after"), "±", tr("unit"), tr("change"), "±", tr("in %"),
-                    tr("significant"),
+                    tr("detectable %"), tr("significant"),
                 )  # fmt: skip
                 note = tr(
                     "± of before and after covers 95 % each; ± of the change covers the whole table together "
                     "(Bonferroni)."
                 )
-                parts.append(Table(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8), note))
+                parts.append(Table(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8, 9), note))
         return Section(tr("Parameters and margins"), tuple(parts))
 
     def _events(self) -> Section:
@@ -192,7 +252,9 @@ class Comparison:
         rows = tuple((recognised(kind), *(number(count[kind], ",") for count in counts)) for kind in kinds)
         parts: list[Part] = [Table((tr("kind"), tr("before"), tr("after")), rows, (1, 2))] if rows else []
         for run, when in zip(self.found.runs, (tr("Before"), tr("After"))):
-            message = run.summary.get("monitoring", {}).get("message", marked("changes are not assessed."))
+            monitoring = run.summary.get("monitoring", {})
+            judged = monitoring.get("baseline") is not None
+            message = monitoring["message"] if judged else marked("changes are not assessed.")
             parts.append(Paragraph(f"{when}: {recognised(message)}"))
         return Section(tr("Events"), tuple(parts))
 
@@ -234,14 +296,29 @@ def _row(c: QuantityChange) -> tuple[str, ...]:
     changed = with_bound(c.amount, c.bound)
     return (
         recognised(c.words), *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed,
-        number(percent(c, c.amount), "+.2g"), tr("yes") if c.significant else tr("no"),
+        number(percent(c, c.amount), "+.2g"), _seen(percent(c, c.seen) / 100), tr("yes") if c.significant else tr("no"),
     )  # fmt: skip
+
+
+def _seen(share: float) -> str:
+    """A detectable relative change in percent."""
+    return number(100 * share, ".2g") if isfinite(share) else "—"
+
+
+def _name(run: RunRecord) -> str:
+    return str(run.path.resolve().name)
+
+
+def _measured(run: RunRecord, average: Averaged) -> str:
+    """When a run was measured; of one without a clock, when it was written."""
+    return first_page.measured_at(run, average.spans_s[0]) or written(run.path / "run.json")
 
 
 def _plain_change(c: QuantityChange) -> dict[str, Any]:
     return {
         "name": c.name, "unit": c.unit, "before": c.before[0], "before_bound_95": c.before[1], "after": c.after[0],
-        "after_bound_95": c.after[1], "change": c.amount, "change_bound": c.bound, "significant": c.significant,
+        "after_bound_95": c.after[1], "change": c.amount, "change_bound": c.bound, "detectable": c.seen,
+        "significant": c.significant,
     }  # fmt: skip
 
 
@@ -252,7 +329,7 @@ def _lines(d: Difference) -> dict[str, Any]:
             "frequency_hz": float(f[i]), "ratio_db": decibels(abs(d.ratio[i])),
             "ratio_deg": float(np.degrees(np.angle(d.ratio[i]))), "ratio_bound": float(d.bound[i]),
             "p": float(d.p[i]), "differs": bool(d.differs[i]),
-            "ignored": bool(d.ignored[i]),
+            "ignored": bool(d.ignored[i]), "detectable": float(d.seen[i]),
         }
         for i in range(len(f))
     ]  # fmt: skip

@@ -101,13 +101,21 @@ def _by_place(places: tuple[ComparedPlace, ...]) -> Iterator[Finding]:
     yield Finding("ok", words)
 
 
+def detectable(d: Difference) -> str:
+    """The smallest detectable change of the response; empty if no line can be compared."""
+    return _sizes(d.seen[np.isfinite(d.p)]) if np.isfinite(d.p).any() else ""
+
+
 def _seen(found: Sequence[Difference]) -> str:
-    """The smallest detectable change: at every line and at the best line."""
-    seen = 100 * np.concatenate([d.seen[np.isfinite(d.p)] for d in found])
-    least, most = float(seen.min()), float(seen.max())
+    return tr("detectable: {sizes}", sizes=_sizes(np.concatenate([d.seen[np.isfinite(d.p)] for d in found])))
+
+
+def _sizes(seen: NDArray[np.float64]) -> str:
+    """At every line and at the best line."""
+    least, most = 100 * float(seen.min()), 100 * float(seen.max())
     if most < 1.5 * least:
-        return tr("detectable: ≥ {most:.2g} %", most=most)
-    return tr("detectable: ≥ {most:.2g} % at every line, ≥ {least:.2g} % at the best line", most=most, least=least)
+        return tr("≥ {most:.2g} %", most=most)
+    return tr("≥ {most:.2g} % at every line, ≥ {least:.2g} % at the best line", most=most, least=least)
 
 
 def _parameters(table: tuple[QuantityChange, ...]) -> Iterator[Finding]:

@@ -15,7 +15,6 @@ from livebode.records.grouped_events import each_event, event_counts
 ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
 """Kinds that are listed individually; so are the events of the record itself."""
 _IN_FULL = 20  # of the first and of the newest events, each
-_LETTERS = 600
 
 
 @dataclass
@@ -75,7 +74,7 @@ class EventSummary:
         rows = tuple(
             (
                 recognised(name), number(k.count, ","), moment(k.first.time_s, 2), moment(k.newest.time_s, 2),
-                recognised(k.newest.message)[:_LETTERS],
+                recognised(k.newest.message),
             )
             for name, k in self.kinds.items()
         )  # fmt: skip
@@ -88,7 +87,5 @@ class EventSummary:
             "{n:,} events between them not shown; events.jsonl contains all.",
             self.left_out,
         )
-        in_full = tuple(
-            (moment(e.time_s, 2), recognised(e.kind), recognised(e.message)[:_LETTERS]) for e in self.in_full
-        )
+        in_full = tuple((moment(e.time_s, 2), recognised(e.kind), recognised(e.message)) for e in self.in_full)
         return grouped, Table((tr("time"), tr("kind"), tr("message")), in_full, note=note if self.left_out else "")

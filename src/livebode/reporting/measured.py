@@ -1,9 +1,10 @@
-"""How it was measured: source, signals, lines, window, estimator, loop."""
+"""How it was measured, in words; and its details for the appendix."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from livebode.core.clock import moment
 from livebode.core.document import Paragraph, Section
 from livebode.language import listed, marked, number, recognised, tr, trn
 from livebode.reporting.report_data import ReportData, recordings
@@ -40,13 +41,12 @@ def how(of: ReportData) -> Section:
     window_s = found["window"] / found["rate_hz"]
     noise = found.get("judged", {}).get("noise", tracking.get("noise", ""))
     f = of.run.lines.frequency_hz
-    source = of.configuration.get("source", {})
     rows = [
-        (tr("source"), listed(recordings(source)) or str(source.get("url") or "")),
-        (tr("format"), str(found.get("format", ""))),
         *((recognised(_ROLES[role]), of.channels[role]) for role in _ROLES if role in of.channels),
         (tr("rate"), f"{number(found['rate_hz'], 'g')} Hz" + _rate_from(found)),
         (tr("samples"), listed((number(of.samples, ","), duration(of.samples / found["rate_hz"])))),
+        (tr("run's clock"), " … ".join(moment(at_s, 2) for at_s in of.of.spans_s)),
+        (tr("responses"), number(of.of.count, ",")),
         (tr("quantity"), _quantity(found)),
         (tr("lines"), trn(
             "{n:,} line, {low:g} … {high:g} Hz on a grid of {step:.4g} Hz",
@@ -61,14 +61,39 @@ def how(of: ReportData) -> Section:
         (tr("estimator"), recognised(_ESTIMATOR.get(tracking.get("estimator", ""), ""))),
         (tr("bounds from"), recognised(_NOISE.get(noise, ""))),
         (tr("options"), listed(_options(tracking, of))),
-        (tr("loop"), "; ".join(_loop(of.configuration.get("loop", {})))),
     ]  # fmt: skip
     bounds = tr(
         "The effective time of a response is the centre of its window. A bound contains the true response with the "
         "stated probability. It covers noise, and distortion where it is detected; "
         "it does not cover a systematic error that the signals do not show."
     )
-    return Section(tr("How it was measured"), (pairs(rows), Paragraph(bounds)))
+    return Section(tr("How it was measured"), (Paragraph(_in_words(of)), pairs(rows), Paragraph(bounds)))
+
+
+def _in_words(of: ReportData) -> str:
+    if "excitation" in of.channels:
+        first = tr(
+            "A small excitation was added in the control loop while the machine was in operation. From the signals, "
+            "livebode computed how the machine responds at each excited frequency (line)."
+        )
+    else:
+        first = tr("From the signals of the machine, livebode computed how it responds at each frequency (line).")
+    return first + " " + tr(
+        "Each response is computed from one window of the signals. The report shows the mean of all responses. ± is "
+        "the bound within which the true value is with a probability of 95 %, unless another one is stated."
+    )  # fmt: skip
+
+
+def details(of: ReportData) -> Section:
+    """Where the signals came from, and the described controllers with the keys of the configuration."""
+    source = of.configuration.get("source", {})
+    rows = [
+        (tr("run"), str(of.run.path.resolve())),
+        (tr("source"), listed(recordings(source)) or str(source.get("url") or "")),
+        (tr("format"), str(of.run.found.get("format", ""))),
+        (tr("loop"), "; ".join(_loop(of.configuration.get("loop", {})))),
+    ]
+    return Section(tr("Details of the measurement"), (pairs(rows),))
 
 
 def _options(tracking: dict[str, Any], of: ReportData) -> list[str]:

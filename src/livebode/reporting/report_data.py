@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from livebode.analysis.acceptance import Accepted, LimitEvidence, accepted
 from livebode.analysis.averaged import Averaged, averaged
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import LoopReport, loop_report
-from livebode.analysis.parameter_track import Track, tracks
+from livebode.analysis.parameter_track import MARGINS, Track, tracks
 from livebode.configuration.axis import FitSection, LoopSection
 from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.report_section import ReportSection
 from livebode.core import LivebodeError, Responses
 from livebode.core.clock import date_and_time
 from livebode.fitting import Fit
@@ -54,6 +57,8 @@ class ReportData:
         Its events.
     judged
         The validation, if requested.
+    header
+        The first page and the limits.
     """
 
     run: RunRecord
@@ -66,6 +71,7 @@ class ReportData:
     tracks: dict[str, Track]
     event_summary: EventSummary
     judged: Judged | None = None
+    header: ReportSection = field(default_factory=ReportSection)
 
     @property
     def title(self) -> str:
@@ -78,6 +84,13 @@ class ReportData:
         if "demo" in self.configuration:
             name = tr("simulated belt axis")
         return str(name or self.run.path.name)
+
+    @cached_property
+    def accepted(self) -> tuple[Accepted, ...]:
+        """The results of the limits."""
+        loop = LoopSection.model_validate(self.configuration.get("loop", {})).build(self.of.overview.lines.rate_hz)
+        fits = [t for t in self.tracks.values() if t.model != MARGINS] if self.of.moved else []
+        return accepted(self.header.limits, LimitEvidence(self.of.response, loop, self.fit, self.loop, fits))
 
     @property
     def described(self) -> bool:
@@ -96,8 +109,8 @@ class ReportData:
         return {role: str(name) for role, name in self.configuration.get("signals", {}).items()}
 
 
-def read(directory: Path, judged: Judged | None = None) -> ReportData:
-    """Read the run.
+def read(directory: Path, judged: Judged | None = None, header: ReportSection | None = None) -> ReportData:
+    """Read the run; `header` replaces the [report] with which it was recorded.
 
     Raises
     ------
@@ -110,7 +123,8 @@ def read(directory: Path, judged: Judged | None = None) -> ReportData:
     loop, loop_words = _loop(configuration, of, fit)
     over = tracks(run, of.overview.sample, of.overview.time_s)
     event_summary = EventSummary.of(run.each_event_and_damage())
-    return ReportData(run, configuration, of, fit, fit_words, loop, loop_words, over, event_summary, judged)
+    own = ReportSection.model_validate(configuration.get("report", {})) if header is None else header
+    return ReportData(run, configuration, of, fit, fit_words, loop, loop_words, over, event_summary, judged, own)
 
 
 def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:

@@ -5,23 +5,32 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from livebode.core.clock import date_and_time, moment
+from livebode.configuration.report_section import ReportSection
 from livebode.core.document import Document, Paragraph, Section
 from livebode.language import tr
-from livebode.reporting import sections
+from livebode.reporting import first_page, sections
 from livebode.reporting.distortion import distortion
-from livebode.reporting.measured import how
+from livebode.reporting.limits import limits
+from livebode.reporting.measured import details, how
 from livebode.reporting.report_data import Judged, ReportData, read, recordings, written
 from livebode.reporting.verdict import verdict
 from livebode.reporting.wording import duration
 
 _SECTIONS = (
     how, sections.response, distortion, sections.tracking, sections.parameters, sections.motion, sections.margins,
-    sections.events, sections.quality, sections.validation, sections.settings, sections.versions,
+    sections.events, sections.quality, sections.validation,
 )  # fmt: skip
+_APPENDIX = (details, sections.source_state, sections.settings, sections.versions)
 
 
-def run_report(directory: Path, judged: Judged | None = None, *, made: datetime) -> Document:
+def run_report(
+    directory: Path,
+    judged: Judged | None = None,
+    *,
+    made: datetime,
+    header: ReportSection | None = None,
+    appendix: bool = False,
+) -> Document:
     """Build the report of a run.
 
     The run is read once, in parts. Curves are thinned to 2048 responses; tables and means use all of them.
@@ -34,49 +43,68 @@ def run_report(directory: Path, judged: Judged | None = None, *, made: datetime)
         Validation of its model on independent data.
     made
         Time of the report, for the title block.
+    header
+        The first page and the limits. Default: the [report] with which the run was recorded.
+    appendix
+        Add the raw configuration, the versions, and what the report does not contain.
 
     Raises
     ------
     RecordError, SignalError
         If the directory is not a run, cannot be read, or has no valid response.
+    ConfigError
+        If the logo cannot be used.
     """
-    of = read(directory, judged)
+    return report_of(read(directory, judged, header), made=made, appendix=appendix)
+
+
+def report_of(of: ReportData, *, made: datetime, appendix: bool = False) -> Document:
+    """The report of a run that was read; see `run_report`."""
     found = [make(of) for make in _SECTIONS]
     absent = tuple(Paragraph(reason) for reason in found if isinstance(reason, str))
-    there = [section for section in found if isinstance(section, Section)]
-    version = of.run.summary.get("versions", {}).get("livebode", "")
+    there = [limits(of.accepted), *(section for section in found if isinstance(section, Section))]
+    findings, title = verdict(of), of.header.machine or of.title
+    not_judged = (
+        "" if _judged(of) else tr("The machine was measured, but not judged: no limits and no baseline were specified.")
+    )
     return Document(
-        kind=tr("Report of a run"),
-        title=of.title,
-        facts=facts(of, made),
-        verdict=verdict(of),
-        sections=(*there, Section(tr("Not in this report"), absent)) if absent else tuple(there),
-        heading=tr("Verdict"),
-        foot=f"{of.title} · {of.run.path.resolve().name} · livebode {version}".strip(),
+        kind=tr("Acceptance report") if of.accepted else tr("Measurement report"),
+        title=title,
+        facts=first_page.facts(of.header, of.title, facts(of), made),
+        verdict=findings,
+        sections=tuple(section for section in there if section is not None),
+        heading=tr("Findings"),
+        foot=" · ".join(filter(None, (title, of.header.serial_number, of.header.company))),
+        result=first_page.result(findings, of.accepted, not_judged),
+        picture=sections.average(of),
+        signatures=first_page.signatures(of.header),
+        appendix=_appendix(of, absent) if appendix else (),
+        logo=first_page.logo_of(of.header),
+        paper=of.header.paper,
+        made=made,
     )
 
 
-def facts(of: ReportData, made: datetime) -> tuple[tuple[str, str], ...]:
-    """The title block."""
+def _judged(of: ReportData) -> bool:
+    """Whether the run was compared with a baseline."""
+    return bool(of.run.summary.get("monitoring", {}).get("judged_s"))
+
+
+def _appendix(of: ReportData, absent: tuple[Paragraph, ...]) -> tuple[Section, ...]:
+    found = [section for make in _APPENDIX if (section := make(of)) is not None]
+    return (*found, Section(tr("Not in this report"), absent)) if absent else tuple(found)
+
+
+def facts(of: ReportData) -> tuple[tuple[str, str], ...]:
+    """When it was measured, and how long."""
     source = of.configuration.get("source", {})
-    files, first_s, last_s = recordings(source), *of.of.spans_s
-    begun = (of.run.summary.get("source") or {}).get("clock_offset_s")
+    files, first_s = recordings(source), of.of.spans_s[0]
+    measured = first_page.measured_at(of.run, first_s)
     rows = (
-        (tr("machine"), of.title),
-        (tr("source"), str(source.get("url", "")) if "url" in source else _kind(files)),
-        (tr("run"), of.run.path.resolve().name),
-        (tr("run's clock"), f"{moment(first_s, 2)} … {moment(last_s, 2)}"),
-        (tr("started"), date_and_time(float(begun)) if begun is not None else ""),
+        (tr("measured"), measured),
+        (tr("recording written"), "" if measured or not files else written(Path(files[-1]))),
+        (tr("run written"), "" if measured else written(of.run.path / "run.json")),
         (tr("duration"), duration(of.samples / of.run.lines.rate_hz)),
-        (tr("recording written"), written(Path(files[-1])) if files else ""),
-        (tr("run written"), written(of.run.path / "run.json")),
-        (tr("report written"), date_and_time(made.timestamp())),
-        ("livebode", str(of.run.summary.get("versions", {}).get("livebode", ""))),
+        (tr("run"), of.run.path.resolve().name),
     )
     return tuple((name, value) for name, value in rows if value)
-
-
-def _kind(files: list[str]) -> str:
-    if len(files) > 1:
-        return tr("{count} recordings", count=len(files))
-    return tr("a recording") if files else ""

@@ -26,13 +26,13 @@ from livebode.reporting.wording import (
     with_bound,
 )
 
-_LINES_SHOWN = 60
+_LINES_SHOWN = 120
 _PANELS, _CURVES = 8, 700  # parameters that are drawn, and responses per curve
 _TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and responses per trace
 
 
-def response(of: ReportData) -> Section:
-    """The mean with its bounds, the fitted model, and a table."""
+def average(of: ReportData) -> Picture:
+    """The mean with its bounds and the fitted model: the picture of the first page."""
     one = of.of.response
     names = (of.channels["input"], of.channels["output"]) if {"input", "output"} <= of.channels.keys() else None
     caption = tr(
@@ -41,7 +41,12 @@ def response(of: ReportData) -> Section:
     )  # fmt: skip
     if of.fit:
         caption += tr(" Dashed: the {model} model fitted to it.", model=recognised(of.fit.model.name))
-    picture = Picture("bode", {"responses": of.of.overview, "mean": one, "names": names, "fitted": of.fit}, caption)
+    return Picture("bode", {"responses": of.of.overview, "mean": one, "names": names, "fitted": of.fit}, caption)
+
+
+def response(of: ReportData) -> Section:
+    """The mean at each line, with its bounds."""
+    one = of.of.response
     frequency = one.lines.frequency_hz
     rows = [
         (number(f, "g"), *polar, number(c, ".4f") if isfinite(c) else "—", share(n, of.of.count))
@@ -49,14 +54,14 @@ def response(of: ReportData) -> Section:
     ]
     step = -(-len(rows) // _LINES_SHOWN)
     note = tr(
-        "{shown} of {count} lines are shown; responses.parquet contains all.",
+        "{shown} of {count} lines are shown; the picture and the record contain all.",
         shown=len(rows[::step]), count=len(rows),
     )  # fmt: skip
     table = Table(
         ("Hz", f"dB{_re(of)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid")),
         tuple(rows[::step]), tuple(range(7)), note if step > 1 else "",
     )  # fmt: skip
-    return Section(tr("Frequency response"), (picture, table))
+    return Section(tr("Frequency response"), (table,))
 
 
 def tracking(of: ReportData) -> Section:
@@ -195,7 +200,7 @@ def events(of: ReportData) -> Section:
 
 
 def quality(of: ReportData) -> Section:
-    """Gaps, bad samples, invalid responses and the state of the source."""
+    """Gaps, bad samples and invalid responses."""
     counts = of.run.summary.get("counts", {})
     rows = [
         (tr("samples"), number(of.samples, ",")),
@@ -211,6 +216,12 @@ def quality(of: ReportData) -> Section:
     parts: list[Part] = [table]
     if "counts" not in of.run.summary:
         parts.append(Paragraph(tr("The counts of samples are written at the end of the run.")))
+    return Section(tr("Data quality"), tuple(parts))
+
+
+def source_state(of: ReportData) -> Section | None:
+    """The state of the source at the end, and the speed; None if neither was recorded."""
+    parts: list[Part] = []
     if source := of.run.summary.get("source"):
         parts.append(pairs([(recognised(_SOURCE.get(key, key)), _plain(value)) for key, value in source.items()]))
     if (speed := of.run.summary.get("speed")) is not None:
@@ -219,7 +230,7 @@ def quality(of: ReportData) -> Section:
             recorded=speed["recorded_s"], run=speed["run_s"], times=speed["times_real_time"],
         )  # fmt: skip
         parts.append(Paragraph(words))
-    return Section(tr("Data quality"), tuple(parts))
+    return Section(tr("Source"), tuple(parts)) if parts else None
 
 
 _COUNTS = {

@@ -25,6 +25,7 @@ def verdict(of: ReportData) -> tuple[Finding, ...]:
     found = [
         *alarms(of.run, of.event_summary),
         *_record(of),
+        *_ready(of),
         *_signals(of),
         *_valid(of),
         *_fits(of),
@@ -60,6 +61,14 @@ def _record(of: ReportData) -> list[Finding]:
         )
         found.append(Finding("check", text))
     return found
+
+
+def _ready(of: ReportData) -> list[Finding]:
+    """How long the machine was not ready; with a baseline, the summary of the monitoring contains it."""
+    suppressed_s = of.run.summary.get("readiness", {}).get("suppressed_s")
+    if not suppressed_s or of.run.summary.get("monitoring", {}).get("baseline") is not None:
+        return []
+    return [Finding("open", tr("Not assessed for {time:.1f} s: the machine was not ready.", time=suppressed_s))]
 
 
 def _signals(of: ReportData) -> list[Finding]:
@@ -139,7 +148,7 @@ def _margins(of: ReportData) -> list[Finding]:
         return [Finding("open", of.loop_words)] if of.described else []
     least = worst(of.loop.places)
     if not least:
-        return [Finding("check", tr("No margins: {why}.", why=recognised(of.loop.message)))]
+        return [Finding("check", tr("No margins: {why}.", why=recognised(str(of.loop.margins.status[0]))))]
     small = least["phase_margin"] < _PHASE_MIN_DEG or least["peak_sensitivity"] > _MS_MAX
     sizes = listed(
         f"{words} {number(least[name], '.3g')}{unit}"
@@ -163,7 +172,7 @@ def _margins(of: ReportData) -> list[Finding]:
 
 def _validated(of: ReportData) -> list[Finding]:
     if of.judged is None:
-        text = tr("The model was not validated on independent data; use `livebode report RUN --on LOG`.")
+        text = tr("The model was not validated on independent data.")
         return [Finding("open", text)] if of.fit is not None else []
     on = of.judged.on
     return [

@@ -33,6 +33,11 @@ class ChangeDetection:
         """Channels that it needs in addition to those of the follower."""
         self._alarms: list[str] = []
 
+    @property
+    def baseline(self) -> str | None:
+        """Name of what it compares with; None if it detects nothing."""
+        return None if self._monitor is None else self._baseline
+
     def take_samples(self, block: Block) -> list[Event]:
         """Monitor the next samples; without this call they are a gap for the Monitor."""
         return [] if self._monitor is None else self._listed(self._monitor.process_samples(block))
@@ -45,12 +50,13 @@ class ChangeDetection:
         """The last events, at the end of the run."""
         return [] if self._monitor is None else self._listed(self._monitor.finish())
 
-    def summary(self) -> dict[str, Any]:
-        """Entries of run.json."""
+    def summary(self, suppressed_s: float = 0.0) -> dict[str, Any]:
+        """Entries of run.json of a run that was not assessed for so many seconds, as the machine was not ready."""
         if self._monitor is None:
             return {"baseline": None, "message": _NO_BASELINE + self._remark}
         found = self._monitor.summary()
-        message = {"message": found["message"] + self._remark}
+        remark = f" Not assessed for {suppressed_s:.1f} s: the machine was not ready." if suppressed_s else ""
+        message = {"message": found["message"] + remark + self._remark}
         return {"baseline": self._baseline} | found | message | {"alarms": self._alarms}
 
     def snapshot(self) -> bytes:

@@ -82,7 +82,7 @@ def demo(to: Destination, *, seconds: float, seed: int, real_time: bool, baselin
     """
     check_seconds(seconds)
     axis = demo_axis(seconds, seed, TensionLoss(start_s=seconds / 2, loss=LOSS))
-    fit, loop = FitSection(radius_m=axis.mechanics.radius_m), _described(axis.drive)
+    fit, loop = FitSection(radius_m=axis.mechanics.radius_m), described_loop(axis.drive)
     configuration = {
         "demo": {"seconds": seconds, "seed": seed},
         "fit": fit.model_dump(),
@@ -99,7 +99,7 @@ def demo(to: Destination, *, seconds: float, seed: int, real_time: bool, baselin
     return RunLoop(machine, pipeline, to, about=about, block_samples=400, real_time=real_time).run()
 
 
-def _described(drive: Drive) -> LoopSection:
+def described_loop(drive: Drive) -> LoopSection:
     """The axis's loop as in a configuration file."""
     velocity = PIDSection(
         gain=drive.velocity_gain_n_m_s, integral_time_s=drive.integral_time_s, rate_hz=drive.velocity_rate_hz

@@ -33,11 +33,13 @@ CAUSES = {
         "fit": ("fit-failed", "fit-resumed"),
         "backlog": ("backlog", "backlog-cleared"),
         "thinned": ("thinned",),
+        "readiness": ("suppressed", "suppression-ended"),
     }.items()
     for kind in kinds
 }
 """The cause of each kind of event that may repeat. All other kinds are reported one by one."""
 _STATES = {"backlog", "backlog-cleared", "restart", "replaced", "disconnected", "layout-changed", "unit-changed"}
+_STATES |= {"suppressed", "suppression-ended"}
 """Changes of state; they are reported soon, because the record shows the previous state until then."""
 
 _STAGE = Stage("event-groups", 1)

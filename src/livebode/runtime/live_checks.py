@@ -55,6 +55,21 @@ class LiveChecks:
         self._slips = SlipSearch(lines.window)
         self._searched = _Stretch()
 
+    def take_ready(self, block: Block, ready: list[Block]) -> Iterator[Event]:
+        """Findings with the parts of this Block in which the machine is ready; others may hide a restart of a phase."""
+        stop = block.start
+        for part in ready:
+            if part.start != stop:
+                self._interrupt()
+            yield from self.take(part)
+            stop = part.stop
+        if stop != block.stop:
+            self._interrupt()
+
+    def _interrupt(self) -> None:
+        """Search for slips from the next sample on, without those before it."""
+        self._slips, self._searched = SlipSearch(self._settings.lines.window), _Stretch()
+
     def take(self, block: Block) -> Iterator[Event]:
         """Findings with this Block."""
         if not len(block):

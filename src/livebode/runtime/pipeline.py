@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 from livebode.configuration.axis import Axis
 from livebode.core import Channel, LivebodeError, SignalError, Stateful, nearest_name
-from livebode.estimation import plant_kinds
+from livebode.estimation import Settings, plant_kinds
 from livebode.estimation.stream_estimator import Follower
 from livebode.fitting import RecordingsMean
 from livebode.fitting.drift import DriftTest
 from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection, change_detection
 from livebode.runtime.fits import Fits
+from livebode.runtime.readiness import Readiness
 from livebode.sources.live import LiveSource
 
 
@@ -35,6 +36,8 @@ class Pipeline:
         Tests whether the machine drifts within a recording.
     recordings
         The mean of several recordings.
+    readiness
+        Whether the machine is ready, if a channel shows it.
     """
 
     follower: Follower
@@ -43,13 +46,15 @@ class Pipeline:
     axis: Axis | None = None
     drift: DriftTest | None = None
     recordings: RecordingsMean | None = None
+    readiness: Readiness | None = None
 
     @classmethod
     def of(cls, axis: Axis, follower: Follower, channels: Sequence[Channel], *, samples: bool = True) -> Pipeline:
         """The configured stages after the follower, with or without `samples`; LivebodeError if one is not possible."""
         settings = follower.settings
         fits = Fits.of(axis.fit, settings.loop, plant_kinds(channels, settings)) if axis.fit else None
-        return cls(follower, fits, change_detection(axis, settings, samples=samples), axis)
+        readiness = _readiness(axis, settings)
+        return cls(follower, fits, change_detection(axis, settings, samples=samples), axis, readiness=readiness)
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> Pipeline:
@@ -80,12 +85,18 @@ class Pipeline:
         """All channels in use, each once."""
         schedule = self.follower.settings.schedule
         covariates = self.detection.covariates if self.detection is not None else ()
-        return list(dict.fromkeys([*self.signals, *([schedule] if schedule else []), *covariates]))
+        ready = [] if self.readiness is None else [self.readiness.condition.channel]
+        return list(dict.fromkeys([*self.signals, *([schedule] if schedule else []), *covariates, *ready]))
 
     @property
     def parts(self) -> Mapping[str, Stateful]:
         """Stages with a state, by name."""
-        optional = {"fits": self.fits, "detection": self.detection, "drift": self.drift}
+        optional = {
+            "fits": self.fits,
+            "detection": self.detection,
+            "drift": self.drift,
+            "readiness": self.readiness,
+        }
         return {"tracker": self.follower} | {name: part for name, part in optional.items() if part}
 
     def take_over(self, before: Pipeline) -> bool:
@@ -97,6 +108,8 @@ class Pipeline:
             self.follower.restore(before.follower.snapshot())
         except LivebodeError:
             return False
+        if self.readiness and before.readiness and self.readiness.condition == before.readiness.condition:
+            self.readiness.take_over(before.readiness)
         if self._same(before, "signals", "tracking", "loop", "motion"):
             if self.fits and before.fits and self._same(before, "fit"):
                 self.fits.restore(before.fits.snapshot())
@@ -106,3 +119,12 @@ class Pipeline:
 
     def _same(self, other: Pipeline, *sections: str) -> bool:
         return all(getattr(self.axis, name) == getattr(other.axis, name) for name in sections)
+
+
+def _readiness(axis: Axis, settings: Settings) -> Readiness | None:
+    """The state of the machine, if a channel shows it."""
+    condition = axis.ready
+    if condition is None:
+        return None
+    chunk_s = 0.0 if axis.motion is None else axis.motion.chunk_s
+    return Readiness(condition, settings.span, round(chunk_s * settings.lines.rate_hz))

@@ -169,11 +169,12 @@ class RunLoop:
     def _process(self, block: Block) -> None:
         """One piece of samples through the house, in this order."""
         self._recorder.write_samples(block)
-        self._monitor_samples(block)
+        ready = self._ready_parts(block)
+        self._monitor_samples(block, ready)
         responses = self._estimate(block)
         self._record_and_publish(responses)
         self._report_events()
-        self._check_signals(block)
+        self._check_signals(block, ready)
         self._stream.announce(TrackerResults(block, self._follower.counts["samples"], self.source.samples))
         self._recorder.commit(block)
 
@@ -189,29 +190,44 @@ class RunLoop:
                 raise StoppedError("ended before the end of the recording")
             yield block
 
-    def _monitor_samples(self, block: Block) -> None:
+    def _ready_parts(self, block: Block) -> list[Block]:
+        """The samples at which the machine is ready; publishes where that begins and ends, before its alarms."""
+        readiness = self.pipeline.readiness
+        if readiness is None:
+            return [block]
+        self._stream.publish_all(readiness.take(block))
+        self._follower.set_aside(readiness.spans)
+        return readiness.condition.parts(block)
+
+    def _monitor_samples(self, block: Block, ready: list[Block]) -> None:
         noticed = () if self._counts.stop else self._noticed  # a continued record already has them
         for event in noticed:
             time_s = block.origin_s + event.sample / self._follower.settings.lines.rate_hz
             self._stream.publish(replace(event, time_s=time_s))
         detection = self.pipeline.detection
         if detection is not None and (self._shedding is None or self._shedding.monitors()):
-            self._stream.publish_all(detection.take_samples(block))
+            for part in ready:
+                self._stream.publish_all(detection.take_samples(part))
 
     def _estimate(self, block: Block) -> Responses:
         self._origin_s = block.origin_s
         self._counts.check.take(block)
         self._counts.stop = block.stop
         before = time.perf_counter()
-        responses = self._follower.process(block, self._events.append)
+        responses = self._marked(self._follower.process(block, self._events.append))
         self._counts.take(responses, time.perf_counter() - before)
         return responses
 
+    def _marked(self, responses: Responses) -> Responses:
+        return responses if self.pipeline.readiness is None else self.pipeline.readiness.mark(responses)
+
     def _record_and_publish(self, responses: Responses) -> None:
-        """Responses, then their fits, then the alarms."""
+        """Responses, then of those that are assessed the fits and the alarms."""
         self._overview.add(responses)
         if len(responses):
             self._stream.publish(responses)
+        if self.pipeline.readiness is not None:
+            responses = responses[responses.ready]
         if self.pipeline.drift is not None:
             self.pipeline.drift.add(responses)
         if self.pipeline.recordings is not None:
@@ -255,11 +271,11 @@ class RunLoop:
             self._stream.report_groups_while_silent(time.monotonic())
             self._recorder.commit_while_silent()
 
-    def _check_signals(self, block: Block) -> None:
+    def _check_signals(self, block: Block, ready: list[Block]) -> None:
         """Publish findings on the signals of a live run."""
         if self._checks is None:
             return
-        for event in self._checks.take(block):
+        for event in self._checks.take_ready(block, ready):
             self._stream.publish(event)
             if event.kind == "transient":
                 self._counts.left_out_samples = int(event.details["samples"])
@@ -268,6 +284,8 @@ class RunLoop:
     def _begin(self) -> None:
         """Publish the start, and what the record that it continues contains."""
         begun = self._begun | ({"record": {"finished": False}} if self._recorder.continues else {})
+        if (detection := self.pipeline.detection) is not None:
+            begun = begun | {"monitoring": {"baseline": detection.baseline}}
         self._stream.announce(RunStarted(self.to.directory, begun, self._control, self._overview))
         channels = {channel.name: channel for channel in self.source.channels}
         used = tuple(channels[name] for name in self.pipeline.channels)
@@ -334,10 +352,15 @@ class RunLoop:
         self._done = summary.begun(self._about, self._follower, *self._plant)
         self._done |= summary.done(self._follower, self._counts)
         self._newest = None if fits is None else fits.newest()
-        self._done |= summary.of_source(self.source) | summary.fitted(fits, self._newest, self._overview.responses())
+        seen = self._overview.responses()
+        self._done |= summary.of_source(self.source) | summary.fitted(fits, self._newest, seen[seen.ready])
+        suppressed_s = 0.0
+        if self.pipeline.readiness is not None:
+            self._done["readiness"] = self.pipeline.readiness.summary(self._follower.settings.lines.rate_hz)
+            suppressed_s = self._done["readiness"]["suppressed_s"]
         if detection is not None:
             self._stream.publish_all(detection.finish())
-            self._done["monitoring"] = detection.summary()
+            self._done["monitoring"] = detection.summary(suppressed_s)
         if self.pipeline.drift is not None:
             found = self.pipeline.drift.result()
             self._done["drift"] = summary.of_drift(found, self._follower.settings.lines)
@@ -358,6 +381,7 @@ class RunLoop:
         if delayed and counts.handed_out != counts.stop:
             before = time.perf_counter()
             if (responses := follower.finish(self._events.append)) is not None:
+                responses = self._marked(responses)
                 counts.take(responses, time.perf_counter() - before)
                 self._record_and_publish(responses)
             self._report_events()

@@ -254,8 +254,8 @@ class SegmentedRecord:
 
 
 def _identity(summary: Mapping[str, Any]) -> list[Any]:
-    # The segmentation of the record may change during a run; what is recorded may not.
-    configuration = dict(summary["configuration"])
+    # The segmentation of the record and the texts of the report may change during a run; what is recorded may not.
+    configuration = {name: value for name, value in summary["configuration"].items() if name != "report"}
     kept = configuration.pop("record", None) or {}
     found = {key: value for key, value in summary["found"].items() if key not in ("motion", "judged")}  # learned
     return [configuration, found, kept.get("samples")]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from livebode.kernel import instruction_set
 from livebode.runtime.fits import Fits
 from livebode.runtime.run_counts import RunCounts
 from livebode.sources.live import LiveSource
+from livebode.version import __version__
 
 
 def begun(about: Mapping[str, Any], tracker: Follower, unit: str, kinds: PlantKinds) -> dict[str, Any]:
@@ -31,7 +31,7 @@ def begun(about: Mapping[str, Any], tracker: Follower, unit: str, kinds: PlantKi
 def versions() -> dict[str, str]:
     """Versions of livebode and of what its results depend on."""
     return {
-        "livebode": version("livebode"),
+        "livebode": __version__,
         "numpy": np.__version__,
         "python": platform.python_version(),
         "instruction_set": instruction_set(),

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, ExtraError, SimulationError, UsageError, nearest_name
+from livebode.core import Block, Channel, SimulationError, UsageError, nearest_name
+from livebode.core.installing import not_installed
 from livebode.simulation.configuration import controller_settings
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
 from livebode.simulation.divergence import diverged
@@ -227,13 +228,7 @@ def _fmpy() -> Any:
         import fmpy
         import fmpy.simulation
     except ImportError as error:
-        raise ExtraError(
-            "not-installed",
-            "FMUs need fmpy, which is not installed",
-            "pip install 'livebode[fmu]'",
-            extra="fmu",
-            package="fmpy",
-        ) from error
+        raise not_installed("FMUs need fmpy, which is not installed", extra="fmu", package="fmpy") from error
     return fmpy
 
 

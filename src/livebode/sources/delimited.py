@@ -20,9 +20,11 @@ from livebode.sources.locate import locate
 from livebode.sources.recording import Chunk, Column, Recording, Skipped
 from livebode.sources.tidy import Tidied
 from livebode.sources.units import split_units
+from livebode.sources.whole_lines import whole_lines
 
 ARROW_BLOCK_BYTES = 1 << 20
-"""Arrow parses pieces of this size; no line can be longer."""
+"""Arrow parses blocks of this size in parallel; no line can be longer."""
+_PIECE_BYTES = 4 * ARROW_BLOCK_BYTES
 
 
 class DelimitedRecording(Recording):
@@ -85,24 +87,24 @@ class DelimitedRecording(Recording):
         names = [str(at) for at in range(dialect.width)]
         moment = pa.timestamp("ns", dialect.zone)
         types = {names[at]: moment if dialect.kinds[at] is CellKind.MOMENT else pa.float64() for at in required}
-        with csv.open_csv(
-            file,
-            read_options=csv.ReadOptions(column_names=names, block_size=ARROW_BLOCK_BYTES),
-            parse_options=csv.ParseOptions(
+        options: Any = {
+            "read_options": csv.ReadOptions(column_names=names, block_size=ARROW_BLOCK_BYTES),
+            "parse_options": csv.ParseOptions(
                 delimiter=dialect.delimiter or "\x1f",
                 quote_char=False if dialect.spaced else '"',
             ),
-            convert_options=csv.ConvertOptions(
+            "convert_options": csv.ConvertOptions(
                 column_types=types,
                 include_columns=[names[at] for at in required],
                 decimal_point=dialect.decimal,
                 null_values=list(EMPTY),
                 check_utf8=False,
             ),
-        ) as reader:
-            for batch in reader:
-                if batch.num_rows:
-                    yield [to_numpy(batch.column(required.index(column.key))) for column in columns]
+        }
+        # Arrow's own stream reads ahead in threads that outlive it: a program that ends meanwhile ends by a signal.
+        for piece in whole_lines(file, _PIECE_BYTES):
+            for batch in csv.read_csv(pa.BufferReader(piece), **options).to_batches():
+                yield [to_numpy(batch.column(required.index(column.key))) for column in columns]
 
     @contextmanager
     def _opened(self) -> Iterator[Any]:
@@ -113,8 +115,6 @@ class DelimitedRecording(Recording):
                 raw.seek(dialect.offset)
                 yield io.BufferedReader(Tidied(raw, dialect), 1 << 20)
         else:
-            # Arrow reads ahead in its own threads. With pa.OSFile it would continue to read from a closed descriptor,
-            # whose number may already belong to another file. A Python file raises an error instead.
             with self.path.open("rb") as file:
                 file.seek(dialect.offset)
                 yield file

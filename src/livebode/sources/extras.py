@@ -6,16 +6,12 @@ from pathlib import Path
 from types import ModuleType
 
 from livebode.core import ExtraError
+from livebode.core.installing import not_installed
 
 
 def missing(path: Path, package: str, extra: str) -> ExtraError:
-    return ExtraError(
-        "not-installed",
-        f"{path} needs the package {package}, which is not installed",
-        f"run pip install livebode[{extra}]",
-        package=package,
-        extra=extra,
-        path=str(path),
+    return not_installed(
+        f"{path} needs the package {package}, which is not installed", package=package, extra=extra, path=str(path)
     )
 
 

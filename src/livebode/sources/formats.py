@@ -81,6 +81,20 @@ ASC_HEAD = re.compile(
 """First lines of a text log of Vector, with the kind of its timestamps."""
 ARROW_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
 
+_FOREIGN = (
+    (b"\x89PNG\r\n\x1a\n", "a picture (PNG)", "name the recording"),
+    (b"\xff\xd8\xff", "a picture (JPEG)", "name the recording"),
+    (b"%PDF", "a PDF document", "name the recording"),
+    (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls) or another Office document", "save its table as CSV"),
+    (b"\x1f\x8b", "compressed (gzip)", "unpack it first"),
+    (b"BZh", "compressed (bzip2)", "unpack it first"),
+    (b"7z\xbc\xaf", "a 7-Zip archive", "unpack it first"),
+    (b"Rar!", "a RAR archive", "unpack it first"),
+)
+"""What a person may name by mistake: first bytes, what it is, and what to do."""
+_ZIPPED_OFFICE = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/")
+_NAME_IN_ZIP = 30  # where the name of its first file begins
+
 FORMATS = (
     Format("Parquet", (".parquet", ".pq"), lambda head: head.startswith(b"PAR1"), "parquet"),
     Format("Arrow", (".arrow", ".feather", ".ipc"), lambda head: head.startswith(ARROW_MAGIC), "arrow"),
@@ -118,6 +132,7 @@ def open_recording(path: Path, dbc: Path | None = None) -> Recording:
         Where the package that reads its format is not installed.
     """
     first, head = read_head(path)
+    _refuse_foreign(first, head)
     for format_ in FORMATS:
         if format_.matches(head) and (format_.takes_directory or first == path):
             return checked(format_.open(path, dbc))
@@ -127,7 +142,7 @@ def open_recording(path: Path, dbc: Path | None = None) -> Recording:
     if named:
         raise RecordingError(
             "format-unknown",
-            f"{path} is not {named[0]}, although its ending is {suffix}: it begins with {head[:8]!r}",
+            f"{path} is not {' or '.join(named)}, although its ending is {suffix}: it begins with {head[:8]!r}",
             "check that the file is complete",
             path=str(path),
             suffix=suffix,
@@ -142,6 +157,22 @@ def open_recording(path: Path, dbc: Path | None = None) -> Recording:
         suffix=suffix,
         beginning=head[:8].hex(),
     )
+
+
+def _refuse_foreign(path: Path, head: bytes) -> None:
+    """RecordingError for a file of a known kind that is no recording."""
+    found = next(((what, remedy) for magic, what, remedy in _FOREIGN if head.startswith(magic)), None)
+    if head.startswith(b"PK\x03\x04") and head[_NAME_IN_ZIP:].startswith(_ZIPPED_OFFICE):
+        found = "an Excel workbook (.xlsx) or another Office document", "save its table as CSV"
+    if found is not None:
+        raise RecordingError(
+            "format-unknown",
+            f"{path} is not a recording, but {found[0]}",
+            found[1],
+            path=str(path),
+            suffix=path.suffix.lower(),
+            beginning=head[:8].hex(),
+        )
 
 
 def read_head(path: Path) -> tuple[Path, bytes]:

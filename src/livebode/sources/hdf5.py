@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core import ExtraError
+from livebode.core.installing import not_installed
 from livebode.sources.arrays import array_columns
 from livebode.sources.damage import oversized
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
@@ -47,13 +47,8 @@ def import_h5py(path: Path) -> ModuleType:
     try:
         import h5py
     except ImportError:
-        raise ExtraError(
-            "not-installed",
-            f"{path} needs the package h5py, which is not installed",
-            "run pip install livebode[hdf5]",
-            package="h5py",
-            extra="hdf5",
-            path=str(path),
+        raise not_installed(
+            f"{path} needs the package h5py, which is not installed", package="h5py", extra="hdf5", path=str(path)
         ) from None
     return h5py  # type: ignore[no-any-return]
 

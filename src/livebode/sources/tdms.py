@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core import ExtraError
+from livebode.core.installing import not_installed
 from livebode.sources.damage import damaged, oversized, truncated
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 from livebode.sources.rounding import exact_rate_hz
@@ -102,13 +102,8 @@ def opened(path: Path) -> Iterator[Any]:
     try:
         import nptdms
     except ImportError:
-        raise ExtraError(
-            "not-installed",
-            f"{path} needs the package npTDMS, which is not installed",
-            "run pip install livebode[tdms]",
-            package="npTDMS",
-            extra="tdms",
-            path=str(path),
+        raise not_installed(
+            f"{path} needs the package npTDMS, which is not installed", package="npTDMS", extra="tdms", path=str(path)
         ) from None
     logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # its messages are in the error that follows
     # With a path it would read the index file next to it, which may belong to another recording.

@@ -27,6 +27,8 @@ class OutputError(LivebodeError):
     codes: ClassVar[Mapping[str, str]] = {
         "exists": "The file or directory exists already, and is replaced only on request.",
         "is-directory": "The path of the file is a directory.",
+        "no-font": "This computer has no font with the letters of the language, and a PDF contains its fonts.",
+        "not-archivable": "The content cannot be written as PDF/A.",
         "not-replaceable": "The directory contains something else than an earlier output, and is not replaced.",
         "not-written": "The system refuses to write the output.",
         "too-large": "There are more values than can be written in this format.",

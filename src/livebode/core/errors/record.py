@@ -32,6 +32,7 @@ class RecordError(LivebodeError):
         "foreign-files": "The directory has files that livebode did not write, so it is neither used nor replaced.",
         "locked": "Another process records in this directory.",
         "newer-version": "A file of the run was written by a newer version of livebode.",
+        "no-directory": "The run has no directory yet: it is written in one piece, at its end.",
         "no-parameters": "The run has no fitted parameters.",
         "no-responses": "The run has no responses.",
         "not-a-run": "The path is not the directory of a run.",

@@ -1,36 +1,74 @@
 // @ts-check
-// Magnitude, phase and coherence over logarithmic frequency: measured with its band, reference, baseline, model.
-import { axis, chart, degreeTicks, frequencyAxis, steady } from "./chart.js";
-import { extent, moved, NAMES, overGrid, turns } from "./curves.js";
-import { byFinger } from "./finger.js";
-import { tr } from "./language.js";
-import { colour } from "./theme.js";
-import { mark } from "./words.js";
+// Magnitude, phase and coherence over frequency: the measured curve, references, baseline and model, in one view.
+import { chosen, remember } from "./address.js";
+import { computed, operationOf } from "./arithmetic.js";
+import { steady } from "./chart.js";
+import { Cursors } from "./cursors.js";
+import { curveOf, extent, LISTED, moved, NAMES, overGrid, turns } from "./curves.js";
+import { next } from "./extrema.js";
+import { marked } from "./marks.js";
+import { mostlyNoise, NoiseHold } from "./noise-hold.js";
+import { panel } from "./panel.js";
+import { Tooltip } from "./tooltip.js";
+import { View } from "./view.js";
+import { tried } from "./whatif.js";
+import { scaled, shifted, Zoom } from "./zoom.js";
 
+/** @import { Operation } from "./arithmetic.js" */
 /** @import { Chart, Range } from "./chart.js" */
-/** @import { Curve, Values } from "./curves.js" */
-/** @import { Curves, Found, Frame, Run } from "./messages.js" */
+/** @import { Curve, Drawn, Values } from "./curves.js" */
+/** @import { Extremum } from "./extrema.js" */
+/** @import { Mode } from "./fitted.js" */
+/** @import { Mark } from "./marks.js" */
+/** @import { Annotation, Curves, Found, Frame, Quantity, Run } from "./messages.js" */
 
 const FEW_LINES = 40;
-/** @type {Record<Curves, number[]>} */
-const DASHES = { measured: [], reference: [8, 4], baseline: [2, 3], model: [5, 2] };
+const STEP = 0.7; // of a zoom by key or button
 
 // What each panel draws of a curve: its value, the edges of its band, and the values that differ from zero.
-const MAGNITUDE = /** @type {const} */ ({ value: "db", edges: ["dbHigh", "dbLow"], sure: "dbSure", room: 3 });
-const PHASE = /** @type {const} */ ({ value: "deg", edges: ["degHigh", "degLow"], sure: "degSure", room: 10 });
-const PANELS = /** @type {const} */ ([MAGNITUDE, PHASE, { value: "coherence", edges: [] }]);
+export const MAGNITUDE = /** @type {const} */ ({ value: "db", edges: ["dbHigh", "dbLow"], sure: "dbSure", room: 3 });
+export const PHASE = /** @type {const} */ ({ value: "deg", edges: ["degHigh", "degLow"], sure: "degSure", room: 10 });
+export const PANELS = /** @type {const} */ ([MAGNITUDE, PHASE, { value: "coherence", edges: [] }]);
+
+/**
+ * What the plot shows that other parts of the page know.
+ *
+ * @typedef {object} Known
+ * @property {() => Mark[]} margins of the loop at the time shown
+ * @property {() => void} laid called when other curves are shown
+ * @property {() => Mode[]} modes of the fitted model at the time shown
+ */
 
 export class Bode {
   /**
    * @param {HTMLElement[]} hosts of magnitude, phase and coherence
    * @param {(hz: number, found: Found) => void} onCursor
+   * @param {Known} known
    */
-  constructor(hosts, onCursor) {
+  constructor(hosts, onCursor, known) {
     this.hosts = hosts;
     this.onCursor = onCursor;
+    this.known = known;
+    this.view = new View();
+    this.zooming = new Zoom();
+    this.cursors = new Cursors();
+    this.hold = new NoiseHold();
+    this.tooltip = new Tooltip();
     this.shown = new Set(NAMES);
-    /** @type {Partial<Record<Curves, Curve>>} */
+    /** In the displayed quantity, at their own frequencies. @type {Partial<Record<Curves, Curve>>} */
     this.curves = {};
+    /** The same over the grid, in the view. @type {Partial<Record<Curves, Drawn>>} */
+    this.drawn = {};
+    /** The curves that the charts have series for. @type {Curves[]} */
+    this.laid = [];
+    /** @type {Operation | null} */
+    this.operation = operationOf(chosen("bode-operation", ""));
+    /** What is tried on the loop. @type {import("./whatif.js").Filter | null} */
+    this.filter = null;
+    /** @type {Extremum | null} */
+    this.extremum = null;
+    /** @type {Annotation[]} */
+    this.annotations = [];
     /** @type {Chart[]} */
     this.charts = [];
     /** @type {number[]} frequencies of the lines, Hz */
@@ -41,46 +79,58 @@ export class Bode {
     this.at = [];
     /** @type {Values} */
     this.nothing = [];
-    /** @type {Range} */
-    this.whole = [1, 10];
-    /** @type {Range} */
-    this.sight = this.whole;
-    this.ranges = [steady({ step: 5, least: 10 }), steady({ step: 15, least: 30 })];
+    this.symbol = "";
+    /** Units of the quantity times (jω)^n, n = −2 … 2. @type {string[]} */
+    this.units = [];
+    /** @type {Quantity | null} */
+    this.quantity = null;
     this.line = 0;
+    /** What shows the curves instead of the three charts. @type {import("./plane.js").Plane | null} */
+    this.plane = null;
+  }
+
+  get sight() {
+    return this.zooming.sight;
+  }
+
+  get whole() {
+    return this.zooming.whole;
+  }
+
+  /** The curve that the ring is around. @returns {Curves} */
+  get main() {
+    return this.operation ? "result" : "measured";
+  }
+
+  // Few lines are points with error bars; nothing is known between them.
+  get few() {
+    return this.lines.length <= FEW_LINES;
   }
 
   /**
    * Start again with these lines.
    *
    * @param {Run} facts
-   * @param {string} unit
-   * @param {string} symbol
+   * @param {Quantity} quantity
    */
-  begin(facts, unit, symbol) {
+  begin(facts, quantity) {
     this.clear();
+    const of = facts.quantities.find(({ name }) => name === quantity);
+    this.quantity = quantity;
+    this.symbol = of?.symbol ?? "";
+    this.units = of?.units ?? [];
     this.lines = facts.frequency_hz;
     this.grid = facts.grid_hz;
     this.at = this.lines.map((f) =>
       this.grid.reduce((best, g, i) => (Math.abs(g - f) < Math.abs(this.grid[best] - f) ? i : best), 0),
     );
     this.line = Math.min(this.line, this.lines.length - 1);
-    this.ranges = [steady({ step: 5, least: 10 }), steady({ step: 15, least: 30 })];
     this.nothing = new Array(this.grid.length).fill(null);
     const low = this.grid[0],
       high = this.grid[this.grid.length - 1],
-      pad = (high / low) ** 0.03 || 1.1;
-    this.whole = [low / Math.max(pad, 1.02), high * Math.max(pad, 1.02)];
-    this.sight = this.whole;
-    this.charts = [
-      this.panel(
-        0,
-        unit ? tr("|{symbol}| in dB re 1 {unit}", { symbol, unit }) : tr("|{symbol}| in dB", { symbol }),
-        { range: () => this.limits(0, MAGNITUDE) },
-        false,
-      ),
-      this.panel(1, tr("phase in °"), { range: () => this.limits(1, PHASE) }, false, { splits: degreeTicks }),
-      this.panel(2, tr("coherence"), { range: [-0.05, 1.08] }, true, { splits: () => [0, 0.5, 1] }),
-    ];
+      pad = Math.max((high / low) ** 0.03 || 1.1, 1.02);
+    this.zooming.begin([low / pad, high * pad], `${facts.axis} ${quantity}`);
+    this.build();
   }
 
   // Show nothing until the next `begin`.
@@ -88,82 +138,38 @@ export class Bode {
     for (const made of this.charts) made.destroy();
     this.charts = [];
     this.curves = {};
+    this.drawn = {};
+    this.extremum = null;
   }
 
-  /**
-   * @param {number} index
-   * @param {string} label
-   * @param {uPlot.Scale} y
-   * @param {boolean} last
-   * @param {uPlot.Axis} more
-   */
-  panel(index, label, y, last, more = {}) {
-    const lines = () => this.lines;
-    const few = this.lines.length <= FEW_LINES;
-    /** @type {uPlot.Series[]} */
-    const series = [{ label: "frequency" }];
-    /** @type {uPlot.Band[]} */
-    const bands = [];
-    for (const name of NAMES) {
-      const show = this.shown.has(name);
-      const first = series.length;
-      const points = {
-        show: name === "measured" && few,
-        size: 7,
-        fill: () => colour("measured"),
-        stroke: () => colour("measured"),
-      };
-      series.push({
-        label: name,
-        show,
-        stroke: () => colour(name),
-        width: name === "measured" ? 2 : 1.6,
-        dash: DASHES[name],
-        points,
-      });
-      if (index === 2 || name === "model") continue;
-      for (const edge of ["high", "low"])
-        series.push({ label: `${name} ${edge}`, show, stroke: () => "transparent", width: 0, points: { show: false } });
-      bands.push({ series: [first + 1, first + 2], fill: () => `${colour(name)}${name === "measured" ? "38" : "24"}` });
-    }
-    return chart(
-      this.hosts[index],
-      {
-        scales: { x: { distr: 3, time: false, range: () => this.sight }, y },
-        axes: [
-          frequencyAxis(lines, last ? tr("frequency in Hz") : ""),
-          axis(label, { size: 44, values: (_u, s) => s.map(mark), ...more }),
-        ],
-        series,
-        bands,
-        cursor: {
-          sync: { key: "bode" },
-          points: { show: false },
-          drag: { x: true, y: false, setScale: false },
-          y: false,
-          bind: {
-            dblclick: () => () => {
-              this.zoom(this.whole);
-              return null;
-            },
-          },
-        },
-        hooks: {
-          ready: [
-            (u) =>
-              byFinger(
-                u,
-                () => this.select(u),
-                () => this.zoom(this.whole),
-              ),
-          ],
-          setCursor: [(u) => this.follow(u)],
-          setSelect: [(u) => this.select(u)],
-          draw: [(u) => this.mark(u)],
-        },
-      },
-      this.data(index),
-    );
+  /** The curves that are to be drawn. @returns {Curves[]} */
+  layout() {
+    if (this.operation) return ["result"];
+    /** @param {Curves} name */
+    const optional = (name) => name === "what if" || name.startsWith("reference");
+    return NAMES.filter((name) => name !== "result" && (!optional(name) || this.curves[name]));
+  }
+
+  // Charts for the curves and the options of the view; data follow with `draw`.
+  build() {
+    for (const made of this.charts) made.destroy();
+    this.tooltip.hide();
+    this.laid = this.layout();
+    this.hold = new NoiseHold();
+    this.ranges = [steady({ step: 5, least: 10 }), steady({ step: 15, least: 30 })];
+    this.charts = [];
+    if (this.plane) this.charts.push(this.plane.build());
+    else for (const index of PANELS.keys()) this.charts.push(panel(this, index));
+    this.known.laid();
+  }
+
+  // The options of the view have changed.
+  rebuild() {
+    this.drawn = {};
+    this.extremum = null;
+    if (!this.charts.length) return;
+    this.build();
+    this.draw();
   }
 
   /**
@@ -174,8 +180,8 @@ export class Bode {
     const { value, edges } = PANELS[index];
     /** @type {[number[], ...Values[]]} */
     const found = [this.grid];
-    for (const name of NAMES) {
-      const curve = this.curves[name],
+    for (const name of this.laid) {
+      const curve = this.drawn[name],
         by = value === "deg" && curve ? curve.turns : 0;
       for (const key of name === "model" ? [value] : [value, ...edges])
         found.push(curve ? moved(curve[key], by) : this.nothing);
@@ -184,20 +190,41 @@ export class Bode {
   }
 
   /**
+   * The series of a curve's values in a chart.
+   *
    * @param {number} index
-   * @param {typeof MAGNITUDE | typeof PHASE} panel
+   * @param {Curves} name
    */
-  limits(index, { value, edges, sure, room }) {
-    const drawn = NAMES.flatMap((name) => (this.shown.has(name) && this.curves[name]) || []);
-    /** @type {(curve: Curve, values: Values) => Values} */
-    const by = (curve, values) => moved(values, value === "deg" ? curve.turns : 0);
+  seriesOf(index, name) {
+    return this.charts[index].series.findIndex(({ label }) => label === name);
+  }
+
+  /**
+   * The visible range of a chart.
+   *
+   * @param {0 | 1} index
+   * @returns {Range}
+   */
+  limits(index) {
+    const chosenRange = this.zooming.heights[index];
+    if (chosenRange) return chosenRange;
+    const { value, edges, sure, room } = index ? PHASE : MAGNITUDE;
+    if (index && this.view.wrapped) return [-190, 190];
+    const names = this.laid.filter((name) => this.shown.has(name) && this.drawn[name]);
+    const drawn = names.flatMap((name) => this.drawn[name] ?? []);
+    /** @type {(curve: Drawn, values: Values) => Values} */
+    const by = (curve, values) => moved(values, index ? curve.turns : 0);
     const certain = drawn.map((curve) => by(curve, curve[sure]));
     const known = certain.some((values) => values.some(Number.isFinite));
     const bounds = drawn.flatMap((curve) => edges.map((edge) => by(curve, curve[edge])));
     const all = drawn.map((curve) => by(curve, curve[value]));
     // A measured point is always in the picture; only its band may leave it.
-    const points = drawn.flatMap((curve, i) => (curve === this.curves.measured ? [all[i]] : []));
-    return this.ranges[index](...extent(known ? [...certain, ...points] : all, [...bounds, ...all], room));
+    const points = all.filter((_, i) => names[i] === this.main);
+    const steadily = this.ranges?.[index] ?? steady({ step: 5, least: 10 });
+    const within = [...(known ? [...certain, ...points] : all), marked(this, index)];
+    const follow = () => steadily(...extent(within, [...bounds, ...all], room));
+    const { measured } = this.curves;
+    return index && measured ? this.hold.range(mostlyNoise(measured), follow) : follow();
   }
 
   /**
@@ -207,21 +234,52 @@ export class Bode {
    */
   take(frame) {
     const name = NAMES.find((known) => known === frame.kind) ?? "measured";
-    this.curves[name] = overGrid(frame, this.grid, this.at);
+    this.curves[name] = curveOf(frame, this.lines, this.grid, this.at);
+    delete this.drawn[name];
   }
 
   /** @param {Curves} name */
   drop(name) {
     delete this.curves[name];
+    delete this.drawn[name];
+  }
+
+  /** Show a curve that is computed from two others; null: the curves themselves. @param {Operation | null} operation */
+  compute(operation) {
+    this.operation = operation;
+    remember("bode-operation", operation ? [operation.kind, operation.a, operation.b].join("~") : "", "");
+    this.zooming.heights.fill(null);
+    this.zooming.note();
+    this.drop("result");
+    this.rebuild();
   }
 
   draw() {
-    const measured = this.curves.measured;
-    for (const name of NAMES) {
-      const curve = this.curves[name];
-      if (curve) curve.turns = name === "measured" || !measured ? 0 : turns(curve, measured);
+    if (!this.charts.length) return;
+    if (this.operation) {
+      this.drop("result");
+      const result = computed(this.operation, this.curves, this.lines, this.at);
+      if (result) this.curves.result = result;
     }
-    for (const [index, made] of this.charts.entries()) made.setData(this.data(index));
+    this.drop("what if");
+    const { measured: known } = this.curves;
+    const other =
+      this.filter && known && !this.operation ? tried(known, known.frame?.quantity ?? null, this.filter) : null;
+    if (other) this.curves["what if"] = other;
+    if (this.layout().join() !== this.laid.join()) this.build();
+    const ratio = this.operation?.kind === "ratio";
+    for (const name of this.laid) {
+      const curve = this.curves[name];
+      if (curve) this.drawn[name] ??= overGrid(curve, this.view.of(curve, ratio), this.grid.length);
+    }
+    const measured = this.drawn.measured;
+    for (const name of this.laid) {
+      const curve = this.drawn[name];
+      if (curve)
+        curve.turns =
+          name === "measured" || name === "what if" || !measured || this.view.wrapped ? 0 : turns(curve, measured);
+    }
+    for (const [index, made] of this.charts.entries()) made.setData(this.plane ? this.plane.data() : this.data(index));
     this.tell();
   }
 
@@ -234,34 +292,72 @@ export class Bode {
     else this.shown.delete(name);
     for (const made of this.charts)
       for (const [i, { label, show: now }] of made.series.entries())
-        if (i && String(label).split(" ")[0] === name && now !== show) made.setSeries(i, { show });
+        if (i && String(label).replace(/ (high|low)$/, "") === name && now !== show) made.setSeries(i, { show });
     this.draw();
+  }
+
+  // The visible ranges have changed.
+  zoomed() {
+    for (const made of this.charts) made.setData(made.data);
   }
 
   /** @param {Range} sight */
   zoom(sight) {
-    this.sight = sight;
-    for (const made of this.charts) made.setData(made.data);
+    this.zooming.across(sight);
+    this.zoomed();
   }
 
-  /** @param {Chart} u */
-  select(u) {
-    const { left, width } = u.select;
-    if (width > 8) this.zoom([u.posToVal(left, "x"), u.posToVal(left + width, "x")]);
-    u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+  reset() {
+    this.plane?.see(null);
+    this.zooming.reset();
+    this.zoomed();
+  }
+
+  /**
+   * Zoom around the cursor by a key or a button.
+   *
+   * @param {boolean} closer
+   */
+  magnify(closer) {
+    if (this.plane) return this.plane.magnify(closer);
+    const f = this.lines[this.line],
+      inside = f > this.sight[0] && f < this.sight[1];
+    const at = inside ? f : Math.sqrt(this.sight[0] * this.sight[1]);
+    this.zoom(scaled(this.sight, at, closer ? STEP : 1 / STEP, !this.view.linear));
+  }
+
+  /** @param {number} share */
+  shift(share) {
+    if (this.plane) return this.plane.shift(share, 0);
+    const [low, high] = shifted(this.sight, share, !this.view.linear);
+    if (low >= this.whole[0] && high <= this.whole[1]) this.zoom([low, high]);
   }
 
   /** @param {Chart} u */
   follow(u) {
-    const { left } = u.cursor;
-    if (left === undefined || left < 0) return;
+    const { left, top } = u.cursor;
+    if (left === undefined || top === undefined || left < 0) {
+      this.tooltip.hide();
+      return;
+    }
     const f = u.posToVal(left, "x");
-    this.line = this.lines.reduce(
-      (best, g, i) => (Math.abs(Math.log(g / f)) < Math.abs(Math.log(this.lines[best] / f)) ? i : best),
-      0,
-    );
+    this.go(f);
+    if (u.over.matches(":hover")) this.tooltip.show(u, this.lines[this.line], this.valuesAt(this.line), this.view);
+  }
+
+  /** The cursor to the line nearest to a frequency. @param {number} hz */
+  go(hz) {
+    this.line = this.nearest(hz);
     this.tell();
     this.ring();
+  }
+
+  /** @param {number} hz */
+  nearest(hz) {
+    return this.lines.reduce(
+      (best, g, i) => (Math.abs(Math.log(g / hz)) < Math.abs(Math.log(this.lines[best] / hz)) ? i : best),
+      0,
+    );
   }
 
   /**
@@ -276,57 +372,72 @@ export class Bode {
     this.ring();
   }
 
+  /** Fix cursor A, or B, at the line under the cursor. @param {boolean} second */
+  place(second) {
+    if (!this.charts.length) return;
+    this.cursors.place(second, this.lines[this.line]);
+    this.tell();
+    this.ring();
+  }
+
+  /** No fixed cursors, no marked peak. */
+  unplace() {
+    this.cursors.clear();
+    this.extremum = null;
+    this.tell();
+    this.ring();
+  }
+
+  /**
+   * The next peak or antiresonance to the right, or to the left: of the model, which is known between the lines, or of
+   * the measured curve.
+   *
+   * @param {boolean} right
+   */
+  seek(right) {
+    const name = this.laid.find((n) => n === "model" && this.curves.model && this.shown.has(n)) ?? this.main,
+      curve = this.curves[name];
+    if (!curve) return;
+    const { db } = this.view.of(curve, this.operation?.kind === "ratio");
+    const from = this.extremum?.hz ?? this.lines[this.line];
+    const found = next(curve.hz, db, curve.reach, from, right);
+    if (!found) return;
+    this.extremum = { ...found, of: name };
+    this.go(found.hz);
+  }
+
   ring() {
     for (const made of this.charts) made.redraw(false, false);
   }
 
   /**
-   * A ring around the measured value at the line under the cursor.
+   * Values of all visible curves at a line, in the view.
    *
-   * @param {Chart} u
+   * @param {number} line
+   * @returns {Found}
    */
-  mark(u) {
-    const index = this.charts.indexOf(u),
-      at = this.at[this.line],
-      f = this.lines[this.line];
-    if (index < 0 || f < this.sight[0] || f > this.sight[1]) return;
-    const x = u.valToPos(f, "x", true),
-      ctx = u.ctx;
-    ctx.save();
-    ctx.strokeStyle = colour("muted");
-    ctx.setLineDash([3, 4]);
-    ctx.beginPath();
-    ctx.moveTo(x, u.bbox.top);
-    ctx.lineTo(x, u.bbox.top + u.bbox.height);
-    ctx.stroke();
-    ctx.setLineDash([]);
-    ctx.lineWidth = 2 * devicePixelRatio;
-    const value = u.data[1][at];
-    if (value !== null && value !== undefined && Number.isFinite(value) && this.shown.has("measured")) {
-      ctx.strokeStyle = colour("ink");
-      ctx.beginPath();
-      ctx.arc(x, u.valToPos(value, "y", true), 6.5 * devicePixelRatio, 0, 7);
-      ctx.stroke();
-    }
-    ctx.restore();
-  }
-
-  tell() {
-    const at = this.at[this.line];
+  valuesAt(line) {
     /** @type {Found} */
     const found = {};
-    for (const name of NAMES) {
-      const curve = this.curves[name];
-      if (!curve || !this.shown.has(name)) continue;
-      const i = curve.frame.columns === this.grid.length && name === "model" ? at : this.line;
+    const at = this.at[line];
+    for (const name of LISTED.filter((listed) => this.laid.includes(listed))) {
+      const curve = this.curves[name],
+        drawn = this.drawn[name];
+      if (!curve || !drawn || !this.shown.has(name)) continue;
+      const i = curve.index === this.at ? line : at;
       found[name] = {
-        db: curve.frame.magnitude[i],
-        deg: curve.frame.phase[i] + curve.turns,
-        reach: curve.frame.reach[i],
-        coherence: curve.frame.coherence[i],
+        db: drawn.db[at] ?? NaN,
+        deg: (drawn.deg[at] ?? NaN) + drawn.turns,
+        reach: curve.reach[i],
+        noise: curve.noise[i],
+        coherence: curve.coherence[i],
         frame: curve.frame,
       };
     }
-    this.onCursor(this.lines[this.line], found);
+    return found;
+  }
+
+  tell() {
+    this.onCursor(this.lines[this.line], this.valuesAt(this.line));
   }
 }

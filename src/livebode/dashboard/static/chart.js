@@ -2,12 +2,16 @@
 // Common parts of the charts: colours, letters, ticks, and ranges that do not jump.
 import uPlot from "/static/uplot/uPlot.esm.js";
 import { colour, onTheme } from "./theme.js";
-import { hertz } from "./words.js";
 
 /** @typedef {uPlot} Chart */
 /** @typedef {[low: number, high: number]} Range */
 
-const FONT = '12px system-ui, "DejaVu Sans", sans-serif';
+const COLUMN_PX = 50,
+  ROW_PX = 30; // between marks
+const WALL_PX = 768; // of the window's width for each unit of scale: letters of 30 px on 1,920 px
+
+/** Size of letters and of their room; larger in the wall mode. */
+export const letters = () => (document.body.classList.contains("wall") ? Math.max(1, innerWidth / WALL_PX) : 1);
 /** @type {Set<Chart>} */
 const charts = new Set();
 onTheme(() => {
@@ -20,14 +24,17 @@ onTheme(() => {
  * @returns {uPlot.Axis}
  */
 export function axis(label, more = {}) {
+  const scale = letters(),
+    font = `${12 * scale}px system-ui, "DejaVu Sans", sans-serif`;
   return {
     label,
-    labelFont: FONT,
-    font: FONT,
-    labelSize: label ? 18 : 0,
+    labelFont: font,
+    font,
+    labelSize: label ? 18 * scale : 0,
     labelGap: 2,
     gap: 4,
-    size: 46,
+    size: 46 * scale,
+    space: (_u, at) => (at ? ROW_PX : COLUMN_PX) * scale,
     stroke: () => colour("muted"),
     grid: { stroke: () => colour("grid"), width: 1 },
     ticks: { stroke: () => colour("edge"), width: 1, size: 4 },
@@ -44,7 +51,7 @@ export function axis(label, more = {}) {
 export function frequencyTicks(lines) {
   return (u, _axis, low, high) => {
     const inside = lines().filter((f) => f >= low && f <= high);
-    const room = u.bbox.width / devicePixelRatio / 46;
+    const room = u.bbox.width / devicePixelRatio / (46 * letters());
     const apart = inside.every((f, i) => i === 0 || Math.log(f / inside[i - 1]) / Math.log(high / low) > 1 / room);
     if (inside.length && inside.length <= Math.min(12, room) && apart) return inside;
     const found = [];
@@ -58,19 +65,6 @@ export function frequencyTicks(lines) {
     return found;
   };
 }
-
-/**
- * @param {() => number[]} lines
- * @param {string} label
- */
-export const frequencyAxis = (lines, label) =>
-  axis(label, {
-    size: label ? 26 : 8,
-    labelSize: label ? 18 : 0,
-    splits: frequencyTicks(lines),
-    filter: (_u, splits) => splits,
-    values: (_u, splits) => splits.map((f) => (label ? hertz(f) : "")),
-  });
 
 /**
  * A range that grows immediately and shrinks after a delay, so that the picture is steady.
@@ -116,7 +110,9 @@ export function steady({ step, least, holdMs = 2500 }) {
  */
 export function degreeTicks(u, _axis, low, high) {
   const step =
-    [5, 10, 15, 30, 45, 90, 180, 360].find((s) => ((high - low) / s) * 26 < u.bbox.height / devicePixelRatio) || 720;
+    [5, 10, 15, 30, 45, 90, 180, 360].find(
+      (s) => ((high - low) / s) * 26 * letters() < u.bbox.height / devicePixelRatio,
+    ) || 720;
   const found = [];
   for (let d = Math.ceil(low / step) * step; d <= high + 1e-9; d += step) found.push(d);
   return found;
@@ -133,7 +129,7 @@ export function degreeTicks(u, _axis, low, high) {
 export function chart(host, options, data) {
   const size = () => ({ width: Math.max(60, host.clientWidth), height: Math.max(40, host.clientHeight) });
   const made = new uPlot(
-    { ...size(), legend: { show: false }, padding: [8, 10, 2, 0], pxAlign: 1, ...options },
+    { ...size(), legend: { show: false }, padding: [8 * letters(), 10, 2, 0], pxAlign: 1, ...options },
     data,
     host,
   );

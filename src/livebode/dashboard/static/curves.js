@@ -1,48 +1,103 @@
 // @ts-check
-// The curves of a Bode plot on one grid of frequencies: the lines and the points of the model between them.
-import { halfDeg, highDb, lowDb } from "./frames.js";
+// The curves of a Bode plot: at their own frequencies as they are, and over one grid as they are drawn.
+import { halfDeg, highDb, lowDb, REFERENCES } from "./frames.js";
 
 /** @import { Curves, Frame } from "./messages.js" */
+/** @import { Viewing } from "./view.js" */
 /** @typedef {(number | null | undefined)[]} Values Over the grid; `undefined` is connected, `null` is a gap. */
-
-/** @type {Curves[]} */
-export const NAMES = ["measured", "reference", "baseline", "model"];
-
-/** @typedef {ReturnType<typeof overGrid>} Curve */
+/** @typedef {Float32Array | Float64Array | number[]} Numbers */
 
 /**
- * From a frame at the lines or on the grid to arrays over the grid; between lines `undefined` (connected), at an
- * invalid line `null` (a gap).
+ * A curve at its own frequencies, in the displayed quantity, before any option of the view is applied. `reach` is
+ * 3σ/|value|, `noise` the same of the noise alone, `index` the place of each frequency in the grid.
  *
- * @param {Frame} frame
+ * @typedef {object} Curve
+ * @property {Frame | null} frame null where it is computed from others
+ * @property {number[]} hz
+ * @property {number[]} index
+ * @property {Numbers} db
+ * @property {Numbers} deg without jumps of whole turns
+ * @property {Numbers} reach
+ * @property {Numbers} noise
+ * @property {Numbers} coherence
+ */
+
+/** In the order of reading. @type {Curves[]} */
+export const LISTED = ["result", "measured", ...REFERENCES, "baseline", "model", "what if"];
+/** In the order of drawing: the model is above the measured points. @type {Curves[]} */
+export const NAMES = [...REFERENCES, "baseline", "measured", "model", "what if", "result"];
+
+/**
+ * @param {Frame} frame of one response or of a model
+ * @param {number[]} lines
  * @param {number[]} grid
  * @param {number[]} at index in the grid of each line
+ * @returns {Curve}
  */
-export function overGrid(frame, grid, at) {
-  const whole = frame.columns === grid.length && frame.kind === "model";
+export function curveOf(frame, lines, grid, at) {
+  const whole = frame.kind === "model" && frame.columns === grid.length;
+  return {
+    frame,
+    hz: whole ? grid : lines,
+    index: whole ? grid.map((_, i) => i) : at,
+    db: frame.magnitude,
+    deg: frame.phase,
+    reach: frame.reach,
+    noise: frame.noise,
+    coherence: frame.coherence,
+  };
+}
+
+/**
+ * A curve as complex numbers with their standard deviation.
+ *
+ * @param {Curve} curve
+ */
+export function complex({ db, deg, reach }) {
+  const count = db.length,
+    [re, im, sigma] = [new Float64Array(count), new Float64Array(count), new Float64Array(count)];
+  for (let i = 0; i < count; i++) {
+    const size = 10 ** (db[i] / 20),
+      angle = (deg[i] * Math.PI) / 180;
+    re[i] = size * Math.cos(angle);
+    im[i] = size * Math.sin(angle);
+    sigma[i] = (size * reach[i]) / 3;
+  }
+  return { re, im, sigma };
+}
+
+/** @typedef {ReturnType<typeof overGrid>} Drawn */
+
+/**
+ * From a curve to arrays over the grid; between its frequencies `undefined` (connected), where it is not valid `null`.
+ *
+ * @param {Curve} curve
+ * @param {Viewing} seen magnitude and phase in the view
+ * @param {number} points of the grid
+ */
+export function overGrid(curve, { db, deg }, points) {
+  const { index, reach, coherence } = curve;
   /** @param {(i: number) => number} of */
   const spread = (of) => {
     /** @type {Values} */
-    const found = new Array(grid.length).fill(undefined);
-    for (let i = 0; i < frame.columns; i++) {
+    const found = new Array(points).fill(undefined);
+    for (let i = 0; i < index.length; i++) {
       const value = of(i);
-      found[whole ? i : at[i]] = Number.isNaN(value) ? null : value;
+      found[index[i]] = Number.isNaN(value) ? null : value;
     }
     return found;
   };
-  const { magnitude, phase, reach, coherence } = frame;
   return {
-    db: spread((i) => magnitude[i]),
-    dbHigh: spread((i) => highDb(magnitude[i], reach[i])),
-    dbLow: spread((i) => lowDb(magnitude[i], reach[i])),
-    deg: spread((i) => phase[i]),
-    degHigh: spread((i) => phase[i] + halfDeg(reach[i])),
-    degLow: spread((i) => phase[i] - halfDeg(reach[i])),
+    db: spread((i) => db[i]),
+    dbHigh: spread((i) => highDb(db[i], reach[i])),
+    dbLow: spread((i) => lowDb(db[i], reach[i])),
+    deg: spread((i) => deg[i]),
+    degHigh: spread((i) => deg[i] + halfDeg(reach[i])),
+    degLow: spread((i) => deg[i] - halfDeg(reach[i])),
     // Values that differ from zero; other values of an overlaid curve must not set the scale.
-    dbSure: spread((i) => (reach[i] >= 1 ? NaN : magnitude[i])),
-    degSure: spread((i) => (reach[i] >= 1 ? NaN : phase[i])),
+    dbSure: spread((i) => (reach[i] >= 1 ? NaN : db[i])),
+    degSure: spread((i) => (reach[i] >= 1 ? NaN : deg[i])),
     coherence: spread((i) => coherence[i]),
-    frame,
     turns: 0,
   };
 }
@@ -56,8 +111,8 @@ const known = (v) => Number.isFinite(v);
 /**
  * Whole turns that shift the phase of a curve next to that of another one, degrees.
  *
- * @param {Curve} curve
- * @param {Curve} beside
+ * @param {Drawn} curve
+ * @param {Drawn} beside
  */
 export function turns(curve, beside) {
   const away = [];

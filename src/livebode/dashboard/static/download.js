@@ -1,49 +1,16 @@
 // @ts-check
-// Downloads: the picture from the canvases, the exact numbers from the server.
+// Downloads: the exact numbers from the server, and their menu.
 import { address } from "./link.js";
 import { element } from "./make.js";
-import { colour, drawing } from "./theme.js";
 
 /**
  * @param {string} name
  * @param {Blob} blob
  */
-function save(name, blob) {
+export function save(name, blob) {
   const link = element("a", { href: URL.createObjectURL(blob), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-}
-
-/**
- * The displayed Bode plot with a title, as a PNG.
- *
- * @param {string} name
- * @param {string} title
- * @param {string} words
- * @param {import("./chart.js").Chart[]} charts
- */
-export function picture(name, title, words, charts) {
-  const ratio = devicePixelRatio,
-    head = 54 * ratio;
-  const canvases = charts.map((made) => made.ctx.canvas);
-  const sheet = element("canvas");
-  sheet.width = Math.max(...canvases.map((c) => c.width));
-  sheet.height = head + canvases.reduce((sum, c) => sum + c.height, 0);
-  const ctx = drawing(sheet);
-  ctx.fillStyle = colour("paper");
-  ctx.fillRect(0, 0, sheet.width, sheet.height);
-  ctx.fillStyle = colour("ink");
-  ctx.font = `600 ${16 * ratio}px system-ui, "DejaVu Sans", sans-serif`;
-  ctx.fillText(title, 14 * ratio, 24 * ratio);
-  ctx.fillStyle = colour("muted");
-  ctx.font = `${12.5 * ratio}px system-ui, "DejaVu Sans", sans-serif`;
-  ctx.fillText(words, 14 * ratio, 44 * ratio);
-  let top = head;
-  for (const canvas of canvases) {
-    ctx.drawImage(canvas, 0, top);
-    top += canvas.height;
-  }
-  sheet.toBlob((blob) => blob && save(name, blob), "image/png");
 }
 
 /**

@@ -1,12 +1,23 @@
 // @ts-check
 // Frames from the server as typed arrays; frames.py documents the layout.
 
-/** @import { Frame, FrameKind, Quantity } from "./messages.js" */
+/** @import { Frame, FrameKind, Quantity, Reference } from "./messages.js" */
 
+/** @type {Reference[]} */
+export const REFERENCES = [
+  "reference",
+  "reference 2",
+  "reference 3",
+  "reference 4",
+  "reference 5",
+  "reference 6",
+  "reference 7",
+  "reference 8",
+];
 /** @type {FrameKind[]} */
-const KINDS = ["newest", "moment", "reference", "baseline", "model", "rows", "history"];
+const KINDS = ["newest", "moment", "reference", "baseline", "model", "rows", "history", ...REFERENCES.slice(1)];
 /** @type {Quantity[]} */
-const QUANTITIES = ["plant", "open loop", "closed loop", "sensitivity"];
+export const QUANTITIES = ["plant", "open loop", "closed loop", "sensitivity"];
 
 /**
  * All frames of a message, in order.
@@ -18,7 +29,7 @@ export function* framesOf(buffer) {
   const view = new DataView(buffer);
   let at = 0;
   while (at + 16 <= buffer.byteLength) {
-    if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 1)
+    if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 2)
       throw new Error("this is not a frame of curves");
     const rows = view.getUint32(at + 8, true),
       columns = view.getUint32(at + 12, true),
@@ -46,6 +57,7 @@ export function* framesOf(buffer) {
       magnitude: floats(),
       phase: floats(),
       reach: floats(),
+      noise: floats(),
       coherence: floats(),
     };
     at = (next + 7) & ~7;

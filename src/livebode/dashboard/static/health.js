@@ -59,7 +59,7 @@ function tilesOf(found, facts, live) {
         tile(
           tr("backlog"),
           `${fixed(source.waiting_s, 1)} s`,
-          source.waiting_s > 2,
+          Boolean(found.backlog_s),
           tr("received, but not yet tracked"),
         );
     }

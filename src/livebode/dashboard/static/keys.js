@@ -6,6 +6,9 @@ import { element } from "./make.js";
 /** @typedef {() => void} Act */
 /** @typedef {[keys: string[], words: string, act: Act | null]} Action Without `act`, each key has its own. */
 
+/** What is printed on a key. @type {Record<string, string>} */
+const NAMES = { " ": tr("Space"), PageUp: tr("Page Up"), PageDown: tr("Page Down") };
+
 /**
  * Whether the element with the focus uses a key itself.
  *
@@ -24,15 +27,14 @@ function uses(focus, key) {
 }
 
 /**
- * @param {HTMLDialogElement} dialog
  * @param {HTMLElement} list
  * @param {Action[]} actions
  * @param {Record<string, Act>} each the action of a key that shares its words with others
  */
-export function keys(dialog, list, actions, each) {
+export function keys(list, actions, each) {
   list.replaceChildren(
     ...actions.flatMap(([names, words]) => [
-      element("dt", {}, ...names.flatMap((n) => [element("kbd", {}, n === " " ? tr("Space") : n), " "])),
+      element("dt", {}, ...names.flatMap((n) => [element("kbd", {}, NAMES[n] ?? n), " "])),
       element("dd", {}, words),
     ]),
   );
@@ -42,7 +44,7 @@ export function keys(dialog, list, actions, each) {
     actions.flatMap(([names, , act]) => names.map((name) => [real[name] || name, act || each[name]])),
   );
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || dialog.open) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]")) return;
     if (uses(event.target, event.key)) return;
     const act = known.get(event.key) || (event.key.length === 1 && known.get(event.key.toUpperCase()));
     if (!act) return;

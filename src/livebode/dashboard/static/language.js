@@ -23,7 +23,7 @@ const ENGLISH = {
   recorded: [],
   languages: { en: "English" },
 };
-const SHOWN = ["title", "aria-label"];
+const SHOWN = ["title", "aria-label", "placeholder"];
 
 function chosen() {
   try {

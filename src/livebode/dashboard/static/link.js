@@ -5,6 +5,11 @@ import { framesOf } from "./frames.js";
 /** @import { Frame, News, ClientRequest } from "./messages.js" */
 
 const PAUSE_MS_MAX = 8000;
+// The page of one run of many is /run/NAME/, and its requests are below that.
+const HERE = new URL(".", location.href).pathname;
+
+/** @param {string} path with a leading slash */
+export const below = (path) => HERE + path.slice(1);
 
 export class Link {
   /**
@@ -24,7 +29,9 @@ export class Link {
   }
 
   connect() {
-    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
+    const socket = new WebSocket(
+      `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${below("/live")}`,
+    );
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.pauseMs = 250;
@@ -72,7 +79,7 @@ export class Link {
  * @param {Query} query
  */
 export const address = (path, query) =>
-  `${path}?${new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)]))}`;
+  `${below(path)}?${new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)]))}`;
 
 /**
  * @param {string} path
@@ -97,7 +104,7 @@ export const reason = (error) => (error instanceof Error ? error.message : Strin
  * @param {object} body
  */
 export async function post(path, body) {
-  const answer = await fetch(path, {
+  const answer = await fetch(below(path), {
     method: "POST",
     headers: { "content-type": "application/json" },
     body: JSON.stringify(body),

@@ -1,56 +1,69 @@
 // @ts-check
 // The page: messages from the server go to the panels, actions of the person go to the server.
+import { chosen, enter, remember } from "./address.js";
+import { alarmMoment } from "./alarmmoment.js";
 import { Bode } from "./bode.js";
-import { setClock } from "./clock.js";
+import { onClock, setClock } from "./clock.js";
 import { controls } from "./controls.js";
+import { curvesMenu } from "./curves-menu.js";
+import { describe } from "./describe.js";
 import { Events } from "./events.js";
+import { delayMs, marginMarks, modes } from "./fitted.js";
+import { QUANTITIES } from "./frames.js";
 import { health } from "./health.js";
 import { tr } from "./language.js";
+import { legend } from "./legend.js";
 import { Link } from "./link.js";
+import { firstLook } from "./look.js";
+import { Lost } from "./lost.js";
 import { byId as $, choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
-import { Margins } from "./margins.js";
+import { isMargin, Margins, marginWords } from "./margins.js";
 import { past } from "./past.js";
 import { readout } from "./readout.js";
 import { recognised } from "./recognition.js";
+import { References } from "./references.js";
 import { Rows } from "./rows.js";
+import { Saved } from "./saved.js";
+import { axisInAddress, rememberAxis, rememberMoment, timeInAddress } from "./shared.js";
+import { Signals } from "./signals.js";
 import { applyTheme } from "./theme.js";
+import { TimeZoom } from "./time-zoom.js";
 import { Timeline } from "./timeline.js";
+import { tools } from "./tools.js";
 import { Tracking } from "./tracking.js";
 import { Trends } from "./trends.js";
-import { lamp, verdict } from "./verdict.js";
+import { lamp } from "./verdict.js";
+import { viewMenu } from "./view-menu.js";
+import { Wall } from "./wall.js";
+import { whatIfMenu } from "./whatif-menu.js";
 import { named } from "./words.js";
+import { zoneChoice } from "./zone.js";
 
-/** @import { Beginning, Curves, Page, Quantity, Run } from "./messages.js" */
+/** @import { Beginning, Page, Quantity, Run } from "./messages.js" */
 
 const TEXT_MS = 120,
   TRACK_MS = 100,
   MAP_MS = 600;
-const REFERENCE_GONE = tr(
-  "A new run with other lines or another quantity has started: the frozen reference was released.",
-);
-/** @type {[name: Curves, words: string, line: string][]} */
-const LEGEND = [
-  ["measured", tr("measured ±3σ"), ""],
-  ["reference", tr("reference"), "dashed"],
-  ["baseline", tr("baseline"), "dotted"],
-  ["model", tr("fitted model"), "dashed"],
-];
+const REFERENCE_GONE = tr("A new run with other lines or another quantity has started: the references were released.");
+const NO_POSITION = tr("This run has no position: name its channel as schedule under [signals]."),
+  NO_MOTION = tr("The position does not change in the time shown.");
 
 applyTheme();
 /** @type {Page} */
 const page = {
   axis: 0,
-  quantity: null,
+  quantity: QUANTITIES.find((q) => q === chosen("quantity", String())) ?? null,
   spanS: "20",
   tab: "map",
   up: false,
   facts: null,
   health: null,
+  verdicts: [],
   schedule: { name: "", unit: "" },
-  frozen: false,
   rows: new Rows(1),
   past: null,
+  zoom: null,
   seen: null,
   read: null,
   dirty: new Set(),
@@ -60,19 +73,38 @@ const page = {
   seeking: false,
 };
 const axisChoice = $("axis", HTMLSelectElement);
-const bode = new Bode([$("magnitude"), $("phase"), $("coherence")], (hz, found) => {
-  page.read = [hz, found];
-  page.dirty.add("read");
-});
-const tracking = new Tracking($("tracking"), $("tracking-lines"), (timeS) => timeline.go(timeS));
+const bode = new Bode(
+  [$("magnitude"), $("phase"), $("coherence")],
+  (hz, found) => {
+    page.read = [hz, found];
+    page.dirty.add("read");
+  },
+  {
+    margins: () => marginMarks(margins.items, timeline.atS ?? NaN),
+    laid: () => drawLegend(),
+    modes: () => modes(parameters.items.values(), timeline.atS ?? NaN),
+  },
+);
+const tracking = new Tracking($("tracking"), $("tracking-lines"));
 const map = new LineMap($("map", HTMLCanvasElement), $("map-hover"));
 const parameters = new Trends(
   $("pane-parameters"),
   (t) => t.model !== "margins",
   tr("No model is fitted: add [fit] to the configuration."),
 );
-const margins = new Margins($("pane-margins"));
-const events = new Events($("events"), $("alarms-only", HTMLInputElement), $("alarm-count"), (text) => complain(text));
+const margins = new Margins($("margins"));
+const marginTrends = new Trends($("margin-trends"), isMargin, "", marginWords);
+const events = new Events(
+  {
+    host: $("events"),
+    views: $("events-view"),
+    filter: $("events-filter", HTMLInputElement),
+    count: $("alarm-count"),
+  },
+  (text) => complain(text),
+  (cause, timeS) => showAlarm(events.all.get(cause), timeS),
+);
+const wall = new Wall($("wall"), page, () => bode.rebuild());
 const timeline = new Timeline(
   {
     slider: $("time", HTMLInputElement),
@@ -81,7 +113,16 @@ const timeline = new Timeline(
     to: $("time-to"),
     now: $("time-now"),
   },
-  { onMoment: (timeS) => showMoment(timeS), onLive: () => goLive() },
+  {
+    onMoment: (timeS) => {
+      rememberMoment(timeS);
+      showMoment(timeS);
+    },
+    onLive: () => {
+      rememberMoment(null);
+      goLive();
+    },
+  },
 );
 
 /** @param {string} text */
@@ -101,22 +142,30 @@ const link = new Link({
   },
   onNews: (news) => {
     const beginning = news.facts ? news : null;
-    if (beginning && overtaken(beginning)) return;
+    // Until the facts of the axis in the address arrive, what comes belongs to another one.
+    if (beginning ? overtaken(beginning) || elsewhere(beginning) : !page.facts) return;
     if (news.error) complain(news.error);
-    if (news.span && setClock(news.span.clock)) newClock();
+    if (news.span && setClock(news.span.clock, news.span.start_s ?? 0)) newClock();
     if (beginning) begin(beginning);
-    if (news.span) timeline.take(news.span);
+    if (news.span) {
+      timeline.take(news.span);
+      zoom.renew();
+      restore(news.span);
+    }
     if (news.health && page.facts?.begun) {
       page.health = news.health;
       health($("health"), news.health, page.facts, timeline.span);
       margins.lines = news.health.ms_at_lines;
       page.dirty.add("trends");
     }
-    if (news.notices) events.take(news.notices);
+    if (news.verdicts) page.verdicts = news.verdicts;
+    events.nowS = timeline.span.last_s;
+    if (news.notices) events.take(news.notices, news.history, news.forgotten);
     if (news.newest) {
       for (const trend of news.newest) {
         parameters.take(trend);
         margins.take(trend);
+        marginTrends.take(trend);
       }
       page.dirty.add("trends");
     }
@@ -129,7 +178,7 @@ const link = new Link({
       page.dirty.add("rows");
       return;
     }
-    if (frame.kind !== "reference" && timeline.atS !== null) return;
+    if (!frame.kind.startsWith("reference") && timeline.atS !== null) return;
     bode.take(frame);
     page.dirty.add("bode");
   },
@@ -144,6 +193,54 @@ const overtaken = ({ facts, axes }) =>
   page.wanted !== undefined && page.wanted < axes.length && facts.axis !== page.wanted;
 
 /**
+ * Whether the address names another axis, which is requested now.
+ *
+ * @param {Beginning} news
+ */
+function elsewhere(news) {
+  const other = page.wanted === undefined ? axisInAddress(news, complain) : null;
+  page.wanted ??= news.facts.axis;
+  if (other === null) return false;
+  page.axis = page.wanted = other;
+  link.request({ kind: "watch", axis: other, quantity: null }, "watch");
+  return true;
+}
+
+let restored = false;
+/**
+ * Show the moment and the span of the address, as soon as their run is there.
+ *
+ * @param {import("./messages.js").Span} span
+ */
+function restore(span) {
+  if (restored || !page.facts?.begun || span.last_s === null || span.first_s === null) return;
+  restored = true;
+  zoom.restore(span, complain);
+  const timeS = timeInAddress("at", span, complain);
+  if (Number.isFinite(timeS)) timeline.go(timeS);
+}
+
+/**
+ * A person has chosen another axis; what belonged to the one before leaves the address.
+ *
+ * @param {number} axis
+ */
+function axisChosen(axis) {
+  page.axis = page.wanted = axis;
+  page.quantity = null;
+  timeline.atS = null;
+  page.zoom = null;
+  link.forget("pause");
+  link.request({ kind: "resume" });
+  rememberAxis(
+    Array.from(axisChoice.options, ({ text }) => text),
+    axis,
+  );
+  for (const name of ["quantity", "lines", "at", "from", "to"]) remember(name, "", "");
+  zoom.draw();
+}
+
+/**
  * The axis or its quantity has changed, the run has started, or the link is new.
  *
  * @param {Beginning} news
@@ -153,6 +250,7 @@ function begin({ facts, axes, trends }) {
   $("axis-label").hidden = axes.length < 2;
   if (axisChoice.options.length !== axes.length)
     axisChoice.replaceChildren(...axes.map((name, i) => element("option", { value: i }, name)));
+  axisChoice.value = String(facts.axis);
   if (!facts.begun) {
     page.axis = facts.axis;
     document.title = `${facts.name} · livebode`;
@@ -163,6 +261,8 @@ function begin({ facts, axes, trends }) {
   const other = page.axis === facts.axis && page.measured !== measured;
   page.measured = measured;
   const fits = facts.quantities.find((q) => q.name === page.quantity && !q.why_not);
+  const refused = page.quantity && !fits ? whyNot(facts, page.quantity) : "";
+  if (refused) remember("quantity", "", "");
   const key = JSON.stringify([facts.axis, facts.frequency_hz, fits ? page.quantity : facts.quantity]);
   page.quantity = fits ? page.quantity : facts.quantity;
   page.axis = facts.axis;
@@ -179,25 +279,41 @@ function begin({ facts, axes, trends }) {
     watch,
   );
   if (page.key !== key) {
-    const shown = facts.quantities.find((q) => q.name === page.quantity);
     page.key = key;
     page.rows = new Rows(facts.frequency_hz.length);
     page.past = null;
-    bode.begin(facts, shown?.unit ?? "", shown?.symbol ?? "");
+    bode.begin(facts, page.quantity ?? facts.quantity);
     tracking.begin(facts, page.schedule);
     map.begin(facts, page.schedule);
     fill();
+    saved.fetch();
   }
-  const gone = other && page.frozen;
-  if (gone) letGo();
-  legend();
+  const gone = other && references.stored.size > 0;
+  if (gone) references.releaseAll();
+  if (!page.restored) references.restore();
+  page.restored = true;
+  over.disable("position", facts.schedule ? "" : NO_POSITION);
+  mapOver.disable("position", facts.schedule ? "" : NO_POSITION);
+  drawLegend();
   parameters.begin(trends);
   margins.begin(trends, whyNoMargins(facts));
+  marginTrends.begin(trends);
   events.begin(facts.axis, facts.role === "operator" && facts.live);
-  const remarks = [gone ? REFERENCE_GONE : "", facts.remark].filter(Boolean);
+  const remarks = [gone ? REFERENCE_GONE : "", refused, facts.remark].filter(Boolean);
   if (remarks.length) complain(remarks.join(" "));
   if (timeline.atS !== null) showMoment(timeline.atS);
   if (facts.watched !== page.quantity) watchShown();
+}
+
+/**
+ * @param {Run} facts
+ * @param {string} quantity
+ */
+function whyNot({ quantities }, quantity) {
+  const why = quantities.find(({ name }) => name === quantity)?.why_not;
+  return why
+    ? `${recognised(quantity)}: ${recognised(why)}`
+    : tr("{quantity} is not a quantity of this page.", { quantity });
 }
 
 // Another axis was chosen, whose machine may not have sent anything: clear the page.
@@ -206,11 +322,12 @@ function clear() {
   if (page.facts)
     page.facts = { ...page.facts, begun: false, name: axisChoice.selectedOptions[0]?.text ?? page.facts.name };
   page.rows.clear();
-  for (const panel of [bode, tracking, map]) panel.clear();
+  for (const panel of [bode, tracking, map, signals]) panel.clear();
   for (const id of ["health", "readout", "quantities"]) $(id).replaceChildren();
   parameters.begin([]);
   margins.lines = null;
   margins.begin([], tr("No samples have arrived yet."));
+  marginTrends.begin([]);
   events.begin(page.axis, false);
   timeline.take({ first_s: null, last_s: null, live: false, growing: false });
   status();
@@ -218,8 +335,15 @@ function clear() {
 
 // All displayed times follow the new clock.
 function newClock() {
-  events.draw();
-  for (const what of ["bode", "rows", "trends"]) page.dirty.add(what);
+  showClock();
+  status();
+  events.redraw();
+  timeline.draw();
+  tracking.build();
+  signals.redraw();
+  parameters.refresh();
+  marginTrends.refresh();
+  for (const what of ["bode", "read", "rows", "trends"]) page.dirty.add(what);
 }
 
 /** @param {Run} facts */
@@ -241,6 +365,8 @@ function watch(quantity, why) {
   }
   if (quantity === page.quantity) return;
   page.quantity = quantity;
+  enter();
+  remember("quantity", quantity, (page.facts?.begun && page.facts.quantity) || "");
   choose($("quantities"), quantity);
   page.key = null;
   watchShown();
@@ -250,71 +376,22 @@ function status() {
   const { up, facts, health } = page;
   if (!facts) return;
   const known = { up, facts, health };
+  document.body.classList.toggle("not-begun", !facts.begun);
   const [word, look] = lamp(known, timeline.span, timeline.atS !== null);
   $("lamp").className = `lamp ${look}`;
   $("status-text").textContent = `${facts.name} · ${word}`;
-  const [judged, tone, why] = verdict(known, events.open, look);
-  Object.assign($("verdict"), { textContent: judged, className: `verdict ${tone}`, title: why, hidden: false });
+  lost.show(known, timeline.span.live && timeline.atS === null);
+  firstLook(page);
+  wall.draw();
 }
 
-function legend() {
-  const { facts } = page;
-  const hidden = {
-    measured: false,
-    reference: !page.frozen,
-    baseline: !(facts?.begun && facts.baseline),
-    model: !(facts?.begun && facts.model),
-  };
-  $("legend").replaceChildren(
-    ...LEGEND.map(([name, words, line]) => {
-      const swatch = element("span", { class: `swatch ${line}`, "aria-hidden": "true" });
-      swatch.style.color = `var(--${name})`;
-      const made = element(
-        "button",
-        {
-          type: "button",
-          "aria-pressed": String(bode.shown.has(name)),
-          "data-name": name,
-          onclick: () => {
-            bode.toggle(name, !bode.shown.has(name));
-            legend();
-          },
-        },
-        swatch,
-        words,
-      );
-      made.hidden = hidden[name];
-      return made;
-    }),
-  );
-}
+const drawLegend = () => legend($("legend"), bode, page.facts, references.names);
 
-// Freeze the response that is shown as a reference, or release the frozen one.
-function freeze() {
-  if (page.frozen) {
-    letGo();
-    return;
-  }
-  const timeS = bode.curves.measured?.frame.timeS[0];
-  if (timeS === undefined) return;
-  link.request({ kind: "freeze", time_s: timeS }, "freeze");
-  frozen(true);
-}
-
-function letGo() {
-  link.forget("freeze");
-  link.request({ kind: "unfreeze" });
-  bode.drop("reference");
-  page.dirty.add("bode");
-  frozen(false);
-}
-
-/** @param {boolean} is */
-function frozen(is) {
-  page.frozen = is;
-  $("freeze").textContent = is ? tr("Unfreeze") : tr("Freeze");
-  $("freeze").classList.toggle("primary", is);
-  legend();
+// References, saved curves or annotations have changed.
+function curvesChanged() {
+  page.dirty.add("bode").add("read");
+  drawLegend();
+  curves?.fill();
 }
 
 /** @param {number} now */
@@ -332,16 +409,43 @@ function draw(now) {
     return true;
   };
   if (due("bode", 0)) bode.draw();
-  if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule);
+  if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule, bode);
   if (due("rows", TRACK_MS)) drawRows(now);
-  if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) map.draw(...page.seen);
+  if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) {
+    map.draw(...page.seen);
+    if (map.cells && page.facts?.schedule) mapOver.disable("position", map.cells.moved ? "" : NO_MOTION);
+  }
   if (due("trends", 250)) {
-    if (page.tab === "parameters") parameters.draw(timeline.atS ?? NaN);
-    if (page.tab === "margins") margins.draw(timeline.atS ?? NaN);
+    if (page.tab === "parameters") parameters.draw(timeline.atS ?? NaN, page.zoom);
+    if (page.tab === "margins") {
+      margins.draw(timeline.atS ?? NaN);
+      marginTrends.draw(timeline.atS ?? NaN, page.zoom);
+    }
   }
 }
 
 const { fill, showMoment, goLive, drawRows } = past(page, { bode, tracking, timeline, link }, { complain, status });
-controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, watchShown, clear, complain });
-window.livebode = { page, bode, tracking, map, parameters, margins, events, timeline };
+const references = new References(bode, link, { changed: curvesChanged, complain });
+const saved = new Saved(() => page.axis, {
+  changed: (annotations) => {
+    bode.annotations = annotations;
+    curvesChanged();
+  },
+  complain,
+});
+const zoom = new TimeZoom(page, tracking, timeline, $("zoomed"), fill);
+const signals = new Signals({ words: $("signals-words"), charts: $("signals") }, page, timeline, bode.view);
+const parts = { bode, tracking, map, signals, timeline, events, wall, references };
+const { over, mapOver } = controls(page, parts, { watch, fill, watchShown, clear, complain, axisChosen });
+const showAlarm = alarmMoment(page, timeline, { references, complain });
+tools($("bode-tools"), bode);
+viewMenu($("bode-view"), $("bode-view-panel"), bode, () => delayMs(parameters.items.values(), timeline.atS ?? NaN));
+whatIfMenu(bode);
+const operator = () => page.facts?.role === "operator";
+const curves = curvesMenu($("bode-curves"), $("bode-curves-panel"), { bode, references, saved, operator, complain });
+const showClock = zoneChoice($("clock", HTMLSelectElement));
+const lost = new Lost($("lost"));
+describe(page, { bode, tracking, map, trends: [parameters, marginTrends] });
+onClock(newClock);
+window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom };
 requestAnimationFrame(draw);

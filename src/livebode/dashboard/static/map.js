@@ -1,25 +1,17 @@
 // @ts-check
-// Position × frequency (time × frequency at standstill): the level, or its change from the median of the place.
-import { moment, ticks, timeLabel } from "./clock.js";
+// Position × frequency, or time × frequency as a waterfall: the level, its change from the median of the place, or the
+// coherence.
+import { moment } from "./clock.js";
 import { tr } from "./language.js";
+import { sorted } from "./map-cells.js";
 import { between } from "./rows.js";
 import { colour, drawing, onTheme } from "./theme.js";
-import { fixed, hertz, label, mark, signed } from "./words.js";
+import { timeLabel, timeMarks, timeSplits } from "./time-ticks.js";
+import { fixed, hertz, label, mark, plain, signed } from "./words.js";
 
+/** @import { Cells, Shown } from "./map-cells.js" */
 /** @import { History, Named } from "./messages.js" */
 /** @typedef {[red: number, green: number, blue: number]} Colour */
-
-/**
- * Values by column and line, and where the columns are: from `low` in steps, in s or in the unit of the schedule.
- *
- * @typedef {object} Cells
- * @property {number[][]} level
- * @property {number[][]} change
- * @property {number} low
- * @property {number} step
- * @property {number} columns
- * @property {boolean} moving
- */
 
 /**
  * @typedef {object} Scales
@@ -31,7 +23,12 @@ import { fixed, hertz, label, mark, signed } from "./words.js";
  * @property {boolean} change
  */
 
-const CELLS = 56;
+/** @type {Record<Shown, string>} */
+const WORDS = {
+  level: tr("map of the level"),
+  change: tr("map of the change"),
+  coherence: tr("map of the coherence"),
+};
 /**
  * Cividis (Nuñez, Anderton, Renslow 2018), which looks the same with any colour vision.
  *
@@ -82,19 +79,6 @@ function shade(stops, share) {
   return `rgb(${stops[i].map((c, k) => Math.round(c + t * (stops[i + 1][k] - c))).join(",")})`;
 }
 
-/** @param {number[]} values */
-const middle = (values) => {
-  values.sort((a, b) => a - b);
-  const h = values.length >> 1;
-  return values.length % 2 ? values[h] : (values[h - 1] + values[h]) / 2;
-};
-
-// The mean of the newest quarter.
-const newest = (/** @type {number[]} */ values) => {
-  const quarter = Math.max(1, values.length >> 2);
-  return values.slice(-quarter).reduce((a, b) => a + b, 0) / quarter;
-};
-
 export class LineMap {
   /**
    * @param {HTMLCanvasElement} canvas
@@ -103,8 +87,10 @@ export class LineMap {
   constructor(canvas, hover) {
     this.canvas = canvas;
     this.hover = hover;
-    /** @type {"level" | "change"} */
+    /** @type {Shown} */
     this.what = "level";
+    /** @type {"position" | "time"} */
+    this.over = "position";
     this.begun = false;
     /** @type {number[]} */
     this.lines = [];
@@ -147,46 +133,11 @@ export class LineMap {
    * @param {number} toS
    */
   draw(rows, fromS, toS) {
-    this.cells = this.sorted(rows, between(rows, fromS, toS));
+    this.cells = sorted(rows, between(rows, fromS, toS), this.lines.length, this.over);
     this.paint();
   }
 
-  /**
-   * @param {History} rows
-   * @param {number[]} order
-   * @returns {Cells | null}
-   */
-  sorted(rows, order) {
-    const moving = order.some((r) => Number.isFinite(rows.schedule[r])),
-      x = moving ? rows.schedule : rows.timeS;
-    const known = order.filter((r) => Number.isFinite(x[r]));
-    if (!known.length) return null;
-    let low = Infinity,
-      high = -Infinity;
-    for (const r of known) {
-      low = Math.min(low, x[r]);
-      high = Math.max(high, x[r]);
-    }
-    const columns = Math.max(1, Math.min(CELLS, Math.ceil(known.length / 6))),
-      step = (high - low) / columns || 1;
-    /** @type {number[][]} */
-    const bins = Array.from({ length: columns }, () => []);
-    for (const r of known) bins[Math.min(columns - 1, Math.floor((x[r] - low) / step))].push(r);
-    /** @type {(of: (values: number[]) => number) => (bin: number[]) => number[]} */
-    const each = (of) => (bin) =>
-      this.lines.map((_, line) => {
-        const values = bin.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite);
-        return values.length ? of(values) : NaN;
-      });
-    const level = bins.map(each(newest));
-    if (!level.flat().some(Number.isFinite)) return null;
-    const all = moving ? [] : each(middle)(known),
-      usual = moving ? bins.map(each(middle)) : bins.map(() => all);
-    return { level, change: level.map((c, i) => c.map((v, k) => v - usual[i][k])), low, step, columns, moving };
-  }
-
-  box() {
-    const { clientWidth: w, clientHeight: h } = this.canvas;
+  box({ w, h } = { w: this.canvas.clientWidth, h: this.canvas.clientHeight }) {
     return { w, h, left: 48, top: 8, right: w - 78, bottom: h - 38 };
   }
 
@@ -198,27 +149,43 @@ export class LineMap {
   }
 
   paint() {
-    const { canvas, cells } = this,
-      { w, h, left, top, right, bottom } = this.box();
+    const { canvas } = this,
+      { clientWidth: w, clientHeight: h } = canvas;
     if (w < 10 || h < 10 || !this.begun) return;
     const ratio = devicePixelRatio,
       ctx = drawing(canvas);
     canvas.width = Math.round(w * ratio);
     canvas.height = Math.round(h * ratio);
     ctx.scale(ratio, ratio);
+    this.drawOn(ctx, w, h);
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} ctx
+   * @param {number} w
+   * @param {number} h
+   */
+  drawOn(ctx, w, h) {
+    const { cells } = this,
+      box = this.box({ w, h }),
+      { left, top, right, bottom } = box;
     ctx.font = '12px system-ui, "DejaVu Sans", sans-serif';
     ctx.fillStyle = colour("muted");
     if (!cells) {
       ctx.fillText(tr("no valid response"), left, top + 20);
       return;
     }
-    const values = cells[this.what],
+    const values = cells.of(this.what),
       flat = values.flat().filter(Number.isFinite);
     const change = this.what === "change",
       edges = this.edges();
     const sizes = flat.map(Math.abs).sort((a, b) => a - b),
       reach = Math.max(0.1, sizes[Math.floor(0.99 * (sizes.length - 1))] || 0);
-    const [low, high] = change ? [-reach, reach] : [Math.min(...flat), Math.max(...flat, Math.min(...flat) + 0.1)];
+    const [low, high] = change
+      ? [-reach, reach]
+      : this.what === "coherence"
+        ? [0, 1]
+        : [Math.min(...flat), Math.max(...flat, Math.min(...flat) + 0.1)];
     const stops = change ? CHANGES[document.documentElement.dataset.theme ?? "light"] || CHANGES.light : LEVELS;
     /** @param {number} log */
     const yOf = (log) => bottom - ((log - edges[0]) / (edges[edges.length - 1] - edges[0])) * (bottom - top);
@@ -232,15 +199,15 @@ export class LineMap {
         const y = yOf(edges[k + 1]);
         ctx.fillRect(left + i * width, y, width + 0.6, yOf(edges[k]) - y + 0.6);
       }
-    this.scales(ctx, { cells, low, high, stops, yOf, change });
+    this.scales(ctx, { cells, low, high, stops, yOf, change }, box);
   }
 
   /**
    * @param {CanvasRenderingContext2D} ctx
    * @param {Scales} drawn
+   * @param {ReturnType<LineMap["box"]>} box
    */
-  scales(ctx, { cells, low, high, stops, yOf, change }) {
-    const { left, top, right, bottom, h } = this.box();
+  scales(ctx, { cells, low, high, stops, yOf, change }, { left, top, right, bottom, h }) {
     ctx.fillStyle = colour("muted");
     ctx.textAlign = "right";
     ctx.textBaseline = "middle";
@@ -261,12 +228,12 @@ export class LineMap {
     ctx.textAlign = "center";
     ctx.textBaseline = "top";
     const reach = cells.step * cells.columns,
-      places = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(reach / 4)))),
-      values = Array.from({ length: 5 }, (_, i) => Number((cells.low + (reach * i) / 4).toFixed(places)));
-    (cells.moving ? values.map(mark) : ticks(values, reach / 4)).forEach((text, i) => {
-      ctx.fillText(text, left + ((right - left) * i) / 4, bottom + 4);
+      end = cells.low + reach;
+    const values = cells.moving ? fifths(cells.low, reach) : timeSplits(cells.low, end, right - left);
+    (cells.moving ? values.map(mark) : timeMarks(values)).forEach((text, i) => {
+      ctx.fillText(text, left + ((right - left) * (values[i] - cells.low)) / reach, bottom + 4);
     });
-    ctx.fillText(cells.moving ? label(this.schedule) : timeLabel(cells.low), (left + right) / 2, h - 15);
+    ctx.fillText(cells.moving ? label(this.schedule) : timeLabel(cells.low, end), (left + right) / 2, h - 15);
     for (let i = 0; i < 60; i++) {
       ctx.fillStyle = shade(stops, i / 59);
       ctx.fillRect(right + 10, bottom - ((i + 1) * (bottom - top)) / 60, 12, (bottom - top) / 60 + 0.6);
@@ -277,14 +244,14 @@ export class LineMap {
     for (const share of [0, 0.5, 1]) {
       const value = low + share * (high - low);
       ctx.fillText(
-        change ? signed(value, reachDigits(high)) : fixed(value, high - low < 3 ? 1 : 0).replace("-", "−"),
+        change ? signed(value, reachDigits(high)) : mark(Number(value.toFixed(high - low < 3 ? 1 : 0))),
         right + 26,
         bottom - share * (bottom - top),
       );
     }
     ctx.textAlign = "center";
     ctx.textBaseline = "top";
-    ctx.fillText("dB", right + 16, h - 15);
+    ctx.fillText(this.unit, right + 16, h - 15);
   }
 
   /** @param {PointerEvent} event */
@@ -301,9 +268,43 @@ export class LineMap {
       log = edges[0] + ((bottom - y) / (bottom - top)) * (edges[edges.length - 1] - edges[0]);
     const line = Math.min(this.lines.length - 1, Math.max(0, edges.findIndex((e) => e > log) - 1)),
       i = Math.floor(((x - left) / (right - left)) * cells.columns);
-    const place = cells.low + (i + 0.5) * cells.step;
-    this.hover.textContent = `${cells.moving ? `${fixed(place, 3)} ${this.schedule.unit}` : moment(place, true)} · ${hertz(this.lines[line])} Hz · ${signed(cells[this.what][i][line], 2)} dB`;
+    this.tell(i, line);
   }
+
+  /**
+   * Show the value of a cell.
+   *
+   * @param {number} i column
+   * @param {number} line
+   */
+  tell(i, line) {
+    const { cells } = this;
+    if (!cells) return;
+    const place = cells.low + (i + 0.5) * cells.step;
+    this.hover.textContent = `${cells.moving ? `${fixed(place, 3)} ${this.schedule.unit}` : moment(place, true)} · ${hertz(this.lines[line])} Hz · ${this.value(cells.of(this.what)[i][line])}`;
+  }
+
+  get words() {
+    return WORDS[this.what];
+  }
+
+  get unit() {
+    return this.what === "coherence" ? "γ²" : "dB";
+  }
+
+  /** @param {number} value */
+  value(value) {
+    return this.what === "coherence" ? `γ² ${plain(value, 3)}` : `${signed(value, 2)} dB`;
+  }
+}
+
+/**
+ * @param {number} low
+ * @param {number} reach
+ */
+function fifths(low, reach) {
+  const places = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(reach / 4))));
+  return Array.from({ length: 5 }, (_, i) => Number((low + (reach * i) / 4).toFixed(places)));
 }
 
 /** @param {number} high */

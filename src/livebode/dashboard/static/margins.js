@@ -5,7 +5,7 @@ import { element } from "./make.js";
 import { recognised } from "./recognition.js";
 import { Series } from "./series.js";
 import { bounded } from "./trends.js";
-import { hertz, plain } from "./words.js";
+import { hertz, pair, plain } from "./words.js";
 
 /** @import { AtLines, Trend } from "./messages.js" */
 
@@ -22,6 +22,11 @@ const ROWS = [
   ["peak_sensitivity", tr("peak sensitivity Ms"), (v) => v > 2],
   ["bandwidth", tr("bandwidth"), () => false],
 ];
+
+/** @param {{model: string, name: string}} trend */
+export const isMargin = ({ model, name }) => model === "margins" && ROWS.some(([known]) => known === name);
+/** @param {string} name */
+export const marginWords = (name) => ROWS.find(([known]) => known === name)?.[1] ?? name;
 
 export class Margins {
   /** @param {HTMLElement} host */
@@ -91,7 +96,7 @@ export class Margins {
           element(
             "td",
             { class: lines.value > 2 ? "small" : "" },
-            `${plain(lines.value, 3)} ± ${plain(lines.bound, 2)}${lines.value > 2 ? ` ⚠ ${tr("large")}` : ""}`,
+            `${pair(lines.value, lines.bound)}${lines.value > 2 ? ` ⚠ ${tr("large")}` : ""}`,
           ),
           element("td", {}, `${hertz(lines.frequency_hz)} Hz`),
           element("td", {}, tr("measured, without a model")),

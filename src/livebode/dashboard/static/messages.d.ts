@@ -2,8 +2,11 @@
 import type { Rows } from "./rows.js";
 
 export type Quantity = "plant" | "open loop" | "closed loop" | "sensitivity";
-export type Curves = "measured" | "reference" | "baseline" | "model";
-export type FrameKind = "newest" | "moment" | "reference" | "baseline" | "model" | "rows" | "history";
+/** A stored response; the first one has no number. */
+export type Reference = "reference" | `reference ${2 | 3 | 4 | 5 | 6 | 7 | 8}`;
+/** `what if` and `result` are computed from others. */
+export type Curves = "measured" | Reference | "baseline" | "model" | "what if" | "result";
+export type FrameKind = "newest" | "moment" | Reference | "baseline" | "model" | "rows" | "history";
 /** A number of the server; what is not finite is sent as null. */
 export type Sent = number | null;
 
@@ -20,6 +23,8 @@ export interface Frame {
   magnitude: Float32Array;
   phase: Float32Array;
   reach: Float32Array;
+  /** `reach` of the noise alone. */
+  noise: Float32Array;
   coherence: Float32Array;
 }
 
@@ -49,12 +54,16 @@ export interface Waiting extends Axis {
 export interface Run extends Axis {
   begun: true;
   directory: string;
+  version: string;
   frequency_hz: number[];
   grid_hz: number[];
   rate_hz: number;
   window: number;
   quantity: Quantity;
-  quantities: { name: Quantity; symbol: string; unit: string; why_not: string }[];
+  /** `units` are those of the quantity times (jω)^n, n = −2 … 2. */
+  quantities: { name: Quantity; symbol: string; unit: string; units: string[]; why_not: string }[];
+  /** Channels by role. */
+  signals: Record<string, string | null>;
   schedule: string;
   model: string;
   baseline: boolean;
@@ -69,6 +78,7 @@ export interface Span {
   last_s: Sent;
   live: boolean;
   growing: boolean;
+  start_s: Sent;
   clock: [number, number][];
 }
 
@@ -91,7 +101,7 @@ export interface AtLines {
 export interface Health {
   responses: number;
   responses_per_s: Sent;
-  alarms: string[];
+  verdict: Verdict;
   ms_at_lines: AtLines | null;
   source?: SourceHealth | null;
   counts?: { samples: number; gaps: number } | null;
@@ -100,9 +110,76 @@ export interface Health {
   given_up?: number;
   silent_s?: number;
   stale?: boolean;
+  /** of tracking, if a person must know of it; see state.py */
+  backlog_s?: Sent;
   behind_ms?: number;
   behind_p99_ms?: number;
   refused: number;
+}
+
+/** What has changed, and by how much. */
+export interface AlarmFacts {
+  what?: string;
+  amount_percent?: number;
+  bound_percent?: number;
+  place_m?: number;
+  reference?: string;
+  name?: string;
+  of?: string;
+  amount?: number;
+  unit?: string;
+}
+
+/** The most important thing on an axis; see verdict.py. */
+export interface Verdict {
+  tone: "alarm" | "check" | "ok" | "open";
+  word: string;
+  since_s: Sent;
+  since_unix_s: Sent;
+  seconds: Sent;
+  facts: AlarmFacts;
+  message: string;
+  /** times of day in it, and their seconds since 1970; see message_times.py */
+  times?: [text: string, unixS: number][];
+  count: number;
+  cause: string;
+  /** set by the page: not of the axis that is shown */
+  other?: boolean;
+}
+
+export interface AxisVerdict extends Verdict {
+  name: string;
+  live: boolean;
+}
+
+/** State of an alarm; see alarm.py. */
+export interface Alarm {
+  state: "unacknowledged" | "acknowledged" | "returned" | "normal" | "shelved" | "suppressed";
+  priority: "high" | "medium" | "low";
+  since_s: number;
+  at_s: number;
+  returned_s: Sent;
+  facts: AlarmFacts;
+  by: string;
+  comment: string;
+  chatters_until_s: Sent;
+  shelf: { by: string; until_s: number; reason: string } | null;
+}
+
+/** A change of an alarm; see alarm_history.py. */
+export interface Transition {
+  number: number;
+  time_s: number;
+  cause: string;
+  kind: string;
+  message: string;
+  /** times of day in it, and their seconds since 1970; see message_times.py */
+  times?: [text: string, unixS: number][];
+  what: string;
+  state: string;
+  by: string;
+  comment: string;
+  count: number;
 }
 
 /** The events of one cause. */
@@ -112,10 +189,14 @@ export interface Notice {
   kind: string;
   kinds: string[];
   message: string;
+  /** times of day in it, and their seconds since 1970; see message_times.py */
+  times?: [text: string, unixS: number][];
   first_s: number;
   last_s: number;
   count: number;
   seen: number;
+  /** null: none of the events is an alarm */
+  alarm: Alarm | null;
 }
 
 /** Rows of one parameter. */
@@ -142,25 +223,45 @@ export type News = (Beginning | { facts?: undefined }) & {
   span?: Span;
   health?: Health;
   notices?: Notice[];
+  /** Causes that the server does not retain. */
+  forgotten?: string[];
+  history?: Transition[];
+  verdicts?: AxisVerdict[];
   newest?: Trend[];
 };
 
 /** A request on the web socket; see queries.py. */
 export type ClientRequest =
   | { kind: "watch"; axis: number; quantity: Quantity | null }
-  | { kind: "freeze"; time_s: number }
-  | { kind: "unfreeze" | "pause" | "resume" };
+  | { kind: "freeze"; slot: number; time_s?: number; saved?: string }
+  | { kind: "unfreeze"; slot: number }
+  | { kind: "pause" | "resume" };
 
 /** Values of one curve at the line under the cursor. */
 export interface AtCursor {
   db: number;
   deg: number;
   reach: number;
+  noise: number;
   coherence: number;
-  frame: Frame;
+  /** null where the curve is computed from others */
+  frame: Frame | null;
+}
+
+/** A text at a frequency, saved with the run. */
+export interface Annotation {
+  id: string;
+  text: string;
+  frequency_hz: number;
 }
 
 export type Found = Partial<Record<Curves, AtCursor>>;
+
+/** What is saved with the run; see records/saved_curves.py. */
+export interface SavedCurves {
+  references: { id: string; name: string; saved: string; time_s: number }[];
+  annotations: Annotation[];
+}
 
 /** What the page shows, and what is to be drawn again (`dirty`). */
 export interface Page {
@@ -171,11 +272,13 @@ export interface Page {
   up: boolean;
   facts: Facts | null;
   health: Health | null;
+  verdicts: AxisVerdict[];
   schedule: Named;
-  frozen: boolean;
   rows: Rows;
   /** Part of the record that the tracking plot and the map show instead of `rows`. */
   past: { frame: Frame; from: number; to: number } | null;
+  /** Span of time that was chosen in the tracking plot. */
+  zoom: [fromS: number, toS: number] | null;
   /** Rows and span of time of the last drawing of the tracking plot. */
   seen: [rows: History, fromS: number, toS: number] | null;
   /** Frequency in Hz of the line under the cursor, and the values there. */
@@ -192,6 +295,8 @@ export interface Page {
   /** The newest request for the past. */
   asked?: string;
   seeking: boolean;
+  /** Whether the references of the address were requested. */
+  restored?: boolean;
   /** Time to show after the one that is being fetched. */
   next?: number;
   silence?: number;

@@ -6,7 +6,9 @@ import { ask, reason } from "./link.js";
 /** @import { Page } from "./messages.js" */
 
 const WHOLE_MS = 4000,
-  ROWS = 1000;
+  ROWS = 1000,
+  // While new responses arrive, no denser than these.
+  ROWS_LIVE = 400;
 
 /**
  * @param {Page} page
@@ -29,17 +31,23 @@ export function past(page, { bode, tracking, timeline, link }, { complain, statu
       setTimeout(fill, 300);
       return;
     }
-    const end = timeline.atS === null ? span.last_s : whole ? span.last_s : Math.min(span.last_s, timeline.atS + half);
-    const from = whole ? span.first_s : Math.max(span.first_s, end - Number(page.spanS));
+    const newest =
+      timeline.atS === null ? span.last_s : whole ? span.last_s : Math.min(span.last_s, timeline.atS + half);
+    const [from, end] = page.zoom ?? [
+      whole ? span.first_s : Math.max(span.first_s, newest - Number(page.spanS)),
+      newest,
+    ];
     const asked = `${page.key} ${from} ${end}`;
     page.asked = asked;
+    const live = !page.zoom && !whole && timeline.atS === null;
+    const rows = live ? ROWS_LIVE : ROWS;
     try {
       const [frame] = framesOf(
-        await ask("/api/past", { axis: page.axis, quantity: page.quantity, from, to: end, rows: ROWS }),
+        await ask("/api/past", { axis: page.axis, quantity: page.quantity, from, to: end, rows }),
       );
       if (page.asked !== asked) return;
       page.past = { frame, from, to: end };
-      if (!whole && timeline.atS === null) page.rows = page.rows.behind(frame);
+      if (live) page.rows = page.rows.behind(frame);
     } catch (error) {
       complain(reason(error));
     }
@@ -66,7 +74,8 @@ export function past(page, { bode, tracking, timeline, link }, { complain, statu
         page.dirty.add("bode");
       }
       const { past } = page;
-      if (!past || timeS < past.from || timeS > past.to || page.spanS !== "whole") await fill();
+      const kept = past && (page.zoom || (timeS >= past.from && timeS <= past.to && page.spanS === "whole"));
+      if (!kept) await fill();
       page.dirty.add("rows");
     } catch (error) {
       complain(reason(error));
@@ -99,7 +108,10 @@ export function past(page, { bode, tracking, timeline, link }, { complain, statu
     let rows = page.rows;
     let from = end - Number(page.spanS),
       to = end;
-    if ((whole || paused) && page.past) {
+    if (page.zoom) {
+      rows = page.past?.frame ?? rows;
+      [from, to] = page.zoom;
+    } else if ((whole || paused) && page.past) {
       rows = page.past.frame;
       ({ from, to } = page.past);
       if (whole && !paused && span.live && now - (page.last.whole ?? -1e9) > WHOLE_MS) {

@@ -1,29 +1,29 @@
 // @ts-check
-// The values at the cursor: Hz, dB, degrees, their bounds, coherence, and the difference from the reference.
+// The values at the cursor, their bounds and distances from the measured curve; what lies between the fixed cursors.
 import { moment } from "./clock.js";
+import { differences } from "./cursors.js";
 import { halfDeg, highDb, holds, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { element } from "./make.js";
-import { fixed, hertz, signed } from "./words.js";
+import { nameOf } from "./names.js";
+import { angle, bounds, frequency, level } from "./values.js";
+import { fixed, plain, signed } from "./words.js";
 
+/** @import { Bode } from "./bode.js" */
 /** @import { AtCursor, Curves, Found, Frame, Named } from "./messages.js" */
 
-const WORDS = {
-  measured: tr("measured"),
-  reference: tr("reference"),
-  baseline: tr("baseline"),
-  model: tr("fitted model"),
-};
+const NEAR = 0.05; // a mode of the fit is that of a peak within this share of its frequency
 
 /**
  * @param {number} low
  * @param {number} value
  * @param {number} high
+ * @param {import("./view.js").View} view
  */
-function around(low, value, high) {
+function around(low, value, high, view) {
   if (!Number.isFinite(value - low) || low <= -999)
     return Number.isFinite(high) ? tr("includes zero") : tr("bound not known");
-  return `−${fixed(value - low, 2)} … +${fixed(high - value, 2)} dB`;
+  return bounds(low, value, high, view);
 }
 
 /**
@@ -46,22 +46,20 @@ function bands(frame) {
 }
 
 /**
- * @param {HTMLElement} host
- * @param {number} hz
  * @param {Found} found
- * @param {Named} schedule
+ * @param {Bode} bode
  */
-export function readout(host, hz, found, schedule) {
+function rowsOf(found, { view }) {
   const shown = /** @type {[Curves, AtCursor][]} */ (Object.entries(found));
-  const rows = shown.map(([name, { db, deg, reach, coherence }]) => {
+  return shown.map(([name, { db, deg, reach, coherence }]) => {
     const away = name !== "measured" && found.measured ? [db - found.measured.db, deg - found.measured.deg] : null;
     return element(
       "tr",
       { "data-name": name },
-      element("th", { scope: "row" }, WORDS[name]),
-      element("td", {}, `${signed(db, 2)} dB`),
-      element("td", {}, name === "model" ? "" : around(lowDb(db, reach), db, highDb(db, reach))),
-      element("td", {}, `${signed(deg, 1)}°`),
+      element("th", { scope: "row" }, nameOf(name)),
+      element("td", {}, level(db, view)),
+      element("td", {}, name === "model" ? "" : around(lowDb(db, reach), db, highDb(db, reach), view)),
+      element("td", {}, angle(deg)),
       element("td", {}, Number.isFinite(reach) ? `± ${fixed(halfDeg(reach), 1)}°` : ""),
       element("td", {}, Number.isFinite(coherence) ? `γ² ${fixed(coherence, 3)}` : ""),
       element(
@@ -71,15 +69,84 @@ export function readout(host, hz, found, schedule) {
       ),
     );
   });
+}
+
+/** The distance from cursor A to cursor B. @param {Bode} bode */
+function between(bode) {
+  const [a, b] = bode.cursors.hz;
+  if (a === null && b === null) return [];
+  if (a === null || b === null) {
+    const placed = tr("cursor {name} at {frequency}", {
+      name: a === null ? "B" : "A",
+      frequency: frequency(a ?? b ?? 0, bode.view),
+    });
+    return [element("p", { class: "cursors" }, placed)];
+  }
+  const [from, to] = [bode.nearest(a), bode.nearest(b)],
+    step = bode.lines[to] - bode.lines[from];
+  const head = tr("B less A: {from} to {to}, {step}, ratio {ratio}", {
+    from: frequency(bode.lines[from], bode.view),
+    to: frequency(bode.lines[to], bode.view),
+    step: `${step < 0 ? "−" : "+"}${frequency(Math.abs(step), bode.view)}`,
+    ratio: plain(bode.lines[to] / bode.lines[from], 4),
+  });
+  const rows = differences(bode.valuesAt(from), bode.valuesAt(to)).map(({ name, db, deg, ratio }) =>
+    element(
+      "tr",
+      { "data-difference": name },
+      element("th", { scope: "row" }, nameOf(name)),
+      element("td", {}, `${signed(db, 2)} dB`),
+      element("td", {}, `× ${plain(ratio, 4)}`),
+      element("td", {}, angle(deg)),
+    ),
+  );
+  return [element("table", { class: "cursors" }, element("caption", {}, head), element("tbody", {}, ...rows))];
+}
+
+/** The peak or antiresonance that was searched for. @param {Bode} bode */
+function extremum(bode) {
+  const found = bode.extremum;
+  if (!found) return [];
+  const { peak, hz, db, damping, of } = found;
+  const kind = peak ? tr("peak") : tr("antiresonance");
+  const width = Number.isFinite(damping)
+    ? tr("{value} (half power)", { value: plain(damping, 3) })
+    : tr("not known (no half power beside it)");
+  const what = tr("{what} of {curve}: {frequency}, {level}, damping {damping}", {
+    what: kind,
+    curve: nameOf(of),
+    frequency: frequency(hz, bode.view),
+    level: level(db, bode.view),
+    damping: width,
+  });
+  const mode = bode.known.modes().find((one) => one.peak === peak && Math.abs(one.hz / hz - 1) < NEAR);
+  return [element("p", { class: "extremum" }, mode ? `${what}; ${mode.words}` : what)];
+}
+
+/**
+ * @param {HTMLElement} host
+ * @param {number} hz
+ * @param {Found} found
+ * @param {Named} schedule
+ * @param {Bode} bode
+ */
+export function readout(host, hz, found, schedule, bode) {
+  const rows = rowsOf(found, bode);
   const frame = found.measured?.frame;
-  const words = frame ? `${where(frame, schedule)}; ${bands(frame)}` : tr("no response yet");
+  const words = bode.operation
+    ? tr("bands are ±3σ; the errors of A and B are taken as independent")
+    : frame
+      ? `${where(frame, schedule)}; ${bands(frame)}`
+      : tr("no response yet");
   host.replaceChildren(
     element(
       "table",
       {},
-      element("thead", {}, element("tr", {}, element("th", { colspan: 7 }, `${hertz(hz)} Hz`))),
+      element("thead", {}, element("tr", {}, element("th", { colspan: 7 }, frequency(hz, bode.view)))),
       element("caption", {}, words),
       element("tbody", {}, ...(rows.length ? rows : [element("tr", {}, element("th", {}, "–"))])),
     ),
+    ...extremum(bode),
+    ...between(bode),
   );
 }

@@ -1,5 +1,5 @@
 // @ts-check
-// The newest responses: times, schedule, and for each line magnitude, phase and reach; a ring buffer of bounded size.
+// The newest responses: times, schedule, and for each line magnitude, phase, reach and coherence; a ring buffer of bounded size.
 
 /** @import { Frame, History } from "./messages.js" */
 
@@ -18,6 +18,7 @@ export class Rows {
     this.magnitude = new Float32Array(this.room * columns);
     this.phase = new Float32Array(this.room * columns);
     this.reach = new Float32Array(this.room * columns);
+    this.coherence = new Float32Array(this.room * columns);
   }
 
   clear() {
@@ -44,6 +45,7 @@ export class Rows {
     this.magnitude.set(from.magnitude.subarray(begin, end), at * this.columns);
     this.phase.set(from.phase.subarray(begin, end), at * this.columns);
     this.reach.set(from.reach.subarray(begin, end), at * this.columns);
+    this.coherence.set(from.coherence.subarray(begin, end), at * this.columns);
     this.next = (at + 1) % this.room;
     this.count = Math.min(this.count + 1, this.room);
   }

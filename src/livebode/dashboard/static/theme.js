@@ -48,6 +48,26 @@ export function colour(name) {
   return found;
 }
 
+/**
+ * Draw in the colours of a theme what is not shown on the page.
+ *
+ * @template T
+ * @param {"light" | "dark"} name
+ * @param {(ink: typeof colour) => T} act
+ */
+export function inTheme(name, act) {
+  const { dataset } = document.documentElement,
+    before = dataset.theme;
+  dataset.theme = name;
+  colours.clear();
+  try {
+    return act(colour);
+  } finally {
+    dataset.theme = before;
+    colours.clear();
+  }
+}
+
 dark.addEventListener("change", applyTheme);
 
 /**

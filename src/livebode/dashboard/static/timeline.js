@@ -3,7 +3,7 @@
 import { moment } from "./clock.js";
 import { tr } from "./language.js";
 
-/** @typedef {Omit<import("./messages.js").Span, "clock">} Span */
+/** @typedef {Omit<import("./messages.js").Span, "clock" | "start_s">} Span */
 
 export class Timeline {
   /**

@@ -1,32 +1,34 @@
 // @ts-check
 // Chosen lines over time or over the position, with their bands.
 import { axis, chart, steady } from "./chart.js";
-import { moment, ticks, timeLabel } from "./clock.js";
+import { moment } from "./clock.js";
+import { endLabels } from "./end-labels.js";
 import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { element } from "./make.js";
+import { drawingPicture } from "./picture.js";
 import { between } from "./rows.js";
 import { colour } from "./theme.js";
+import { timeAxis, timeLabel } from "./time-ticks.js";
+import { linesInAddress, rememberLines, toggle } from "./tracked_lines.js";
 import { hertz, label, mark } from "./words.js";
 
 /** @import { Chart } from "./chart.js" */
 /** @import { History, Named, Run } from "./messages.js" */
 
 const COLOURS = 10,
-  LINES_MAX = 10,
-  AT_FIRST = 6,
   GAP_S = 2;
 
 export class Tracking {
   /**
    * @param {HTMLElement} host
    * @param {HTMLElement} chips
-   * @param {(timeS: number) => void} onMoment
    */
-  constructor(host, chips, onMoment) {
+  constructor(host, chips) {
     this.host = host;
     this.chips = chips;
-    this.onMoment = onMoment;
+    /** @type {(u: Chart) => void} a chart was built */
+    this.onBuilt = () => {};
     /** @type {"magnitude" | "phase"} */
     this.what = "magnitude";
     /** @type {"time" | "position"} */
@@ -59,12 +61,10 @@ export class Tracking {
     this.schedule = schedule;
     this.rows = null;
     // Each axis has its own choice, independent of the lines of others.
-    const key = JSON.stringify([facts.axis, this.lines]),
-      n = Math.min(AT_FIRST, this.lines.length);
-    this.chosen =
-      this.choices.get(key) ??
-      Array.from({ length: n }, (_, i) => Math.round((i * (this.lines.length - 1)) / Math.max(1, n - 1)));
+    const key = JSON.stringify([facts.axis, this.lines]);
+    this.chosen = this.choices.get(key) ?? linesInAddress(this.lines);
     this.choices.set(key, this.chosen);
+    rememberLines(this.lines, this.chosen);
     this.drawChips();
     this.build();
   }
@@ -105,10 +105,8 @@ export class Tracking {
 
   /** @param {number} i */
   toggle(i) {
-    const place = this.chosen.indexOf(i);
-    if (place >= 0) this.chosen.splice(place, 1);
-    else this.chosen.push(i);
-    if (this.chosen.length > LINES_MAX) this.chosen.shift();
+    toggle(this.chosen, i);
+    rememberLines(this.lines, this.chosen);
     this.drawChips();
     this.chips.querySelectorAll("button")[i]?.focus();
     this.build();
@@ -144,23 +142,36 @@ export class Tracking {
           y: { range: () => range(...this.reach()) },
         },
         axes: [
-          axis(() => (byPlace ? place : timeLabel(this.fromS)), {
+          axis(() => (byPlace ? place : timeLabel(this.fromS, this.toS)), {
             size: 28,
-            space: byPlace ? 50 : 74,
-            values: (_u, splits, _i, _space, step) => (byPlace ? splits.map(mark) : ticks(splits, step)),
+            ...(byPlace ? { space: 50, values: (_u, splits) => splits.map(mark) } : timeAxis),
           }),
           axis(deg ? tr("phase in °") : tr("magnitude in dB"), {
             size: 46,
             values: (_u, s) => s.map(mark),
           }),
         ],
+        padding: [8, 44, 2, 0],
         series,
         bands,
-        cursor: { drag: { x: false, y: false }, y: false, points: { show: !byPlace, size: 6 } },
-        hooks: { draw: [(u) => this.mark(u)], ready: [(u) => u.over.addEventListener("click", () => this.click(u))] },
+        cursor: {
+          drag: { x: false, y: false, setScale: false },
+          y: false,
+          points: { show: !byPlace, size: 6 },
+          bind: { dblclick: () => () => null },
+        },
+        hooks: {
+          draw: [(u) => this.mark(u), (u) => endLabels(u, this.named(), byPlace ? 1 : 3)],
+          ready: [(u) => this.onBuilt(u)],
+        },
       },
       [[], ...series.slice(1).map(() => [])],
     );
+  }
+
+  // The tracked lines, as they are written beside their curves.
+  named() {
+    return this.chosen.map((line, i) => ({ text: hertz(this.lines[line]), ink: colour(`t${i % COLOURS}`) }));
   }
 
   /**
@@ -250,7 +261,7 @@ export class Tracking {
 
   /** @param {Chart} u */
   mark(u) {
-    if (this.over === "position" || !Number.isFinite(this.marked)) return;
+    if (drawingPicture() || this.over === "position" || !Number.isFinite(this.marked)) return;
     const x = u.valToPos(this.marked, "x", true),
       { ctx, bbox } = u;
     if (x < bbox.left || x > bbox.left + bbox.width) return;
@@ -264,17 +275,9 @@ export class Tracking {
     ctx.stroke();
     ctx.textAlign = "left";
     ctx.font = `${11 * devicePixelRatio}px system-ui`;
-    ctx.fillText(
-      moment(this.marked, true),
-      Math.min(x + 5 * devicePixelRatio, bbox.left + bbox.width - 110 * devicePixelRatio),
-      bbox.top + 12 * devicePixelRatio,
-    );
+    const words = moment(this.marked, true),
+      room = bbox.left + bbox.width - ctx.measureText(words).width;
+    ctx.fillText(words, Math.min(x + 5 * devicePixelRatio, room), bbox.top + 12 * devicePixelRatio);
     ctx.restore();
-  }
-
-  /** @param {Chart} u */
-  click(u) {
-    const { left = -1 } = u.cursor;
-    if (this.over === "time" && left >= 0) this.onMoment(u.posToVal(left, "x"));
   }
 }

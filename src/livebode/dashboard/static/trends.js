@@ -1,12 +1,12 @@
 // @ts-check
 // Parameters over time with 95 % bounds, valid if the model is complete: a small chart for each.
 import { axis, chart } from "./chart.js";
-import { ticks } from "./clock.js";
 import { element } from "./make.js";
 import { recognised } from "./recognition.js";
 import { Series } from "./series.js";
 import { colour } from "./theme.js";
-import { plain } from "./words.js";
+import { timeAxis, timeLabel } from "./time-ticks.js";
+import { afterNumber, pair, plain } from "./words.js";
 
 /** @import { Trend } from "./messages.js" */
 
@@ -18,9 +18,7 @@ const BOUND = 1.959964;
  * @param {string} unit
  */
 export const bounded = (value, sigma, unit) =>
-  Number.isFinite(value)
-    ? `${plain(value)}${Number.isFinite(sigma) && sigma > 0 ? ` ± ${plain(BOUND * sigma, 2)}` : ""}${unit ? ` ${recognised(unit)}` : ""}`
-    : "–";
+  Number.isFinite(value) ? pair(value, BOUND * sigma) + afterNumber(unit && recognised(unit)) : "–";
 
 // A parameter with its chart, which is built when it is first drawn.
 class Item extends Series {
@@ -35,11 +33,16 @@ export class Trends {
    * @param {HTMLElement} host
    * @param {(trend: Trend) => boolean} wanted selects the parameters that are shown here
    * @param {string} empty shown instead of none
+   * @param {(name: string) => string} title of a chart
    */
-  constructor(host, wanted, empty) {
+  constructor(host, wanted, empty, title = (name) => recognised(name.replaceAll("_", " "))) {
     this.host = host;
     this.wanted = wanted;
     this.empty = empty;
+    this.title = title;
+    this.note = element("p", { class: "zone-note" });
+    /** @type {[fromS: number, toS: number] | null} the span that is shown; null for all */
+    this.span = null;
     /** @type {Map<string, Item>} */
     this.items = new Map();
   }
@@ -69,13 +72,13 @@ export class Trends {
 
   /** @param {Item} item */
   build(item) {
-    if (this.host.querySelector(".empty")) this.host.replaceChildren(element("div", { class: "trends" }));
-    const host = element("div", { class: "plot" });
+    if (this.host.querySelector(".empty")) this.host.replaceChildren(element("div", { class: "trends" }), this.note);
+    const host = element("div", { class: "plot", role: "img", "aria-label": this.title(item.name) });
     this.host.firstElementChild?.append(
       element(
         "div",
         { class: "trend", "data-name": item.name },
-        element("h3", {}, recognised(item.name.replaceAll("_", " ")), item.words),
+        element("h3", {}, this.title(item.name), item.words),
         host,
       ),
     );
@@ -90,9 +93,12 @@ export class Trends {
       {
         padding: [6, 6, 0, 0],
         cursor: { show: false },
-        scales: { x: { time: false }, y: { range: (_u) => reach(item) } },
+        scales: {
+          x: { time: false, range: (_u, low, high) => this.span ?? [low ?? 0, high ?? 1] },
+          y: { range: (_u) => reach(item, this.span) },
+        },
         axes: [
-          axis("", { size: 18, space: 70, values: (_u, splits, _i, _space, step) => ticks(splits, step) }),
+          axis("", { size: 18, ...timeAxis }),
           axis("", { size: 56, space: 24, values: (_u, s) => s.map((v) => plain(v, 4)) }),
         ],
         series: [
@@ -107,11 +113,17 @@ export class Trends {
   }
 
   // Draw the parameters that changed, each with its value at a time, or the newest.
-  draw(atS = NaN) {
-    if (this.host.hidden) return;
+  draw(atS = NaN, span = this.span) {
+    if (this.host.closest("[hidden]")) return;
+    if (span !== this.span) this.refresh();
+    this.span = span;
+    let low = Infinity,
+      high = -Infinity;
     for (const item of this.items.values()) {
       if (item.s.every((s) => s === 0 || Number.isNaN(s)) && item.s.some((s) => s === 0)) continue; // it is fixed
       item.made ??= this.build(item);
+      low = Math.min(low, item.t[0] ?? low);
+      high = Math.max(high, item.t.at(-1) ?? high);
       const at = item.known(atS);
       const words = item.name.endsWith("_frequency") ? "" : bounded(item.v[at], item.s[at], item.unit);
       item.words.textContent = Number.isFinite(item.v[at]) ? words : recognised(item.status[at] ?? "");
@@ -123,6 +135,13 @@ export class Trends {
       const edge = (sign) => item.v.map((v, i) => known(v + sign * BOUND * item.s[i]));
       item.made.setData([item.t, item.v.map(known), edge(1), edge(-1)]);
     }
+    const [from, to] = span ?? [low, high];
+    this.note.textContent = this.items.size ? timeLabel(from, to) : "";
+  }
+
+  // Draw all again: another span or another clock.
+  refresh() {
+    for (const item of this.items.values()) item.dirty = true;
   }
 }
 
@@ -130,14 +149,23 @@ export class Trends {
  * The range of 90 % of the values and their bounds: one outlier does not hide the rest.
  *
  * @param {Series} series
+ * @param {[fromS: number, toS: number] | null} span
  * @returns {import("./chart.js").Range}
  */
-function reach({ v, s }) {
-  const sorted = v.filter(Number.isFinite).sort((a, b) => a - b);
+function reach({ t, v, s }, span) {
+  /** @type {(_: number, i: number) => boolean} */
+  const seen = (_, i) => !span || (t[i] >= span[0] && t[i] <= span[1]);
+  const sorted = v
+    .filter(seen)
+    .filter(Number.isFinite)
+    .sort((a, b) => a - b);
   if (!sorted.length) return [0, 1];
   /** @param {number} share */
   const q = (share) => sorted[Math.round(share * (sorted.length - 1))];
-  const spread = s.filter(Number.isFinite).sort((a, b) => a - b);
+  const spread = s
+    .filter(seen)
+    .filter(Number.isFinite)
+    .sort((a, b) => a - b);
   const room = 1.5 * BOUND * (spread[spread.length >> 1] || 0),
     low = q(0.03) - room,
     high = q(0.97) + room;

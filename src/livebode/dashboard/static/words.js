@@ -26,6 +26,33 @@ export function plain(value, digits = 4) {
   return numeral(text).replace("-", "−");
 }
 
+const BOUND_DIGITS = 2,
+  PLACES_MAX = 9;
+/**
+ * A value with its bound: the bound has two digits, and the value as many as the bound leaves.
+ *
+ * @param {number} value
+ * @param {number} bound of any size; NaN or 0 if it is not known
+ */
+export function pair(value, bound) {
+  if (!(bound > 0 && Number.isFinite(bound) && Number.isFinite(value))) return plain(value);
+  const top = Math.floor(Math.log10(Math.max(Math.abs(value), bound)));
+  const power = top < -4 || top > 6 ? top : 0; // of ten that both have in common
+  const place = Math.floor(Math.log10(bound)) - power + 1 - BOUND_DIGITS;
+  /** @param {number} v */
+  const rounded = (v) => {
+    const scaled = v / 10 ** power;
+    return place > 0
+      ? String(Math.round(scaled / 10 ** place) * 10 ** place)
+      : fixed(scaled, Math.min(-place, PLACES_MAX));
+  };
+  const text = `${rounded(value)} ± ${rounded(bound)}`.replace("-", "−");
+  return power ? `(${text})e${power < 0 ? "−" : ""}${Math.abs(power)}` : text;
+}
+
+/** @param {string} unit as it is shown after a number */
+export const afterNumber = (unit) => (unit === "deg" || unit === "°" ? "°" : unit && ` ${unit}`);
+
 /** @param {number} value */
 export const signed = (value, digits = 1) =>
   Number.isFinite(value) ? `${value < 0 ? "−" : "+"}${fixed(Math.abs(value), digits)}` : "–";

@@ -7,15 +7,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from livebode.experiment_design.waveform import Waveform
+from livebode.version import __version__
 
 
 def facts(waveform: Waveform) -> dict[str, Any]:
     """Plain data: program, rate, window, lines in bins, peak, and the parameters with the seed."""
-    from importlib.metadata import version
-
     lines = waveform.lines
     return {
-        "made_by": f"livebode {version('livebode')} design",
+        "made_by": f"livebode {__version__} design",
         **waveform.about,
         "rate_hz": lines.rate_hz,
         "window": lines.window,

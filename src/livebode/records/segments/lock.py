@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-import fcntl
+import contextlib
 import os
+from importlib import import_module
 from pathlib import Path
 
 from livebode.core import RecordError
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    _POSIX = False
+else:
+    _POSIX = True
+
 
 class Lock:
     """Locks a directory until it is released or the process ends in any way.
+
+    POSIX locks the directory itself. Windows opens no directory: there a file beside it is locked, which the system
+    unlocks when the process ends, and `release` removes.
 
     Raises
     ------
@@ -19,11 +30,12 @@ class Lock:
     """
 
     def __init__(self, directory: Path) -> None:
-        self._directory = os.open(directory, os.O_RDONLY)
+        self._beside = None if _POSIX else _beside(directory.absolute())
+        self._file = os.open(directory, os.O_RDONLY) if self._beside is None else _created(self._beside)
         try:
-            fcntl.flock(self._directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(self._file)
         except BlockingIOError:
-            os.close(self._directory)
+            os.close(self._file)
             raise RecordError(
                 "locked",
                 f"another process records in {str(directory)!r}",
@@ -32,4 +44,27 @@ class Lock:
             ) from None
 
     def release(self) -> None:
-        os.close(self._directory)
+        os.close(self._file)
+        if self._beside is not None:
+            with contextlib.suppress(OSError):  # another process has opened it
+                os.unlink(self._beside)
+
+
+def _beside(directory: Path) -> Path:
+    return directory.with_name(f".{directory.name}.lock")
+
+
+def _created(path: Path) -> int:
+    return os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+
+
+def _lock(file: int) -> None:
+    """Lock an open file or directory; BlockingIOError if another process has locked it."""
+    if _POSIX:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return
+    msvcrt = import_module("msvcrt")
+    try:
+        msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+    except OSError as error:
+        raise BlockingIOError(error.errno, error.strerror) from None

@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core import ConfigError, ExtraError, LivebodeError, SourceError
+from livebode.core import ConfigError, LivebodeError, SourceError
+from livebode.core.installing import not_installed
 from livebode.sources.live.address import Address
 from livebode.sources.live.numbered import Numbered
 from livebode.sources.live.ring import FILETIME_1970, HEADER, Ring, new_rows, read_ring, ring_batch
@@ -192,12 +193,8 @@ def import_pyads() -> ModuleType:
     try:
         import pyads
     except ImportError:
-        raise ExtraError(
-            "not-installed",
-            "ads needs the package pyads, which is not installed",
-            "run pip install livebode[ads]",
-            package="pyads",
-            extra="ads",
+        raise not_installed(
+            "ads needs the package pyads, which is not installed", package="pyads", extra="ads"
         ) from None
     return pyads  # type: ignore[no-any-return]
 

@@ -27,9 +27,13 @@ class ClockReading:
     def at(cls, monotonic_s: float) -> ClockReading:
         """The clocks when `time.monotonic()` was `monotonic_s`."""
         ago_s = time.monotonic() - monotonic_s
-        # If available, the clock that also counts while the computer sleeps.
-        uptime = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
-        return cls(time.time() - ago_s, time.clock_gettime(uptime) - ago_s, _boot())
+        return cls(time.time() - ago_s, _uptime_s() - ago_s, _boot())
+
+
+def _uptime_s() -> float:
+    """Seconds since boot; where the system has such a clock, also those during which the computer slept."""
+    clock = getattr(time, "CLOCK_BOOTTIME", None)
+    return time.monotonic() if clock is None else time.clock_gettime(clock)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ import socket
 import ssl
 from typing import Any, ClassVar
 
-from livebode.core import ConfigError, ExtraError, LivebodeError, SourceError
+from livebode.core import ConfigError, LivebodeError, SourceError
+from livebode.core.installing import not_installed
 from livebode.sources.live.address import Address
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.framing import FRAME_BYTES_MAX
@@ -35,12 +36,8 @@ class MqttSource(LiveSource):
         try:
             from paho.mqtt import client as mqtt
         except ImportError:
-            raise ExtraError(
-                "not-installed",
-                "mqtt needs the package paho-mqtt, which is not installed",
-                "run pip install livebode[mqtt]",
-                package="paho-mqtt",
-                extra="mqtt",
+            raise not_installed(
+                "mqtt needs the package paho-mqtt, which is not installed", package="paho-mqtt", extra="mqtt"
             ) from None
         self._mqtt = mqtt
         topic = address.path

@@ -12,7 +12,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import ConfigError, ExtraError, LivebodeError, SourceError
+from livebode.core import ConfigError, LivebodeError, SourceError
+from livebode.core.installing import not_installed
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, Batch
 from livebode.sources.live.numbered import Numbered
@@ -112,12 +113,8 @@ class OpcUaSource(LiveSource):
         try:
             import asyncua
         except ImportError:
-            raise ExtraError(
-                "not-installed",
-                "opc.tcp needs the package asyncua, which is not installed",
-                "run pip install livebode[opcua]",
-                package="asyncua",
-                extra="opcua",
+            raise not_installed(
+                "opc.tcp needs the package asyncua, which is not installed", package="asyncua", extra="opcua"
             ) from None
         self._asyncua: Any = asyncua
         logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # its messages would repeat our Events

@@ -1,0 +1,1 @@
+"""Pictures of the dashboard and of the report, each of a run of a simulated machine."""

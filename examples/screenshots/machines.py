@@ -1,0 +1,122 @@
+"""Simulated machines that are tracked while a dashboard shows them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from livebode.configuration.axis import FitSection
+from livebode.core import Block, Channel, Lines
+from livebode.dashboard import Hub
+from livebode.estimation import Settings, Tracker, plant_kinds
+from livebode.excitation import multisine
+from livebode.monitoring import Baseline, Monitor
+from livebode.runtime import Destination
+from livebode.runtime.change_detection import ChangeDetection
+from livebode.runtime.demo import RATE_HZ, demo_axis, described_loop
+from livebode.runtime.fits import Fits
+from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.run_loop import RunLoop
+from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Standstill
+
+Afterwards = Literal["live", "silent", "over"]
+BLOCK = 400
+_PATIENCE_S = 120.0
+_PARAMETERS = 4  # of the fitted model
+
+
+@dataclass
+class Held:
+    """The first seconds of a simulated axis as fast as possible; afterwards it is live, silent or over."""
+
+    machine: SimulatedAxis
+    fast_s: float
+    afterwards: Afterwards
+
+    def __post_init__(self) -> None:
+        self.reached, self.left = threading.Event(), threading.Event()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return self.machine.channels
+
+    @property
+    def samples(self) -> None:
+        """Not known before its end, as of a live source."""
+
+    def blocks(self, channels: Sequence[str], block_samples: int = BLOCK) -> Iterator[Any]:
+        """Blocks, and None while the machine sends nothing."""
+        begun_s = time.monotonic()
+        for block in self.machine.blocks(channels, block_samples):
+            now_s = block.stop / RATE_HZ
+            if now_s > self.fast_s:
+                if not self.reached.is_set():
+                    self.reached.set()
+                    begun_s = time.monotonic() - now_s
+                yield from self._wait(begun_s + now_s)
+                if self.left.is_set():
+                    return
+            yield block
+
+    def _wait(self, until_s: float) -> Iterator[Block | None]:
+        while self.afterwards != "over" and not self.left.wait(0.02):
+            if self.afterwards == "live" and time.monotonic() >= until_s:
+                return
+            yield None
+        self.left.set()
+
+
+class Tracked:
+    """A run of a machine, in a thread of its own, until it is left; in the context its fast part is over."""
+
+    def __init__(
+        self, held: Held, settings: Settings, to: Path, hub: Hub | None = None, baseline: Baseline | None = None
+    ) -> None:
+        drive = held.machine.axis.drive
+        fit, loop = FitSection(radius_m=held.machine.axis.mechanics.radius_m), described_loop(drive)
+        enough = len(settings.lines) > _PARAMETERS
+        pipeline = Pipeline(
+            Tracker(settings),
+            Fits(fit, loop.build(RATE_HZ), plant_kinds(held.channels, settings)) if enough else None,
+            None if baseline is None else ChangeDetection(Monitor(baseline, settings), "healthy strokes"),
+        )
+        configuration = {"loop": loop.model_dump(mode="json")} | ({"fit": fit.model_dump()} if enough else {})
+        about = {"configuration": configuration, "found": {"clock": "relative"}}
+        destination = Destination(to, lambda *_: None, subscribers=() if hub is None else (hub,))
+        run = RunLoop(held, pipeline, destination, about=about, block_samples=BLOCK)
+        self._held = held
+        self._thread = threading.Thread(target=run.run)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        end_s = time.monotonic() + _PATIENCE_S
+        while self._thread.is_alive() and not self._held.reached.wait(0.05):
+            if time.monotonic() > end_s:
+                raise TimeoutError("the simulated machine is too slow")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._held.afterwards != "over":
+            self._held.left.set()
+        self._thread.join()
+
+
+def healthy(afterwards: Afterwards, fast_s: float = 20.0) -> Held:
+    """The demo's axis without a fault."""
+    return Held(SimulatedAxis(demo_axis(3600.0, 1)), fast_s, afterwards)
+
+
+def at_standstill(lines: Lines, amplitude_n_m: float) -> tuple[Held, Settings]:
+    """Six seconds of an axis at standstill, excited at these lines, and how it is tracked."""
+    axis = BeltAxis(
+        motion=Standstill(position_m=0.9),
+        excitation_n_m=multisine(lines, amplitude_n_m),
+        sensor=Sensor(noise_rad_per_s=0.05),
+        seconds=6.0,
+    )
+    settings = Settings(lines=lines, output="velocity", input="u", excitation="w", schedule="x", hop=lines.window // 4)
+    return Held(SimulatedAxis(axis), 6.0, "over"), settings

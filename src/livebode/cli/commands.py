@@ -1,0 +1,46 @@
+"""The commands: their names, in the order of the help, and the first sentence of the help of each.
+
+Here once more, because a command's module loads what the command needs: the help that lists them all does without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import Any
+
+SUMMARIES: Mapping[str, str] = {
+    "run": "Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.",
+    "fit": "Fit a model to the response of a run, and print its parameters with bounds.",
+    "inspect": "List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and "
+    "SNR.",
+    "demo": "Track a simulated belt axis during its strokes, live; halfway, the belt loses 10 % of its stiffness.",
+    "example": "Write recordings of simulated axes and their configurations, which the documentation uses; or list "
+    "them.",
+    "new": "Write the configuration of a recording: list its channels, propose their roles, ask, and find lines and "
+    "window.",
+    "design": "Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and "
+    "axis.toml.",
+    "query": "Query the tables of a run with SQL (DuckDB).",
+    "export": "Write the responses or the fitted parameters of a run in a format of other programs.",
+    "margins": "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter "
+    "if needed.",
+    "validate": "Simulate the fitted model with another recording and test whether the residual correlates with the "
+    "signals.",
+    "learn": "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",
+    "plc": "Write function blocks for the PLC of an axis: excitation, sliding DFT and the ring buffer that "
+    "livebode reads.",
+    "report": "Write the measurement and its results as report.html and report.pdf, with the verdict on page 1.",
+    "compare": "Find the lines, parameters and margins that differ between two runs, with amounts and bounds.",
+    "view": "Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still "
+    "recording.",
+    "doctor": "Check this computer, a configuration and whether its machine can be reached.",
+    "schema": "Print the JSON Schema of axis.toml or experiment.toml: an editor uses it to complete and check the "
+    "keys.",
+}
+
+
+def command(name: str) -> Callable[..., Any]:
+    """The function of a command, from its module `NAME_command`."""
+    function: Callable[..., Any] = getattr(import_module(f"livebode.cli.{name}_command"), f"{name}_command")
+    return function

@@ -1,0 +1,54 @@
+"""`livebode example`: recordings to try livebode on, from simulated axes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from livebode.cli.options import Json
+from livebode.core import UsageError
+
+_ALL = "all"
+
+
+def example_command(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Which one, or all. Without a name: list them.")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Directory to write to.")] = Path("example"),
+    force: Annotated[bool, typer.Option("--force", help="Replace files that differ.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Write recordings of simulated axes and their configurations, which the documentation uses; or list them."""
+    from livebode.interface.example_recordings import EXAMPLES, write_examples
+    from livebode.records import to_json
+
+    if name is None:
+        if as_json:
+            print(to_json({name: {"about": e.about, "files": e.files} for name, e in EXAMPLES.items()}))
+            return
+        for each, example in EXAMPLES.items():
+            print(f"{each:<12} {example.about}: {', '.join(example.files)}")
+        print("\nlivebode example NAME writes one of them to the directory example; all: every one.")
+        return
+    if name not in (*EXAMPLES, _ALL):
+        raise UsageError(
+            "not-one-of",
+            f"{name!r} is not one of the examples",
+            f"choose {', '.join(EXAMPLES)} or {_ALL}",
+            argument="name",
+            value=name,
+            allowed=[*EXAMPLES, _ALL],
+        )
+    files = write_examples(list(EXAMPLES) if name == _ALL else [name], out, force=force)
+    if as_json:
+        print(to_json({"directory": str(out), "files": [str(path) for path in files]}))
+        return
+    for path in files:
+        print(path)
+    print("\nTry:" if name != _ALL else "\nTry, for example:")
+    print(f"  cd {out}")
+    for command in EXAMPLES["standstill" if name == _ALL else name].commands:
+        print(f"  {command}")

@@ -1,0 +1,55 @@
+"""The entry point: version and first page of help at once, everything else by the application.
+
+Typer and Rich alone take ten times as long to load as Python takes to start.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from livebode.cli.first_page import first_page
+from livebode.version import __version__
+
+_USAGE_ERROR, _INTERRUPTED = 2, 130
+_COMPLETION = "_LIVEBODE_COMPLETE"
+"""The variable with which a shell asks for completions; the command line is then empty."""
+
+
+def main() -> None:
+    """Run the command line and exit with its code."""
+    words = sys.argv[1:]
+    if words == ["--version"] and _printed(f"livebode {__version__}\n"):
+        return
+    if words in (["--help"], ["-h"]) and _printed(_help()):
+        return
+    if not words and _COMPLETION not in os.environ and _printed(_help()):
+        sys.exit(_USAGE_ERROR)
+    try:
+        from livebode.cli.app import run_application
+    except KeyboardInterrupt:
+        print("livebode: stopped; nothing was written", file=sys.stderr)
+        sys.exit(_INTERRUPTED)
+    run_application()
+
+
+def _help() -> str:
+    terminal = sys.stdout is not None and sys.stdout.isatty()
+    colours = terminal and os.name == "posix" and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
+    return first_page(_width(terminal=terminal), colours=colours)
+
+
+def _width(*, terminal: bool) -> int:
+    columns = os.environ.get("COLUMNS", "")
+    if columns.isdecimal() and int(columns):
+        return int(columns)
+    return (os.get_terminal_size(sys.stdout.fileno()).columns if terminal else 0) or 80
+
+
+def _printed(text: str) -> bool:
+    # What cannot be printed is left to the application: it reports a full disk, and its frames need no Unicode.
+    try:
+        print(text, end="", flush=True)
+    except (OSError, UnicodeError):
+        return False
+    return True

@@ -1,0 +1,70 @@
+"""How optional packages are installed here: livebode is on no index, so by the clone that it was installed from."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
+
+from livebode.core.errors.extra import ExtraError
+
+
+def install_command(*extras: str) -> str:
+    """The command that adds these extras to the livebode that runs.
+
+    From the clone if it is still there, otherwise the packages themselves.
+
+    >>> install_command("pdf").startswith("pip install") or " -m pip install " in install_command("pdf")
+    True
+    """
+    from importlib.metadata import distribution  # slow to import, and needed where something is missing only
+
+    installed = distribution("livebode")
+    pip = _pip()
+    clone, editable = _clone(installed.read_text("direct_url.json"))
+    if clone is None:
+        return f"{pip} {' '.join(_quoted(package) for package in _packages(installed.requires or [], extras))}"
+    target = _quoted(f"{clone}[{','.join(extras)}]")
+    return f"{pip} --editable {target}" if editable else f"{pip} {target}"
+
+
+def not_installed(message: str, package: str, extra: str, **facts: object) -> ExtraError:
+    """The error of an optional package that is missing, with the command that installs it."""
+    return ExtraError("not-installed", message, f"run {install_command(extra)}", package=package, extra=extra, **facts)
+
+
+def _pip() -> str:
+    """The pip of this Python: by its path if another one is found first."""
+    found, here = shutil.which("pip"), Path(sys.executable)
+    if found is not None and Path(found).parent == here.parent:
+        return "pip install"
+    return f"{_quoted(str(here)) if ' ' in str(here) else here} -m pip install"
+
+
+def _clone(direct_url: str | None) -> tuple[Path | None, bool]:
+    """The directory that livebode was installed from, if it is there, and whether it is installed editable."""
+    if direct_url is None:
+        return None, False
+    origin = json.loads(direct_url)
+    url = urlsplit(origin.get("url", ""))
+    if url.scheme != "file" or "dir_info" not in origin:
+        return None, False
+    folder = Path(url2pathname(url.path))
+    there = (folder / "pyproject.toml").is_file()
+    return (folder if there else None), bool(origin["dir_info"].get("editable"))
+
+
+def _packages(requires: list[str], extras: tuple[str, ...]) -> list[str]:
+    from packaging.requirements import Requirement
+
+    found = [Requirement(text) for text in requires]
+    wanted = [one for one in found if one.marker and any(one.marker.evaluate({"extra": extra}) for extra in extras)]
+    return [f"{one.name}{one.specifier}" for one in wanted]
+
+
+def _quoted(text: str) -> str:
+    quote = '"' if sys.platform == "win32" else "'"
+    return f"{quote}{text}{quote}"

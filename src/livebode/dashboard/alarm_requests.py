@@ -1,0 +1,73 @@
+"""What a person may ask for an alarm: acknowledge, shelve, unshelve; requests validated to plain values."""
+
+from __future__ import annotations
+
+import unicodedata
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from livebode.core import ServerError, UsageError
+from livebode.dashboard.queries import plain, whole_number
+
+Act = Literal["acknowledge", "shelve", "unshelve"]
+NAME_MAX, TEXT_MAX = 60, 200
+"""Most letters of a name, and of a comment or reason."""
+MINUTES_MAX = 24 * 60
+_TURNING = {*map(chr, range(0x202A, 0x202F)), *map(chr, range(0x2066, 0x206A))}  # the direction of the text
+
+
+@dataclass(frozen=True)
+class AlarmRequest:
+    """An action on the alarm of an event: who, their comment or reason, and for how many minutes."""
+
+    axis: int
+    event: str
+    by: str = ""
+    words: str = ""
+    minutes: float = 0.0
+
+
+def alarm_request(data: bytes, axes: int, act: Act) -> AlarmRequest:
+    """Parse the body of a request; LivebodeError if it is invalid.
+
+    >>> alarm_request(b'{"axis": 0, "event": "3f", "by": "Ann", "reason": "test", "minutes": 30}', 1, "shelve").minutes
+    30.0
+    """
+    message = plain(data)
+    axis, event = message.get("axis"), message.get("event")
+    if isinstance(axis, bool) or not isinstance(axis, int) or not isinstance(event, str) or len(event) > 64:
+        raise ServerError("request-malformed", "the request does not have an axis and an event", "send both")
+    by = _text(message, "by", NAME_MAX, required=act != "acknowledge")
+    words = _text(message, "reason" if act == "shelve" else "comment", TEXT_MAX, required=act == "shelve")
+    minutes = _minutes(message.get("minutes")) if act == "shelve" else 0.0
+    return AlarmRequest(whole_number(str(axis)[:10], 0, axes - 1, "axis"), event, by, words, minutes)
+
+
+def _text(message: dict[str, Any], name: str, letters_max: int, *, required: bool) -> str:
+    value = message.get(name, "")
+    text = " ".join(value.split()) if isinstance(value, str) else None
+    if text is None or len(text) > letters_max or (required and not text):
+        least = 1 if required else 0
+        raise UsageError(
+            "out-of-range",
+            f"{name} is not a text of {least} to {letters_max} letters",
+            "shorten it, or add it",
+            argument=name,
+            high=letters_max,
+        )
+    if any(letter in _TURNING or unicodedata.category(letter) in ("Cc", "Cs") for letter in text):
+        raise UsageError("unreadable", f"{name} contains a control character", "remove it", argument=name)
+    return text
+
+
+def _minutes(value: object) -> float:
+    if isinstance(value, int | float) and not isinstance(value, bool) and 1 <= value <= MINUTES_MAX:
+        return float(value)
+    raise UsageError(
+        "out-of-range",
+        f"minutes is not a number from 1 to {MINUTES_MAX}",
+        "shelve the alarm for at most a day, and again if necessary",
+        argument="minutes",
+        low=1,
+        high=MINUTES_MAX,
+    )

@@ -1,0 +1,46 @@
+"""Raw signals of a recorded run at a time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from livebode.arrow import to_numpy
+from livebode.core import Block, Channel
+from livebode.dashboard.signal_answer import Picture, answer, why_not
+from livebode.dashboard.signal_tap import span_samples
+from livebode.records import RunRecord
+
+_OWN = 2  # columns of the table before its channels: number and time of the sample
+
+
+def recorded_answer(directory: Path, at_s: float, picture: Picture) -> bytes:
+    """The answer with the recorded samples around a time, which is in the middle of them."""
+    run = RunRecord.open(directory)
+    block = recorded_block(run, at_s)
+    if block is not None:
+        return answer(block, run.lines, picture)
+    return why_not("unrecorded" if next(run.tables("samples"), None) is None else "outside")
+
+
+def recorded_block(run: RunRecord, at_s: float) -> Block | None:
+    """The recorded samples around a time, NaN where samples are missing; None if there are none."""
+    lines = run.lines
+    half_s = span_samples(lines.rate_hz, lines.window, 1) / lines.rate_hz / 2
+    found = []
+    for table in run.tables("samples", span_s=(at_s - half_s, at_s + half_s)):
+        time_s = to_numpy(table["time_s"].combine_chunks())
+        within = np.flatnonzero((time_s >= at_s - half_s) & (time_s < at_s + half_s))
+        if within.size:
+            found.append(table.slice(int(within[0]), int(within[-1]) + 1 - int(within[0])))
+    if not found:
+        return None
+    table = pa.concat_tables(found).combine_chunks()
+    sample, time_s, *values = (to_numpy(column.chunk(0)) for column in table.columns)
+    start = int(sample[0])
+    channels = [Channel(f.name, (f.metadata or {}).get(b"unit", b"").decode()) for f in list(table.schema)[_OWN:]]
+    data = np.full((len(channels), int(sample[-1]) + 1 - start), np.nan)
+    data[:, sample - start] = values
+    return Block(data, tuple(channels), lines.rate_hz, start, float(time_s[0]) - start / lines.rate_hz)

@@ -1,0 +1,32 @@
+// @ts-check
+// The sentence at the top of the page; a screen reader hears it when its meaning changes, not every second.
+import { byId as $ } from "./make.js";
+import { sentence } from "./verdict.js";
+
+/** @import { Page, Verdict } from "./messages.js" */
+
+/** @type {Record<string, string>} */
+export const SIGNS = { alarm: "⚠", check: "◆", ok: "✓", open: "○" };
+
+let heard = "";
+
+/**
+ * @param {Page} page
+ * @returns {Verdict | undefined}
+ */
+const verdictOf = ({ facts, health, verdicts }) => (facts && health ? health.verdict : verdicts[facts?.axis ?? 0]);
+
+/** @param {Page} page */
+export function firstLook(page) {
+  const verdict = verdictOf(page);
+  const { text, tone, detail } = sentence(page.up, verdict);
+  const host = $("verdict");
+  const shown = `${SIGNS[tone]} ${text}`;
+  if (host.textContent !== shown) host.textContent = shown;
+  host.className = `first-look ${tone}`;
+  host.title = detail;
+  const meaning = page.up ? `${verdict?.word} ${verdict?.cause}` : "";
+  if (meaning === heard) return;
+  heard = meaning;
+  $("verdict-heard").textContent = text;
+}

@@ -1,0 +1,71 @@
+// @ts-check
+// All lines of the Bode plot as a table, for a person who does not see the curves or wants their numbers.
+import { moment } from "./clock.js";
+import { halfDeg, highDb, lowDb } from "./frames.js";
+import { tr } from "./language.js";
+import { byId as $, element } from "./make.js";
+import { nameOf } from "./names.js";
+import { angle, bounds, frequency, level } from "./values.js";
+import { fixed } from "./words.js";
+
+/** @import { Bode } from "./bode.js" */
+/** @import { AtCursor, Curves } from "./messages.js" */
+
+/**
+ * @param {AtCursor | undefined} value
+ * @param {import("./view.js").View} view
+ */
+function cells(value, view) {
+  if (!value) return ["", "", ""];
+  const { db, deg, reach, coherence } = value,
+    known = Number.isFinite(reach) && lowDb(db, reach) > -999;
+  return [
+    known ? `${level(db, view)} (${bounds(lowDb(db, reach), db, highDb(db, reach), view)})` : level(db, view),
+    Number.isFinite(reach) ? `${angle(deg)} ± ${fixed(halfDeg(reach), 1)}°` : angle(deg),
+    Number.isFinite(coherence) ? fixed(coherence, 3) : "",
+  ];
+}
+
+/** @param {Bode} bode */
+function filled(bode) {
+  const values = bode.lines.map((_, line) => bode.valuesAt(line)),
+    names = /** @type {Curves[]} */ ([...new Set(values.flatMap((found) => Object.keys(found)))]);
+  const heads = names.flatMap((name) => [
+    `${nameOf(name)}: ${tr("magnitude")}`,
+    `${nameOf(name)}: ${tr("phase")}`,
+    `${nameOf(name)}: ${tr("coherence")}`,
+  ]);
+  return [
+    element(
+      "thead",
+      {},
+      element("tr", {}, ...[tr("frequency"), ...heads].map((text) => element("th", { scope: "col" }, text))),
+    ),
+    element(
+      "tbody",
+      {},
+      ...bode.lines.map((hz, line) =>
+        element(
+          "tr",
+          {},
+          element("th", { scope: "row" }, frequency(hz, bode.view)),
+          ...names.flatMap((name) => cells(values[line][name], bode.view)).map((text) => element("td", {}, text)),
+        ),
+      ),
+    ),
+  ];
+}
+
+/**
+ * @param {Bode} bode
+ * @returns {() => void} opens the table
+ */
+export function table(bode) {
+  const dialog = $("table", HTMLDialogElement);
+  return () => {
+    const frame = bode.curves.measured?.frame;
+    const words = frame ? tr("at {time}, bands are ±3σ", { time: moment(frame.timeS[0], true) }) : "";
+    $("table-values").replaceChildren(element("caption", {}, `${bode.symbol} ${words}`), ...filled(bode));
+    if (!dialog.open) dialog.showModal();
+  };
+}

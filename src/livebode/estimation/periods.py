@@ -1,0 +1,105 @@
+"""Whole periods of signals, cut from samples that come in any pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import StatefulBase
+
+Floats = NDArray[np.float64]
+
+_TOGETHER = 1 << 15  # samples of a signal in one batch: a few of such signals, and their spectra, stay in the cache
+
+
+@dataclass(frozen=True, eq=False)
+class Periods:
+    """Consecutive whole periods.
+
+    Attributes
+    ----------
+    signals
+        Shape (signals, periods, N).
+    schedule
+        Shape (periods, N).
+    complete
+        Whether no sample is missing or left out, shape (periods,).
+    stop
+        Index behind the last sample, shape (periods,).
+    """
+
+    signals: Floats
+    schedule: Floats
+    complete: NDArray[np.bool_]
+    stop: NDArray[np.int64]
+
+
+class PeriodCutter(StatefulBase):
+    """Cuts signals at the multiples of N, and remembers the period that has begun.
+
+    Parameters
+    ----------
+    window
+        N, samples.
+    differenced
+        Which signals are differenced, shape (signals,).
+    """
+
+    _STATE: ClassVar[tuple[str, ...]] = ("_samples", "_position", "_at", "_whole")
+
+    def __init__(self, window: int, differenced: NDArray[np.bool_]) -> None:
+        self._window, self._differenced = window, differenced
+        self._samples = np.zeros((differenced.size, window + 1))  # with the one before the period
+        self._position = np.full(window, np.nan)
+        self._at, self._whole = 0, False
+
+    def _begin_at(self, sample: int) -> None:
+        """The next sample has this number and does not follow the previous one."""
+        self._at = sample % self._window
+        self._whole, self._position[:] = False, np.nan
+
+    def _cut(self, data: Floats, schedule: Floats, left_out: NDArray[np.int64]) -> Iterator[Periods]:
+        """The periods that end in these samples, some at a time.
+
+        Parameters
+        ----------
+        data, schedule
+            Shapes (signals, samples) and (samples,).
+        left_out
+            Indices of the samples without which a period does not count.
+        """
+        window, at, samples = self._window, self._at, data.shape[1]
+        count = (at + samples) // window
+        complete = np.ones(count + 1, dtype=np.bool_)
+        complete[0] = self._whole
+        complete[(at + left_out) // window] = False
+        together = max(1, _TOGETHER // window)
+        for first in range(0, count, together):
+            last = min(count, first + together)
+            begin, end = max(first * window - at, 0), last * window - at
+            before = first * window - at < 1  # the sample before them is not in the data
+            signals = np.hstack([self._samples[:, : at + 1], data[:, :end]]) if before else data[:, begin - 1 : end]
+            position = np.concatenate([self._position[:at], schedule[:end]]) if before else schedule[begin:end]
+            yield Periods(
+                self._differences(signals).reshape(len(data), last - first, window),
+                position.reshape(last - first, window),
+                complete[first:last],
+                np.arange(first + 1, last + 1) * window - at,
+            )
+            if last == count:
+                self._samples[:], self._position[:] = signals[:, -window - 1 :], position[-window:]
+                self._samples[:, 0] = self._samples[:, -1]
+        rest, at = (samples, at) if not count else ((at + samples) % window, 0)
+        self._samples[:, at + 1 : at + 1 + rest] = data[:, samples - rest :]
+        self._position[at : at + rest] = schedule[samples - rest :]
+        self._at, self._whole = at + rest, bool(complete[count])
+
+    def _differences(self, signals: Floats) -> Floats:
+        """Signals without the sample before them, some of them differenced."""
+        if not self._differenced.any():
+            return signals[:, 1:]
+        return np.where(self._differenced[:, np.newaxis], np.diff(signals), signals[:, 1:])

@@ -1,0 +1,214 @@
+"""The recordings of `livebode example`: simulated axes whose files the documentation uses.
+
+The same files on every call: each recording has a fixed seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+
+from livebode.core import Block, Lines, OutputError
+from livebode.core.files import whole_files
+from livebode.core.writing import writing
+from livebode.excitation import chirp, multisine
+from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Standstill, Strokes, TensionLoss
+
+_RATE_HZ, _WINDOW = 4000.0, 400
+_SENSOR = Sensor(noise_rad_per_s=0.1)
+_HELD = Standstill(position_m=0.8)
+_STROKES = Strokes(start_m=0.25, end_m=1.6, speed_m_per_s=0.38)
+_HUM_HZ, _HUM_N_M = 50.0, 0.05
+_SIGNALS = ("w", "u", "velocity")
+
+
+@dataclass(frozen=True)
+class Example:
+    """Recordings of one kind, their configurations, and the commands to begin with.
+
+    `recordings` are functions that simulate, by name of their files; `configurations` names of files.
+    """
+
+    about: str
+    recordings: dict[str, Callable[[], pa.Table]]
+    configurations: tuple[str, ...]
+    commands: tuple[str, ...]
+
+    @property
+    def files(self) -> list[str]:
+        return [*self.recordings, *self.configurations]
+
+
+def _simulated(names: tuple[str, ...], **settings: Any) -> Callable[[], pa.Table]:
+    def simulate() -> pa.Table:
+        block, _ = SimulatedAxis(BeltAxis(sensor=_SENSOR, **settings)).run()
+        return _table(block, names)
+
+    return simulate
+
+
+def _table(block: Block, names: tuple[str, ...]) -> pa.Table:
+    units = {channel.name: channel.unit for channel in block.channels}
+    columns = {f"{name} [{units[name]}]": block[name] for name in names}
+    return pa.table({"t [s]": np.arange(len(block)) / block.rate_hz} | columns)
+
+
+def _multisine(frequencies: str, amplitude_n_m: float = 1.0) -> np.ndarray:
+    return multisine(Lines.parse(frequencies, _RATE_HZ, _WINDOW), amplitude_n_m)
+
+
+def _standstill(seed: int, seconds: float = 2.0) -> Callable[[], pa.Table]:
+    period = _multisine("20:140:10", 0.5)
+    return _simulated(_SIGNALS, motion=_HELD, excitation_n_m=period, seconds=seconds, run_in_s=0.5, seed=seed)
+
+
+def _moving(seed: int, seconds: float, *faults: TensionLoss) -> Callable[[], pa.Table]:
+    period = _multisine("20:140:20")
+    return _simulated(
+        (*_SIGNALS, "x"), motion=_STROKES, excitation_n_m=period, faults=faults, seconds=seconds, seed=seed
+    )
+
+
+def _single_chirp() -> pa.Table:
+    period = chirp(10, 200, _RATE_HZ, 3 * int(_RATE_HZ), 2.0)
+    return _simulated(_SIGNALS, motion=_HELD, excitation_n_m=period, seconds=3.0, seed=6)()
+
+
+def _quiet() -> pa.Table:
+    """An axis at standstill without excitation; the measured torque has a hum."""
+    block, _ = SimulatedAxis(BeltAxis(sensor=_SENSOR, motion=_HELD, seconds=3.0, seed=7)).run()
+    table = _table(block, ("u", "velocity"))
+    hum = _HUM_N_M * np.sin(2 * np.pi * _HUM_HZ * np.arange(len(block)) / block.rate_hz)
+    return table.set_column(1, table.column_names[1], pa.array(block["u"] + hum))
+
+
+EXAMPLES = {
+    "standstill": Example(
+        "an axis at standstill, recorded twice",
+        {"standstill.csv": _standstill(1), "standstill-2.csv": _standstill(2)},
+        ("standstill.toml", "acceptance.toml"),
+        (
+            "livebode inspect standstill.csv --excitation w --output velocity",
+            "livebode run standstill.toml",
+            "livebode fit runs/standstill",
+            "livebode validate runs/standstill --on standstill-2.csv",
+        ),
+    ),
+    "moving": Example(
+        "an axis that moves, with the position as schedule",
+        {"moving.parquet": _moving(3, 8.2)},
+        ("moving.toml",),
+        ("livebode run moving.toml",),
+    ),
+    "chirp": Example(
+        "a single chirp, which does not repeat",
+        {"chirp.csv": _single_chirp},
+        ("chirp.toml",),
+        ("livebode inspect chirp.csv --excitation w", "livebode run chirp.toml"),
+    ),
+    "fault": Example(
+        "a healthy axis on two days, and today with a belt that becomes 2 % softer",
+        {
+            "monday.parquet": _moving(1, 13.0),
+            "tuesday.parquet": _moving(2, 13.0),
+            "today.parquet": _moving(3, 13.0, TensionLoss(start_s=5.0, loss=0.02)),
+        },
+        ("monday.toml", "tuesday.toml", "today.toml"),
+        (
+            "livebode run monday.toml",
+            "livebode run tuesday.toml",
+            "livebode learn runs/monday runs/tuesday --out healthy.json",
+            "livebode run today.toml --baseline healthy.json --false-alarm-interval 30",
+        ),
+    ),
+    "loop": Example(
+        "an axis whose control loop is described",
+        {"loop.parquet": _standstill(5)},
+        ("loop.toml",),
+        ("livebode run loop.toml", "livebode margins runs/loop"),
+    ),
+    "design": Example(
+        "before an experiment: a recording without excitation, and the description of a machine",
+        {"quiet.parquet": _quiet},
+        ("experiment.toml",),
+        (
+            "livebode inspect quiet.parquet --lines 20:140:10 --window 400 --output velocity --input u",
+            "livebode design experiment.toml --out runs/experiment",
+        ),
+    ),
+    "output-only": Example(
+        "an axis without a recorded input",
+        {
+            "ambient.parquet": _simulated(
+                ("velocity",), motion=_HELD, drive=Drive(torque_noise_n_m=1.0), seconds=20.0, seed=8
+            )
+        },
+        ("ambient.toml",),
+        ("livebode run ambient.toml",),
+    ),
+}
+"""The examples by name."""
+
+
+def write_examples(names: list[str], folder: Path, *, force: bool = False) -> list[Path]:
+    """Write the recordings and configurations of these examples.
+
+    Parameters
+    ----------
+    names
+        Of `EXAMPLES`.
+    folder
+        Created if it is missing.
+    force
+        Replace files with other content. A file that has this content already is left as it is.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    OutputError
+        If one of the files exists with other content, or cannot be written. Nothing is written then.
+    """
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        with whole_files(folder, "example") as partial:
+            for name in names:
+                _write(EXAMPLES[name], partial)
+            files = [folder / path.name for path in sorted(partial.iterdir())]
+            for path in files:
+                _check(path, partial / path.name, force)
+    return files
+
+
+def _write(example: Example, folder: Path) -> None:
+    for name, simulate in example.recordings.items():
+        if name.endswith(".csv"):
+            pyarrow.csv.write_csv(simulate(), folder / name)
+        else:
+            pq.write_table(simulate(), folder / name)
+    for name in example.configurations:
+        text = (resources.files("livebode.interface") / "example_files" / name).read_text("utf-8")
+        (folder / name).write_text(text, encoding="utf-8", newline="\n")
+
+
+def _check(path: Path, written: Path, force: bool) -> None:
+    """An OutputError if something else is there."""
+    if path.is_dir() or (not force and path.exists() and path.read_bytes() != written.read_bytes()):
+        raise OutputError(
+            "exists",
+            f"{str(path)!r} exists already, and is not the file of the example",
+            "choose another directory, or replace it with force",
+            path=str(path),
+            argument="force",
+        )

@@ -1,0 +1,84 @@
+"""The configuration of a recording from the roles of its channels: lines, window and estimator are found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import tomli_w
+
+from livebode.configuration import Axis
+from livebode.core import Lines, LivebodeError, counted
+from livebode.estimation.settings import DETECTION_LINES_MIN
+from livebode.excitation import recognise
+from livebode.experiment_design.axis_file import lines_text
+from livebode.preparation.plan import beginning, make_settings, roles_in_doubt
+from livebode.sources import Log
+
+_NOT_REPEATING = ("signal.not-periodic", "signal.too-short")
+_COLUMN = 28  # of the comments
+
+Tables = dict[str, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A valid configuration; `comments` by section and key, `doubts` about the roles."""
+
+    tables: Tables
+    comments: Mapping[tuple[str, str], str]
+    doubts: list[str]
+
+    def text(self, recording: str) -> str:
+        """The configuration as TOML, with its comments."""
+        lines = [f"# Written by `livebode new` from {recording}."]
+        for section, table in self.tables.items():
+            lines += ["", f"[{section}]"]
+            for key, value in table.items():
+                line = tomli_w.dumps({key: value}).strip()
+                comment = self.comments.get((section, key), "")
+                lines.append(f"{line:<{_COLUMN}}# {comment}" if comment else line)
+        return "\n".join(lines) + "\n"
+
+
+def suitable_estimator(log: Log, signals: Mapping[str, str]) -> tuple[str, str]:
+    """The estimator for these roles, and why: by whether the excitation, or else the input, repeats."""
+    reference = signals.get("excitation") or signals.get("input")
+    if reference is None:
+        return "joint", ""
+    try:
+        recognise(beginning(log, reference), log.rate_hz)
+    except LivebodeError as error:
+        if error.code in _NOT_REPEATING:
+            return "lpm", f"{reference} does not repeat, as noise or a single chirp"
+    if "excitation" not in signals:
+        return "direct", "without the excitation: for an open loop"
+    return "joint", "for a machine in a control loop, whose excitation repeats"
+
+
+def settled(log: Log, tables: Tables, reasons: Mapping[str, str]) -> Settled:
+    """Check the tables with the recording, and add lines and window if the excitation repeats.
+
+    Raises
+    ------
+    LivebodeError
+        If the recording contradicts the roles, or they do not suffice.
+    """
+    axis = Axis.of(tables, "the answers")
+    settings = make_settings(axis, log)
+    doubts = roles_in_doubt(axis, log, settings)
+    comments = {("signals", role): reason for role, reason in reasons.items()}
+    if not settings.periodic:
+        return Settled(tables, comments, doubts)
+    lines, periods = settings.lines, "one period"
+    if "schedule" in tables["signals"] and len(lines.quiet) < DETECTION_LINES_MIN:
+        lines = Lines(tuple(2 * k for k in lines.bins), lines.window * 2, log.rate_hz)
+        periods = "two periods, so that bins without excitation show the noise in motion"
+    found = {"frequencies": lines_text(lines), "window": lines.window}
+    ends = f"{lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz"
+    comments["lines", "frequencies"] = f"{counted(len(lines), 'line')}, {ends}"
+    comments["lines", "window"] = f"samples: {lines.window / log.rate_hz:.6g} s, {periods}"
+    order = ("source", "signals", "lines")
+    head = {name: tables[name] if name != "lines" else found for name in order}
+    return Settled(head | {name: table for name, table in tables.items() if name not in order}, comments, doubts)

@@ -1,0 +1,176 @@
+"""What somebody does wrong on the first day: each mistake is one sentence that names the value and what to do."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import livebode as package
+from livebode.configuration.axis import serve_section
+from livebode.core.installing import _clone, _packages
+from livebode.records import RunRecord
+from tests.support.command import livebode, signals, write_csv, write_parquet
+
+BYTES = {
+    "picture.csv": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR",
+    "photo.mat": b"\xff\xd8\xff\xe0\0\x10JFIF",
+    "manual.txt": b"%PDF-1.7\n",
+    "old.xls": b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(500),
+    "log.csv.gz": b"\x1f\x8b\x08\0",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("first")
+    for name, content in BYTES.items():
+        (folder / name).write_bytes(content)
+    with zipfile.ZipFile(folder / "book.xlsx", "w") as book:
+        book.writestr("[Content_Types].xml", "<Types/>")
+        book.writestr("xl/workbook.xml", "<workbook/>")
+    (folder / "empty.csv").touch()
+    (folder / "header.csv").write_text("t,w,u,y\n")
+    (folder / "text.txt").write_text("Dear reader,\nthis is a letter.\n")
+    (folder / "directory").mkdir()
+    (folder / "key.toml").write_text('[source]\nlog = "log.csv"\n[signals]\nexcitaton = "w"\noutput = "y"\n')
+    (folder / "broken.toml").write_text("[source\n")
+    write_csv(folder / "log.csv", signals())
+    roles = ("--excitation", "w", "--input", "u", "--output", "y")
+    assert livebode("run", folder / "log.csv", *roles, "--out", folder / "runs/monday").code == 0
+    return folder
+
+
+MISTAKES = [
+    ("run nofile.csv", "there is no file nofile.csv"),
+    ("run directory", "directory is a directory"),
+    ("run log.csv", "the output channel is not named"),
+    ("run log.csv --output yy", "did you mean 'y'?"),
+    ("run log.csv --excitation w --input u --output y --lines 20-140 --window 100", "cannot be read"),
+    ("run log.csv --excitation w --input u --output y --lines 55 --window 100", "the nearest lines are 50 and 60 Hz"),
+    ("run log.csv --excitation w --input u --output y --lines 900 --window 100", "Nyquist"),
+    ("run log.csv --excitation w --input u --output y --window 0.1", "neither a whole number"),
+    ("run log.csv --excitation w --input u --output y --window 9999", "less than the window"),
+    ("run log.csv --excitation w --input u --output y --rate 500", "correct rate_hz"),
+    ("run log.csv --excitation w --input u --output y --from 99", "choose other limits"),
+    ("run log.csv --excitation w --input u --output y --estimator jont", "'joint'"),
+    ("run log.csv --excitation w --input u --output y --out runs/monday", "replace it with force"),
+    ("run log.csv --excitation w --input u --output y --out log.csv/run", "could not be written"),
+    ("run picture.csv --output y", "is not a recording, but a picture (PNG)"),
+    ("inspect photo.mat", "is not a recording, but a picture (JPEG)"),
+    ("inspect manual.txt", "a PDF document"),
+    ("inspect old.xls", "an Excel workbook (.xls) or another Office document; save its table as CSV"),
+    ("inspect book.xlsx", "an Excel workbook (.xlsx) or another Office document; save its table as CSV"),
+    ("inspect log.csv.gz", "compressed (gzip); unpack it first"),
+    ("inspect empty.csv", "is empty"),
+    ("inspect header.csv", "no row of numbers"),
+    ("inspect text.txt", "no row of numbers"),
+    ("inspect directory", "is a directory"),
+    ("run key.toml", "did you mean 'excitation'?"),
+    ("run broken.toml", "is not TOML"),
+    ("fit runs/nope", "there is no directory 'runs/nope'; Runs in runs: monday"),
+    ("fit runs/mondy", "did you mean 'monday'?"),
+    ("fit log.csv", "'log.csv' is a file, not the directory of a run"),
+    ("view nowhere/run", "there is no directory 'nowhere/run'"),
+    ("report directory", "has no run.json"),
+    ("compare runs/monday runs/nope", "there is no directory 'runs/nope'"),
+    ("learn runs/nope --out healthy.json", "there is no directory"),
+    ("validate runs/monday --on nofile.csv", "there is no file nofile.csv"),
+    ("export runs/monday --to xlsx", "choose csv, mat, netcdf or uff"),
+    (
+        "run log.csv --excitation w --input u --output y --baseline none.json --force",
+        "there is no baseline 'none.json'",
+    ),
+    ("run log.csv key.toml", "a configuration cannot be combined"),
+    ("design key.toml", "there is no 'source'"),
+]
+
+
+@pytest.mark.parametrize(("command", "sentence"), MISTAKES, ids=[command for command, _ in MISTAKES])
+def test_a_first_mistake_is_one_sentence(
+    command: str, sentence: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    result = livebode(*command.split())
+    assert result.code == 2
+    assert sentence in result.err
+    assert result.err.count("\n") == 1, "one sentence"
+
+
+def test_decimal_commas_and_semicolons_are_read(folder: Path) -> None:
+    text = (folder / "log.csv").read_text().replace(",", ";").replace(".", ",")
+    (folder / "german.csv").write_text(text)
+    result = livebode("inspect", folder / "german.csv", "--excitation", "w")
+    assert (result.code, "repeats every 20 samples" in result.out) == (0, True)
+
+
+def test_first_mistakes_in_python_are_sentences_too(folder: Path) -> None:
+    block = next(package.open_log(folder / "log.csv").blocks(["w", "y"]))
+    with pytest.raises(
+        package.UsageError, match=r"a Block with the channels w, y; give the samples of one: block\['w'\]"
+    ):
+        package.recognise(block, "w")
+    with pytest.raises(package.UsageError, match="rate_hz='1000' is not a positive number"):
+        package.recognise(block["w"], "1000")
+    with pytest.raises(package.UsageError, match=r"the lines \[20, 40\] are not text"):
+        package.Lines.parse([20, 40], 1000, 100)
+    with pytest.raises(package.UsageError, match="lines='20:40:20' are not Lines"):
+        package.Settings(lines="20:40:20", output="y", input="u", excitation="w")
+    with pytest.raises(package.RecordError, match="is a file, not the directory of a run"):
+        package.Run(str(folder / "log.csv"))
+    assert RunRecord.open(str(folder / "runs/monday")).lines == package.Run(folder / "runs/monday").lines
+
+
+def test_view_takes_a_file_that_has_only_the_section_serve(folder: Path) -> None:
+    (folder / "serve.toml").write_text('[serve]\nport = 9000\ntoken_file = "token"\n')
+    found = serve_section(folder / "serve.toml")
+    assert (found.port, found.token_file) == (9000, folder / "token")
+    (folder / "wrong.toml").write_text("[serve]\nprot = 9000\n")
+    with pytest.raises(package.ConfigError, match="did you mean 'port'"):
+        serve_section(folder / "wrong.toml")
+
+
+def test_an_extra_is_installed_from_the_clone_while_it_is_there_and_by_its_packages_after(tmp_path: Path) -> None:
+    (tmp_path / "pyproject.toml").touch()
+    url = tmp_path.as_uri()
+    assert _clone(f'{{"url": "{url}", "dir_info": {{"editable": true}}}}') == (tmp_path, True)
+    assert _clone(f'{{"url": "{url}", "dir_info": {{}}}}') == (tmp_path, False)
+    assert _clone(f'{{"url": "{url}/gone", "dir_info": {{}}}}') == (None, False)
+    assert _clone('{"url": "https://example.org/x.whl", "archive_info": {}}') == (None, False)
+    assert _clone(None) == (None, False)
+    requires = ["numpy>=2.0", 'reportlab>=4.2; extra == "pdf"', 'h5py>=3.11; extra == "hdf5"']
+    assert _packages(requires, ("pdf",)) == ["reportlab>=4.2"]
+
+
+@pytest.mark.parametrize("columns", [40, 60])
+def test_no_name_is_cut_in_a_narrow_terminal(columns: int, folder: Path) -> None:
+    long = "MAIN.fbAxis.stStatus.fActualVelocityOfTheMotor"
+    given = signals(400)
+    write_parquet(folder / "long.parquet", {"t": given["t"], f"{long} [rad/s]": given["y"]})
+    text = on_terminal(columns, "inspect", folder / "long.parquet") + on_terminal(columns, "doctor", "--runs", folder)
+    assert long in text
+    assert "…" not in text
+    for name in ("instruction set", "not applicable", "UDP receive buffer"):
+        assert name in text
+
+
+def on_terminal(columns: int, *arguments: object) -> str:
+    reader, terminal = pty.openpty()
+    command = [Path(sys.executable).with_name("livebode"), *arguments]
+    environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": str(columns)}
+    process = subprocess.Popen(list(map(str, command)), stdout=terminal, stderr=terminal, env=environment)
+    os.close(terminal)
+    found = b""
+    try:
+        while piece := os.read(reader, 1 << 16):
+            found += piece
+    except OSError:  # so a terminal ends
+        pass
+    os.close(reader)
+    process.wait()
+    return found.decode()

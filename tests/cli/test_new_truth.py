@@ -1,0 +1,134 @@
+"""`livebode new`: the configuration that it writes has the roles, lines and window of the simulated machine."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pty
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.interface.example_recordings import write_examples
+from tests.support.command import livebode, signals, write_csv
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("new")
+    write_examples(["standstill", "moving", "chirp"], folder)
+    return folder
+
+
+def written(folder: Path, log: str, *options: object) -> dict[str, dict[str, object]]:
+    out = folder / "axis.toml"
+    result = livebode("new", folder / log, "--yes", "--force", "--out", out, *options)
+    assert result.code == 0, result.err
+    return tomllib.loads(out.read_text("utf-8"))
+
+
+def test_at_standstill_the_proposals_are_the_roles_and_the_lines_of_the_simulation(folder: Path) -> None:
+    found = written(folder, "standstill.csv")
+    assert found["signals"] == {"excitation": "w", "input": "u", "output": "velocity"}
+    assert found["lines"] == {"frequencies": "20:140:10", "window": 400}
+    assert found["tracking"] == {"estimator": "joint", "average": True}
+
+
+def test_in_motion_the_position_is_the_schedule_and_the_window_leaves_bins_without_excitation(folder: Path) -> None:
+    found = written(folder, "moving.parquet")
+    assert found["signals"]["schedule"] == "x"
+    assert found["lines"] == {"frequencies": "20:140:20", "window": 400}
+    assert "average" not in found["tracking"]
+
+
+def test_a_chirp_that_does_not_repeat_is_for_the_local_polynomial_method(folder: Path) -> None:
+    assert written(folder, "chirp.csv")["tracking"] == {"estimator": "lpm"}
+
+
+def test_without_units_the_names_suffice_and_without_both_the_sentence_lists_the_channels(tmp_path: Path) -> None:
+    given = signals()
+    write_csv(tmp_path / "log.csv", given)
+    assert written(tmp_path, "log.csv")["signals"] == {"excitation": "w", "input": "u", "output": "y"}
+    renamed = {"t": given["t"], "a": given["w"], "b": given["u"], "c": given["y"]}
+    write_csv(tmp_path / "names.csv", renamed)
+    refused = livebode("new", tmp_path / "names.csv", "--yes", "--out", tmp_path / "other.toml")
+    assert refused.code == 2
+    assert "not recognised among t, a, b, c; give --output CHANNEL" in refused.err
+    roles = written(tmp_path, "names.csv", "--output", "c", "--input", "b")["signals"]
+    assert roles == {"excitation": "a", "input": "b", "output": "c"}  # the only channel that repeats exactly
+
+
+def test_exchanged_roles_are_refused_and_nothing_is_written(folder: Path) -> None:
+    out = folder / "exchanged.toml"
+    refused = livebode("new", folder / "standstill.csv", "--yes", "--out", out, "--input", "velocity", "--output", "u")
+    assert refused.code == 2
+    assert "'velocity'" in refused.err
+    assert not out.exists()
+
+
+def test_an_existing_file_and_a_missing_terminal_are_one_sentence_each(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    existing = folder / "standstill.toml"
+    refused = livebode("new", folder / "standstill.csv", "--yes", "--out", existing)
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
+    assert "replace it with --force" in refused.err
+    with open(os.devnull) as nothing:
+        monkeypatch.setattr(sys, "stdin", nothing)
+        refused = livebode("new", folder / "standstill.csv", "--out", folder / "asked.toml")
+        missing = livebode("new", folder / "nofile.csv", "--out", folder / "asked.toml")
+    assert "there is no terminal to ask on; take the proposals with --yes" in refused.err
+    assert "there is no file" in missing.err
+
+
+def test_json_gives_the_configuration(folder: Path) -> None:
+    out = folder / "json.toml"
+    result = livebode("new", folder / "chirp.csv", "--json", "--out", out)
+    assert json.loads(result.out)["configuration"] == tomllib.loads(out.read_text("utf-8"))
+
+
+def test_on_a_terminal_it_lists_the_channels_asks_again_after_a_wrong_name_and_takes_numbers(folder: Path) -> None:
+    out = folder / "asked.toml"
+    answers = [
+        ("Excitation", "nonsense"), ("select one", "2"), ("Input", ""), ("Output", "velocity"), ("Schedule", "-"),
+        ("Estimator", ""), ("Average", "n"), ("Model", "two-mass"),
+    ]  # fmt: skip
+    code, text = asked(["new", folder / "moving.parquet", "--out", out], answers)
+    assert code == 0, text
+    assert "torque" in text
+    assert tomllib.loads(out.read_text("utf-8"))["signals"] == {"excitation": "w", "input": "u", "output": "velocity"}
+    assert "[fit]" in out.read_text("utf-8")
+
+
+def asked(arguments: list[object], answers: list[tuple[str, str]]) -> tuple[int, str]:
+    """Give each answer when the terminal shows its question."""
+    reader, terminal = pty.openpty()
+    command = [Path(sys.executable).with_name("livebode"), *arguments]
+    environment = os.environ | {"TERM": "dumb", "COLUMNS": "120"}
+    process = subprocess.Popen(
+        list(map(str, command)), stdin=terminal, stdout=terminal, stderr=terminal, env=environment
+    )
+    os.close(terminal)
+    shown, at, rest = "", 0, list(answers)
+    with contextlib.suppress(OSError):  # so a terminal ends
+        while piece := os.read(reader, 1 << 16):
+            shown += piece.decode()
+            while rest and rest[0][0] in shown[at:] and shown.endswith(": "):
+                at = len(shown)
+                os.write(reader, f"{rest.pop(0)[1]}\n".encode())
+    os.close(reader)
+    return process.wait(), shown
+
+
+def test_the_schedule_is_not_proposed_for_a_position_that_only_vibrates(tmp_path: Path) -> None:
+    given = signals()
+    write_csv(tmp_path / "log.csv", given | {"x [m]": 0.8 + 1e-3 * given["y"]})
+    assert "schedule" not in written(tmp_path, "log.csv")["signals"]
+    ramp = given | {"x [m]": 0.8 + 1e-3 * given["y"] + np.sin(3 * given["t"])}
+    write_csv(tmp_path / "moves.csv", ramp)
+    assert written(tmp_path, "moves.csv")["signals"]["schedule"] == "x"

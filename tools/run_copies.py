@@ -1,0 +1,71 @@
+"""Copies of one recorded run as if the machine had been measured again: another day, other values, another baseline."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from livebode.records.piece import parts_of
+from livebode.records.segments.json_lines import to_line
+from livebode.records.summary_file import COPY, RUN, read_summary, to_document
+
+
+def copy_run(
+    run: Path,
+    to: Path,
+    *,
+    begun: float | None = None,
+    factors: Mapping[str, float] | None = None,
+    alarm: str = "",
+    changes: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write a copy of a run in one piece; tables that do not change are the same files.
+
+    Parameters
+    ----------
+    run, to
+        The run, and the directory to create.
+    begun
+        Seconds since 1970 at second 0 of the run; None: it has no clock.
+    factors
+        Of fitted quantities, by name.
+    alarm
+        Message of an alarm at the end of the run; empty: no alarm.
+    changes
+        Further keys of run.json.
+    """
+    to.mkdir(parents=True)
+    os.link(run / "responses.parquet", to / "responses.parquet")
+    summary, _ = read_summary(run)
+    if factors:
+        _scaled(run / "parameters.parquet", to / "parameters.parquet", factors)
+    else:
+        os.link(run / "parameters.parquet", to / "parameters.parquet")
+    summary |= {"files": {path.name: parts_of(path) for path in sorted(to.glob("*.parquet"))}}
+    if begun is not None:
+        summary["clock"] = [[0.0, begun]]
+    events = []
+    if alarm:
+        events.append({"kind": "change", "sample": 1000, "time_s": 1.0, "message": alarm, "details": {}})
+    (to / "events.jsonl").write_bytes(b"".join(map(to_line, events)))
+    for name in (RUN, COPY):
+        (to / name).write_bytes(to_document(summary | dict(changes or {})))
+    return to
+
+
+def _scaled(file: Path, to: Path, factors: Mapping[str, float]) -> None:
+    table = pq.read_table(file)
+    name = table["name"].to_numpy(zero_copy_only=False)
+    factor = np.ones(len(name))
+    for one, by in factors.items():
+        factor[name == one] = by
+    for column in ("value", "sigma"):
+        at = table.schema.get_field_index(column)
+        table = table.set_column(at, table.schema.field(column), pa.array(table[column].to_numpy() * factor))
+    pq.write_table(table, to)
