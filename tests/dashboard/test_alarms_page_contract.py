@@ -35,9 +35,10 @@ def tab(watched: Watched) -> Iterator[Tab]:
     """The page with an alarm in a flood of 500 others."""
     with chromium() as browser, Tab(browser, watched.url) as found:
         assert watched.hub.control is not None
-        watched.hub.control.record(CHANGE)
         for i in range(500):
             watched.hub(Event("roles-doubtful", i, i / 1000, f"doubtful {i}", {"reason": f"cause {i}"}))
+        found.until("document.querySelectorAll('#events [role=row]').length === 301")
+        watched.hub.control.record(CHANGE)
         watched.go(8200)
         found.page.locator(ROW).wait_for()
         found.page.locator("#verdict", has_text="ALARM").wait_for()

@@ -51,6 +51,8 @@ export class Events {
     this.past = new Map();
     /** @type {Set<string>} causes whose acknowledgement is on its way */
     this.waiting = new Set();
+    /** @type {string | undefined} the cause of the row that last had the focus */
+    this.chosen = undefined;
     this.open = 0;
     this.drawn = -DRAW_MS;
     /** @type {Map<string, {key: string, row: HTMLElement}>} */
@@ -72,6 +74,10 @@ export class Events {
     filter.placeholder = tr("filter");
     filter.addEventListener("input", () => this.draw());
     this.list = roving(host, (row, event) => this.key(row, event));
+    host.addEventListener("focusin", ({ target }) => {
+      const row = target instanceof Element && target.closest("[role=row]");
+      if (row instanceof HTMLElement) this.chosen = row.dataset.cause;
+    });
     host.addEventListener("click", ({ target }) => {
       const row = target instanceof Element && target.closest("[role=row]");
       if (row instanceof HTMLElement) this.go(row);
@@ -101,6 +107,7 @@ export class Events {
   begin(axis, may) {
     this.axis = axis;
     this.may = may;
+    this.chosen = undefined;
     this.all.clear();
     this.past.clear();
     this.draw();
@@ -176,20 +183,17 @@ export class Events {
   }
 
   /**
-   * Rows that have not changed keep their element, and the focus stays with its cause.
+   * Rows that have not changed keep their element. The tab stop stays with the cause that the person chose; before, it is
+   * the first row, since in a flood the most urgent alarm may come after others.
    *
    * @param {HTMLElement[]} shown
    */
   replace(shown) {
     const focused = this.host.contains(document.activeElement);
-    const held = this.host.querySelector('[tabindex="0"]')?.getAttribute("data-cause");
     if (shown.length !== this.host.children.length || shown.some((row, i) => row !== this.host.children[i]))
       this.host.replaceChildren(...shown);
-    const again = held && shown.find((row) => row.getAttribute("data-cause") === held);
-    if (again) {
-      for (const row of shown) row.tabIndex = row === again ? 0 : -1;
-    }
-    this.list.settle();
+    const stop = (this.chosen && shown.find((row) => row.dataset.cause === this.chosen)) || shown[0];
+    for (const row of shown) row.tabIndex = row === stop ? 0 : -1;
     if (focused && !this.host.contains(document.activeElement)) this.list.focus();
   }
 

@@ -37,11 +37,6 @@ export function roving(host, act) {
     event.stopPropagation();
   });
   return {
-    /** The tab stop after the rows have changed: the same cause if it is still there. */
-    settle() {
-      const all = rows();
-      if (!all.some((row) => row.tabIndex === 0)) stop(all[0]);
-    },
     focus: () => (rows().find((row) => row.tabIndex === 0) ?? rows()[0])?.focus(),
   };
 }
