@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
+from urllib.request import Request, urlopen
 
 import pytest
 
@@ -31,6 +32,7 @@ def object_storage() -> Iterator[str]:
         try:
             import s3fs
 
+            urlopen(Request(f"{address}/moto-api/reset", method="POST")).close()  # its buckets are of the process
             s3fs.S3FileSystem().mkdir(BUCKET)
             yield address
         finally:

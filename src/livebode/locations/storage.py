@@ -23,7 +23,8 @@ _WITHIN = (
     "ReadTimeoutError",
 )
 _REASON_LETTERS = 200
-_WITHOUT_DIRECTORIES = ("s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "memory")
+_S3 = ("s3", "s3a")
+_WITHOUT_DIRECTORIES = (*_S3, "gs", "gcs", "az", "abfs", "abfss", "memory")
 
 
 def opened(url: Url) -> tuple[Any, str]:
@@ -46,20 +47,13 @@ def opened(url: Url) -> tuple[Any, str]:
         # A listing of before would hide what another process wrote since.
         system, path = url_to_fs(url.address, use_listings_cache=False)
     except ImportError as error:
-        package = error.name or url.scheme
-        raise not_installed(
-            f"{url} needs a package for {url.scheme}://, which is not installed ({error})",
-            package=package,
-            extra="remote",
-            path=str(url),
-        ) from None
+        if url.scheme in _S3:
+            raise not_installed(
+                f"{url} needs the package s3fs, which is not installed", package="s3fs", extra="remote", path=str(url)
+            ) from None
+        raise _unusable(url, error, "install that package") from None
     except ValueError as error:
-        raise LocationError(
-            "scheme-unknown",
-            f"{url} cannot be opened: {_first_line(error)}",
-            "check the part before ://",
-            path=str(url),
-        ) from None
+        raise _unusable(url, error, "check the part before ://") from None
     return system, path
 
 
@@ -102,6 +96,11 @@ def _sentence(url: Url, error: Exception) -> LocationError:
             **facts,
         )
     return LocationError("failed", f"{url} cannot be used: {facts['reason']}", "check the URL and the storage", **facts)
+
+
+def _unusable(url: Url, error: Exception, remedy: str) -> LocationError:
+    message = f"{url} cannot be opened: {_first_line(error)}"
+    return LocationError("scheme-unknown", message, remedy, path=str(url))
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:
