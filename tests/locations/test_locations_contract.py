@@ -12,7 +12,6 @@ from livebode.locations import (
     Location,
     Url,
     delta_options,
-    download,
     find,
     local_copy,
     location,
@@ -96,7 +95,7 @@ def test_a_run_arrives_as_it_was(root: str, tmp_path: Path) -> None:
     if isinstance(place, Path):
         return  # a path is itself
     upload(a_run(tmp_path / "run"), place)
-    with download(place) as copy:
+    with local_copy(place) as copy:
         files = {path.relative_to(copy).as_posix(): path.read_text() for path in copy.rglob("*") if path.is_file()}
         assert copy.name == "axis"
     assert files == {name: name for name in ("run.json", "events.jsonl", "responses/000001.parquet")}

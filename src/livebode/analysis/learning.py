@@ -12,6 +12,7 @@ from livebode.configuration.fit_settings import fitter_of
 from livebode.configuration.recorded import recorded_configuration
 from livebode.configuration.recording import open_recording
 from livebode.core import BaselineError, Block, LivebodeError
+from livebode.locations import Location, resolved
 from livebode.monitoring import (
     Baseline,
     LearnedMachine,
@@ -122,9 +123,9 @@ def _axis(run: RunRecord) -> Axis:
 
 def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
     """Duplicated data would count as twice as much evidence."""
-    seen: dict[Path, RunRecord] = {}
+    seen: dict[Location, RunRecord] = {}
     for run, axis in zip(runs, axes):
-        things = [path.resolve() for path in (run.path, *axis.source.logs)]
+        things = [resolved(place) for place in (run.path, *axis.source.logs)]
         for thing in things:
             if thing in seen:
                 raise BaselineError(

@@ -4,12 +4,12 @@ Nothing of fsspec is imported for a path. Endpoint, credentials and other option
 of the storage itself: ``~/.config/fsspec``, ``FSSPEC_…``, ``AWS_…``.
 """
 
-from livebode.locations.copies import LocalCopy, download, local_copy, original, with_originals
+from livebode.locations.copies import LocalCopy, is_copy, local_copy, original, shared_copy, with_originals
 from livebode.locations.delta import delta_options
 from livebode.locations.finding import Found, find
 from livebode.locations.objects import read_bytes, write_whole
 from livebode.locations.uploads import check_free, upload
-from livebode.locations.url import Location, Url, location
+from livebode.locations.url import Location, Url, location, resolved
 
 __all__ = [
     "Found",
@@ -18,12 +18,14 @@ __all__ = [
     "Url",
     "check_free",
     "delta_options",
-    "download",
     "find",
+    "is_copy",
     "local_copy",
     "location",
     "original",
     "read_bytes",
+    "resolved",
+    "shared_copy",
     "upload",
     "with_originals",
     "write_whole",

@@ -7,26 +7,31 @@ import logging
 import os
 import shutil
 import tempfile
+import threading
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from livebode.core import LivebodeError, LocationError
 from livebode.core.writing import why
 from livebode.locations.storage import opened, reporting
-from livebode.locations.url import Location, Url, location
+from livebode.locations.url import Url, location
 
 _logger = logging.getLogger(__name__)
-_RUN = "run.json"
+_DIRECTORIES = {"run.json": "a run", "metadata.yaml": "a ROS 2 bag"}
+"""The file that each kind of directory has, downloaded first: without it the directory is not complete."""
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 _present: dict[str, str] = {}
 """The URL that each temporary directory stands for: of the directory that the copy is from."""
+_shared: weakref.WeakValueDictionary[str, LocalCopy] = weakref.WeakValueDictionary()
+_sharing = threading.Lock()
 
 
 class LocalCopy:
-    """A copy of the file at a URL, or with `run` of the run directory there, until it is closed or no longer in use.
+    """A copy of a file, run or bag at a URL, which is removed when nothing refers to it.
 
     Attributes
     ----------
@@ -43,36 +48,30 @@ class LocalCopy:
         If a package for this storage is not installed.
     """
 
-    def __init__(self, url: Url, *, run: bool = False) -> None:
+    def __init__(self, url: Url) -> None:
         system, source = opened(url)
         self.url = url
         folder = tempfile.mkdtemp(prefix="livebode-")
         self._finalizer = weakref.finalize(self, _remove, folder)
-        self.path = Path(folder) / (url.name or "run")
+        self.path = Path(folder) / (url.name or "copy")
         _present[folder] = str(url).rpartition("/")[0]
         try:
             with reporting(url):
-                (_download_run if run else _download)(url, system, source, self.path)
+                found = system.info(source)
+                if found["type"] == "directory":
+                    _download_directory(url, system, source, self.path)
+                else:
+                    _download(url, system, source, self.path, found)
         except BaseException:
-            self.close()
+            self._finalizer()
             raise
-
-    def close(self) -> None:
-        """Remove the copy."""
-        self._finalizer()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 @contextmanager
 def local_copy(place: str | os.PathLike[str] | Url) -> Iterator[Path]:
-    """The path of a file: a local one itself, of a URL a temporary copy with the same name.
+    """The path of a file or run: a local one itself, of a URL a temporary copy with the same name.
 
-    An error within names the URL in place of the copy. Errors as of `LocalCopy`.
+    Within, whatever opens the URL uses this copy, and an error names the URL in its place. Errors as of `LocalCopy`.
 
     Examples
     --------
@@ -80,15 +79,26 @@ def local_copy(place: str | os.PathLike[str] | Url) -> Iterator[Path]:
     ...     print(path)
     logs/a.csv
     """
-    with _copied(location(place), run=False) as path:
-        yield path
+    found = location(place)
+    if isinstance(found, Path):
+        yield found
+        return
+    copy = shared_copy(found)
+    try:
+        yield copy.path
+    except LivebodeError as error:
+        raise with_originals(error) from error.__cause__
+    finally:
+        del copy  # a traceback would keep it
 
 
-@contextmanager
-def download(place: str | os.PathLike[str] | Url) -> Iterator[Path]:
-    """The path of a run directory: a local one itself, of a URL a temporary copy; otherwise as `local_copy`."""
-    with _copied(location(place), run=True) as path:
-        yield path
+def shared_copy(url: Url) -> LocalCopy:
+    """The copy that is in use for this URL, or a new one; it exists as long as anybody has it."""
+    with _sharing:
+        copy = _shared.get(url.address)
+        if copy is None:
+            copy = _shared[url.address] = LocalCopy(url)
+        return copy
 
 
 def original(text: str) -> str:
@@ -96,6 +106,11 @@ def original(text: str) -> str:
     for folder, url in _present.items():
         text = text.replace(folder, url)
     return text
+
+
+def is_copy(path: Path) -> bool:
+    """Whether a path is that of a local copy, or within one."""
+    return original(str(path)) != str(path)
 
 
 def with_originals(error: LivebodeError) -> LivebodeError:
@@ -106,56 +121,42 @@ def with_originals(error: LivebodeError) -> LivebodeError:
     return error
 
 
-@contextmanager
-def _copied(place: Location, *, run: bool) -> Iterator[Path]:
-    if isinstance(place, Path):
-        yield place
-        return
-    with LocalCopy(place, run=run) as copy:
-        try:
-            yield copy.path
-        except LivebodeError as error:
-            raise with_originals(error) from error.__cause__
-
-
 def _remove(folder: str) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     _present.pop(folder, None)
 
 
-def _download(url: Url, system: Any, source: str, to: Path) -> None:
+def _download(url: Url, system: Any, source: str, to: Path, before: dict[str, Any]) -> None:
     """One file. Large ones arrive in concurrent parts, so its version must be the same before and after."""
-    before = system.info(source)
-    if before["type"] != "file":
-        raise LocationError("not-found", f"{url} is not a file", "name a file below it", path=str(url))
     _get(url, system, source, to)
-    size = before.get("size")
-    if size is not None and to.stat().st_size != size:
+    size_bytes, arrived_bytes = before.get("size"), to.stat().st_size
+    if size_bytes is not None and arrived_bytes != size_bytes:
         raise LocationError(
             "interrupted",
-            f"{url} has {size} bytes, and {to.stat().st_size} arrived",
+            f"{url} has {size_bytes} bytes, and {arrived_bytes} arrived",
             "try again",
             path=str(url),
-            size_bytes=size,
+            size_bytes=size_bytes,
         )
     if version(system.info(source)) != version(before):
         raise LocationError("changed", f"{url} changed while it was downloaded", "try again", path=str(url))
-    _logger.info("%s: downloaded, %d bytes", url, to.stat().st_size)
+    _logger.info("%s: downloaded, %d bytes", url, arrived_bytes)
 
 
-def _download_run(url: Url, system: Any, source: str, to: Path) -> None:
-    """All files of a run; run.json is first, since a run that is incomplete or removed has none."""
-    files = system.find(source)
-    names = [file.removeprefix(source.rstrip("/")).lstrip("/") for file in files]
-    if _RUN not in names:
-        code = "not-a-run" if names else "not-found"
-        raise LocationError(code, f"there is no run at {url}: it has no {_RUN}", "name a run directory", path=str(url))
+def _download_directory(url: Url, system: Any, source: str, to: Path) -> None:
+    files = {name.removeprefix(source.rstrip("/")).lstrip("/"): info for name, info in _files(system, source)}
+    if not files.keys() & _DIRECTORIES.keys():
+        kinds = " or ".join(f"{kind} ({name})" for name, kind in _DIRECTORIES.items())
+        raise LocationError("not-a-run", f"{url} is not {kinds}", "name a run directory or a file", path=str(url))
     to.mkdir()
-    for name, file in sorted(zip(names, files), key=lambda found: found[0] != _RUN):
-        if ".." in name.split("/"):
-            continue
-        (to / name).parent.mkdir(parents=True, exist_ok=True)
-        _download(url / name, system, file, to / name)
+    for name, info in sorted(files.items(), key=lambda found: found[0] not in _DIRECTORIES):
+        if ".." not in name.split("/"):
+            (to / name).parent.mkdir(parents=True, exist_ok=True)
+            _download(url / name, system, info["name"], to / name, info)
+
+
+def _files(system: Any, source: str) -> Iterable[tuple[str, dict[str, Any]]]:
+    return system.find(source, detail=True).items()  # type: ignore[no-any-return]
 
 
 def _get(url: Url, system: Any, source: str, to: Path) -> None:
@@ -179,4 +180,6 @@ def version(info: dict[str, Any]) -> str:
     if etag:
         return str(etag).strip('"')
     moments = [info.get(name) for name in ("mtime", "LastModified", "last_modified", "created", "modified")]
-    return "-".join(str(value) for value in (info.get("size"), *moments) if value is not None)
+    # A moment is a datetime or a number, of some storages one in a listing and the other alone.
+    times = [value.timestamp() if isinstance(value, datetime) else value for value in moments]
+    return "-".join(str(value) for value in (info.get("size"), *times) if value is not None)

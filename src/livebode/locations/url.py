@@ -74,6 +74,11 @@ class Url:
 Location = Path | Url
 
 
+def resolved(place: Location) -> Location:
+    """The place by its only name: a path is absolute and without links."""
+    return place.resolve() if isinstance(place, Path) else place
+
+
 def location(place: str | os.PathLike[str] | Url) -> Location:
     """The place of a file; a file:// URL is a path.
 
