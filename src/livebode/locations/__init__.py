@@ -8,15 +8,15 @@ from livebode.locations.copies import LocalCopy, is_copy, local_copy, original, 
 from livebode.locations.delta import delta_options
 from livebode.locations.finding import Found, find
 from livebode.locations.objects import read_bytes, write_whole
-from livebode.locations.uploads import check_free, upload
+from livebode.locations.uploads import Upload, upload
 from livebode.locations.url import Location, Url, location, resolved
 
 __all__ = [
     "Found",
     "LocalCopy",
     "Location",
+    "Upload",
     "Url",
-    "check_free",
     "delta_options",
     "find",
     "is_copy",

@@ -51,10 +51,8 @@ class LocalCopy:
     def __init__(self, url: Url) -> None:
         system, source = opened(url)
         self.url = url
-        folder = tempfile.mkdtemp(prefix="livebode-")
-        self._finalizer = weakref.finalize(self, _remove, folder)
-        self.path = Path(folder) / (url.name or "copy")
-        _present[folder] = str(url).rpartition("/")[0]
+        self.path = temporary_place(url)
+        self._finalizer = weakref.finalize(self, remove_temporary, self.path)
         try:
             with reporting(url):
                 found = system.info(source)
@@ -121,9 +119,17 @@ def with_originals(error: LivebodeError) -> LivebodeError:
     return error
 
 
-def _remove(folder: str) -> None:
-    shutil.rmtree(folder, ignore_errors=True)
-    _present.pop(folder, None)
+def temporary_place(url: Url) -> Path:
+    """A path with the name of the URL in a new temporary directory; `original` finds the URL from it."""
+    folder = tempfile.mkdtemp(prefix="livebode-")
+    _present[folder] = str(url).rstrip("/").rpartition("/")[0]
+    return Path(folder) / (url.name or "copy")
+
+
+def remove_temporary(path: Path) -> None:
+    """Remove what is there, and the directory that it is in."""
+    shutil.rmtree(path.parent, ignore_errors=True)
+    _present.pop(str(path.parent), None)
 
 
 def _download(url: Url, system: Any, source: str, to: Path, before: dict[str, Any]) -> None:

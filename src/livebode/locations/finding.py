@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.locations.copies import version
-from livebode.locations.storage import opened, reporting
+from livebode.locations.storage import check_bucket, opened, reporting
 from livebode.locations.url import Location, Url, location
 
 _MAGIC = "*?["
@@ -71,8 +71,8 @@ def _below(url: Url) -> list[Found]:
     with reporting(url):
         if any(letter in path for letter in _MAGIC):
             files = system.glob(path, detail=True)
-            if not files and (bucket := path.partition("/")[0]):
-                system.info(bucket)  # its error says whether the bucket is missing
+            if not files:
+                check_bucket(url, system, path)
         else:
             files = system.find(path, detail=True) or {path: system.info(path)}
     # What a storage calls a path lacks the scheme, and for some the host.

@@ -63,6 +63,12 @@ def make_parent(url: Url, system: Any, path: str) -> None:
         system.makedirs(system._parent(path), exist_ok=True)
 
 
+def check_bucket(url: Url, system: Any, path: str) -> None:
+    """FileNotFoundError if the bucket of a path is missing, where the storage has buckets."""
+    if url.scheme in _WITHOUT_DIRECTORIES and (bucket := path.partition("/")[0]):
+        system.info(bucket)
+
+
 @contextmanager
 def reporting(url: Url) -> Iterator[None]:
     """Within, an error of the storage is raised as a `LocationError`; others, such as of a full disk, remain."""

@@ -4,27 +4,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Self
 
 from livebode.core import LivebodeError, LocationError
+from livebode.locations.copies import remove_temporary, temporary_place
 from livebode.locations.objects import write_whole
-from livebode.locations.storage import make_parent, opened, reporting
+from livebode.locations.storage import check_bucket, make_parent, opened, reporting
 from livebode.locations.url import Url
 
 _RUN = "run.json"
-
-
-def check_free(url: Url) -> None:
-    """LocationError if there is anything at the URL, or it cannot be asked."""
-    system, path = opened(url)
-    with reporting(url):
-        taken = system.exists(path)
-    if taken:
-        raise LocationError(
-            "exists",
-            f"there is something at {url} already, and it is not replaced",
-            "choose another URL, or remove it with the tools of the storage",
-            path=str(url),
-        )
 
 
 def upload(directory: str | os.PathLike[str], url: Url) -> None:
@@ -62,3 +50,52 @@ def upload(directory: str | os.PathLike[str], url: Url) -> None:
             directory=str(directory),
             reason=error.code,
         ) from error
+
+
+class Upload:
+    """A run that is written on this computer for a URL, in a temporary directory; use it as a context manager.
+
+    The directory is removed at the end, unless a run in it could not be uploaded.
+
+    Parameters
+    ----------
+    url
+        Where the run is to be.
+
+    Attributes
+    ----------
+    path
+        The directory to write, which does not exist yet; several runs may be written in directories within it.
+
+    Raises
+    ------
+    LocationError
+        If there is something at the URL, or the storage cannot be used: before the run, not after it.
+    """
+
+    def __init__(self, url: Url) -> None:
+        self._url = url
+        system, path = opened(url)
+        with reporting(url):
+            check_bucket(url, system, path)
+            taken = system.exists(path)
+        if taken:
+            raise LocationError(
+                "exists",
+                f"there is something at {url} already, and it is not replaced",
+                "choose another URL, or remove it with the tools of the storage",
+                path=str(url),
+            )
+        self.path = temporary_place(url)
+
+    def send(self) -> None:
+        """Upload each run that was written; errors as of `upload`."""
+        for run in sorted(path.parent for path in self.path.rglob(_RUN)):
+            upload(run, self._url if run == self.path else self._url / run.relative_to(self.path).as_posix())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        if not (isinstance(error, LocationError) and error.code == "location.not-uploaded"):
+            remove_temporary(self.path)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 from urllib.parse import urlsplit
@@ -16,7 +15,6 @@ _QUERY = re.compile(r"\?.*", re.DOTALL)
 _WEB = ("http", "https")
 
 
-@dataclass(frozen=True)
 class Url:
     """A URL of a file or directory; as a text it is without user, password and query, which may be a secret.
 
@@ -34,7 +32,14 @@ class Url:
     Url('ftp://host/site/a.csv')
     """
 
-    address: str
+    def __init__(self, address: str) -> None:
+        self.address = address
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Url) and self.address == other.address
+
+    def __hash__(self) -> int:
+        return hash(self.address)
 
     def __str__(self) -> str:
         shown = _USER.sub("", self.address)

@@ -5,7 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    SerializationInfo,
+    WithJsonSchema,
+)
+from pydantic_core import PydanticCustomError
 
 from livebode.core import Channel, ConfigError, QuantityKind
 from livebode.core.clock import ClockKind
@@ -16,15 +26,22 @@ from livebode.sources.units import split_unit
 
 def _recording(given: Any) -> Location:
     if not isinstance(given, str | Path | Url):
-        raise ValueError("is not a path or URL")
+        raise PydanticCustomError("location", "input is not a valid path or URL")
     return location(given)
+
+
+def _plain_recording(value: Any, info: SerializationInfo) -> Any:
+    if info.mode != "json":
+        return value
+    # Of the union below, the first serializer gets a list too.
+    return list(map(str, value)) if isinstance(value, list) else str(value)
 
 
 File = Annotated[Path, Field(strict=False)]
 LocatedFile = Annotated[
     Any,
     PlainValidator(_recording),
-    PlainSerializer(lambda place, info: str(place) if info.mode == "json" else place),
+    PlainSerializer(_plain_recording),
     WithJsonSchema({"type": "string", "format": "path"}),
 ]
 """A path or URL; as JSON without a secret in it."""
