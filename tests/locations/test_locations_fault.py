@@ -6,14 +6,14 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from livebode.core import LocationError
-from livebode.locations import Url, find, local_copy, upload, write_whole
+from livebode.locations import Upload, Url, find, local_copy, read_bytes, upload, write_whole
 from tests.support.object_storage import BUCKET, at_address, object_storage
 
 
@@ -163,6 +163,33 @@ def test_an_upload_that_fails_leaves_no_run_there_and_the_local_one_here(tmp_pat
         upload(tmp_path, Url("s3://hall/axis"))
     assert caught.value.directory == str(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == list(files)
+
+
+def record(url: Url, before_sending: Callable[[], object]) -> None:
+    with Upload(url) as there:
+        write_whole(there.path / "run.json", b"{}")
+        before_sending()
+        there.send()
+
+
+@pytest.mark.usefixtures("s3")
+def test_of_two_runs_for_one_url_the_later_one_remains_here(temporary: Path) -> None:
+    url = Url("s3://hall/race/axis")
+    with pytest.raises(LocationError, match=r"exists already.*the run is in") as caught:
+        record(url, lambda: write_whole(url / "run.json", b"earlier"))
+    assert read_bytes(url / "run.json") == b"earlier"
+    assert [path / "axis" for path in temporary.iterdir()] == [Path(caught.value.directory)]
+
+
+@pytest.mark.usefixtures("s3")
+def test_a_run_that_fails_leaves_nothing(temporary: Path) -> None:
+    def fails() -> None:
+        raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        record(Url("s3://hall/failed"), fails)
+    assert not list(temporary.iterdir())
+    assert not find("s3://hall/failed*")
 
 
 def test_an_unknown_scheme_is_named() -> None:
