@@ -17,7 +17,7 @@ from typing import Any
 
 from livebode.core import LivebodeError, LocationError
 from livebode.core.writing import why
-from livebode.locations.storage import opened, reporting
+from livebode.locations.storage import in_pieces, opened, reporting
 from livebode.locations.url import Url, location
 
 _logger = logging.getLogger(__name__)
@@ -133,7 +133,7 @@ def remove_temporary(path: Path) -> None:
 
 
 def _download(url: Url, system: Any, source: str, to: Path, before: dict[str, Any]) -> None:
-    """One file. Large ones arrive in concurrent parts, so its version must be the same before and after."""
+    """One file. A connection that ends may be resumed, so its version must be the same before and after."""
     _get(url, system, source, to)
     size_bytes, arrived_bytes = before.get("size"), to.stat().st_size
     if size_bytes is not None and arrived_bytes != size_bytes:
@@ -167,7 +167,7 @@ def _files(system: Any, source: str) -> Iterable[tuple[str, dict[str, Any]]]:
 
 def _get(url: Url, system: Any, source: str, to: Path) -> None:
     try:
-        system.get_file(source, str(to))
+        system.get_file(source, str(to), **in_pieces(url))
     except OSError as error:
         if error.errno not in _DISK or isinstance(error, PermissionError | FileNotFoundError):
             raise

@@ -24,6 +24,7 @@ _WITHIN = (
 )
 _REASON_LETTERS = 200
 _S3 = ("s3", "s3a")
+_PIECE_BYTES = 8 << 20
 _WITHOUT_DIRECTORIES = (*_S3, "gs", "gcs", "az", "abfs", "abfss", "memory")
 
 
@@ -61,6 +62,14 @@ def make_parent(url: Url, system: Any, path: str) -> None:
     """Create the directory of a path, where the storage has directories; a missing bucket is not created."""
     if url.scheme not in _WITHOUT_DIRECTORIES:
         system.makedirs(system._parent(path), exist_ok=True)
+
+
+def in_pieces(url: Url) -> dict[str, int]:
+    """Options of get_file and put_file that bound the memory for a large file; s3fs takes 500 MB otherwise.
+
+    One piece after the other: a download is then one answer of the server, of one version of the file.
+    """
+    return {"chunksize": _PIECE_BYTES, "max_concurrency": 1} if url.scheme in _S3 else {}
 
 
 def check_bucket(url: Url, system: Any, path: str) -> None:

@@ -9,7 +9,7 @@ from typing import Self
 from livebode.core import LivebodeError, LocationError
 from livebode.locations.copies import remove_temporary, temporary_place
 from livebode.locations.objects import write_whole
-from livebode.locations.storage import check_bucket, make_parent, opened, reporting
+from livebode.locations.storage import check_bucket, in_pieces, make_parent, opened, reporting
 from livebode.locations.url import Url
 
 _RUN = "run.json"
@@ -39,7 +39,7 @@ def upload(directory: str | os.PathLike[str], url: Url) -> None:
             for file in sorted(path for path in directory.rglob("*") if path.is_file()):
                 if (name := file.relative_to(directory).as_posix()) != _RUN:
                     make_parent(url, system, f"{root}/{name}")
-                    system.put_file(str(file), f"{root}/{name}")
+                    system.put_file(str(file), f"{root}/{name}", **in_pieces(url))
         write_whole(url / _RUN, (directory / _RUN).read_bytes(), new=True)
     except LivebodeError as error:
         raise LocationError(
