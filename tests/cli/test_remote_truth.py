@@ -35,7 +35,7 @@ RUN = f"{ROOT}/runs/monday"
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A directory with a recording and its run, and both in the storage; the run there is of the recording there."""
     folder = tmp_path_factory.mktemp("desk")
-    log = write_csv(folder / "log.csv", signals())
+    log = write_csv(folder / "log.csv", signals(3000))
     with object_storage():
         write_whole(f"{ROOT}/site/log.csv", log.read_bytes())
         assert livebode("run", log, *ROLES, "--out", folder / "monday").code == 0
@@ -107,10 +107,11 @@ def test_a_proposed_configuration_names_the_url() -> None:
 
 @pytest.mark.usefixtures("desk")
 def test_results_about_a_run_there_are_written_here(here: Path) -> None:
-    for command in (("export", RUN, "--to", "csv"), ("report", RUN)):
+    for command in (("export", RUN, "--to", "csv"), ("report", RUN), ("learn", RUN, "--out", "baseline.json")):
         assert livebode(*command).err == ""
     files = {path.relative_to(here).as_posix() for path in here.rglob("*") if path.is_file()}
-    assert files >= {"monday.csv", "monday/report.html"}
+    assert files >= {"monday.csv", "monday/report.html", "baseline.json"}
+    assert json.loads(Path("baseline.json").read_text())["runs"] == [RUN]
 
 
 def refused(*arguments: str) -> str:

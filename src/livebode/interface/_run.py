@@ -69,7 +69,7 @@ class Run:
 
     def __init__(self, path: str | PathLike[str] | Url) -> None:
         place = location(path)
-        self._copy = shared_copy(place) if isinstance(place, Url) else None
+        self._copy = shared_copy(place) if isinstance(place, Url) else None  # exists as long as this object
         with local_copy(place) as self.path:
             self._record = RunRecord.open(self.path)
         self.summary: Mapping[str, Any] = self._record.summary

@@ -101,7 +101,7 @@ def shared_copy(url: Url) -> LocalCopy:
 
 def original(text: str) -> str:
     """A text with the URLs of local copies in place of their paths."""
-    for folder, url in _present.items():
+    for folder, url in list(_present.items()):  # other threads may have copies too
         text = text.replace(folder, url)
     return text
 
@@ -146,6 +146,8 @@ def _download(url: Url, system: Any, source: str, to: Path, before: dict[str, An
         )
     if version(system.info(source)) != version(before):
         raise LocationError("changed", f"{url} changed while it was downloaded", "try again", path=str(url))
+    if written_s := _moments_s(before)[:1]:
+        os.utime(to, (written_s[0], written_s[0]))  # a report states when a run was written
     _logger.info("%s: downloaded, %d bytes", url, arrived_bytes)
 
 
@@ -185,7 +187,11 @@ def version(info: dict[str, Any]) -> str:
     etag = info.get("ETag") or info.get("etag")
     if etag:
         return str(etag).strip('"')
-    moments = [info.get(name) for name in ("mtime", "LastModified", "last_modified", "created", "modified")]
-    # A moment is a datetime or a number, of some storages one in a listing and the other alone.
-    times = [value.timestamp() if isinstance(value, datetime) else value for value in moments]
-    return "-".join(str(value) for value in (info.get("size"), *times) if value is not None)
+    return "-".join(map(str, (info.get("size"), *_moments_s(info))))
+
+
+def _moments_s(info: dict[str, Any]) -> list[float]:
+    """When it was written, as the storage names it: a datetime or a number, of some one in a listing and one alone."""
+    values = [info.get(name) for name in ("mtime", "LastModified", "last_modified", "modified", "created")]
+    moments = [value.timestamp() if isinstance(value, datetime) else value for value in values]
+    return [moment for moment in moments if isinstance(moment, int | float)]

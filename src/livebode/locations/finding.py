@@ -25,7 +25,8 @@ class Found:
     size_bytes
         Its length; None if the storage does not know it.
     version
-        A text that changes when the content changes: the ETag of an object, or size and time of a file.
+        A text that changes when the content changes: the ETag of an object, or size and time of a file. A web server
+        that reports neither ETag nor time gives the size only.
     """
 
     url: Location

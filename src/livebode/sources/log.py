@@ -29,6 +29,7 @@ class Log:
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
     >>> from livebode import open_log
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "log.csv"
@@ -191,6 +192,7 @@ class Log:
         Examples
         --------
         >>> import tempfile
+        >>> from pathlib import Path
         >>> from livebode import open_log
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     path = Path(folder) / "log.csv"
