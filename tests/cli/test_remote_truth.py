@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import livebode as library
-from livebode.locations import find, read_bytes, write_whole
+from livebode.locations import Url, find, read_bytes, upload, write_whole
 from tests.support.command import Result, livebode, signals, write_csv
 from tests.support.object_storage import BUCKET, object_storage
 
@@ -68,6 +68,15 @@ def test_a_run_there_equals_the_one_here_and_names_only_urls(desk: Path) -> None
     run = library.Run(RUN)
     np.testing.assert_array_equal(run.responses.value, library.Run(desk / "monday").responses.value)
     del run
+
+
+def test_a_finished_run_in_segments_is_read_where_no_empty_directory_can_be(desk: Path) -> None:
+    assert livebode("run", desk / "log.csv", *ROLES, "--continue", "--out", "segments").code == 0
+    upload("segments", Url(f"{ROOT}/runs/segments"))
+    there = library.Run(f"{ROOT}/runs/segments")
+    np.testing.assert_array_equal(there.responses.value, library.Run(desk / "monday").responses.value)
+    assert [event.kind for event in there.events] == [event.kind for event in library.Run("segments").events]
+    del there
 
 
 def same(there: Result, here: Result) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,8 +63,9 @@ def _on_this_computer(place: Path) -> list[Found]:
         paths = [path for name in glob.glob(str(place), recursive=True) if (path := Path(name)).is_file()]
     found = []
     for path in sorted(paths):
-        status = path.stat()
-        found.append(Found(path, status.st_size, f"{status.st_size}-{status.st_mtime_ns}"))
+        with suppress(FileNotFoundError):  # removed meanwhile
+            status = path.stat()
+            found.append(Found(path, status.st_size, f"{status.st_size}-{status.st_mtime_ns}"))
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 from pathlib import Path
 
 from livebode.core import LocationError, files
@@ -31,7 +32,10 @@ def read_bytes(place: str | os.PathLike[str] | Url) -> bytes:
 
 
 def write_whole(place: str | os.PathLike[str] | Url, data: bytes, *, new: bool = False) -> None:
-    """Write a file to a path or URL, complete or not at all; missing directories are created.
+    """Write a file to a path or URL; missing directories are created.
+
+    At a path and in S3 and similar storages, the file is complete or not there at all; in others, such as SFTP, the
+    beginning of a file may remain.
 
     Parameters
     ----------
@@ -69,7 +73,7 @@ def _write_here(path: Path, data: bytes, new: bool) -> None:
             files.write_whole(path, data)
             return
         # A link is created only where there is nothing, and its file is complete before.
-        complete = path.with_name(f".{path.name[:50]}.{os.getpid()}.new")
+        complete = path.with_name(f".{path.name[:50]}.new-{secrets.token_hex(4)}")
         files.write_whole(complete, data)
         try:
             os.link(complete, path)

@@ -11,12 +11,13 @@ from urllib.request import url2pathname
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")  # two letters or more: C:// is a drive
 _USER = re.compile(r"(?<=://)[^/]*@")
+_PASSWORD = re.compile(r"(?<=://)([^/@:]*):[^/]*(?=@)")
 _QUERY = re.compile(r"\?.*", re.DOTALL)
 _WEB = ("http", "https")
 
 
 class Url:
-    """A URL of a file or directory; as a text it is without user, password and query, which may be a secret.
+    """A URL of a file or directory; as a text it is without what may be secret: password, and user and query of http.
 
     Parameters
     ----------
@@ -27,9 +28,9 @@ class Url:
     --------
     >>> url = Url("ftp://user:secret@host/site/a.csv")
     >>> print(url, url.name, url.suffix)
-    ftp://host/site/a.csv a.csv .csv
+    ftp://user@host/site/a.csv a.csv .csv
     >>> url
-    Url('ftp://host/site/a.csv')
+    Url('ftp://user@host/site/a.csv')
     """
 
     def __init__(self, address: str) -> None:
@@ -42,8 +43,9 @@ class Url:
         return hash(self.address)
 
     def __str__(self) -> str:
-        shown = _USER.sub("", self.address)
-        return _QUERY.sub("", shown) if self.scheme in _WEB else shown  # elsewhere "?" is part of a name or a pattern
+        if self.scheme in _WEB:  # a token may be the user; elsewhere "?" is part of a name or a pattern
+            return _QUERY.sub("", _USER.sub("", self.address))
+        return _PASSWORD.sub(r"\1", self.address)
 
     def __repr__(self) -> str:
         return f"Url({str(self)!r})"
@@ -87,8 +89,8 @@ def resolved(place: Location) -> Location:
 def location(place: str | os.PathLike[str] | Url) -> Location:
     """The place of a file; a file:// URL is a path.
 
-    >>> location("s3://bucket/site/a.csv"), location("logs/a.csv")
-    (Url('s3://bucket/site/a.csv'), PosixPath('logs/a.csv'))
+    >>> location("s3://bucket/site/a.csv"), location("logs/a.csv").parts
+    (Url('s3://bucket/site/a.csv'), ('logs', 'a.csv'))
     """
     if isinstance(place, Url):
         return place
