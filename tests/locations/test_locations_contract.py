@@ -28,13 +28,13 @@ def s3() -> Iterator[str]:
         yield address
 
 
-@pytest.fixture(params=["path", "file", "memory", "s3"])
+@pytest.fixture(params=["path", "memory", "s3"])
 def root(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """A place with nothing below it."""
     name = f"{tmp_path.parent.name}-{tmp_path.name}"
     if request.param == "s3":
         request.getfixturevalue("s3")
-    places = {"path": f"{tmp_path}", "file": tmp_path.as_uri(), "memory": f"memory://{name}"}
+    places = {"path": f"{tmp_path}", "memory": f"memory://{name}"}
     return places.get(request.param, f"s3://{BUCKET}/{name}")
 
 
