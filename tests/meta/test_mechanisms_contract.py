@@ -14,8 +14,11 @@ SOURCE = Path(__file__).parents[2] / "src/livebode"
 @pytest.mark.parametrize(
     ("pattern", "places"),
     [
-        # The journal of a damaged segment is only set aside.
-        (r"os\.(replace|rename)\(|\w\.rename\(|mk[sd]temp\(", {"core/files.py", "records/segments/journal.py"}),
+        # The journal of a damaged segment is only set aside; the copy of a file at a URL has no place.
+        (
+            r"os\.(replace|rename)\(|\w\.rename\(|mk[sd]temp\(",
+            {"core/files.py", "records/segments/journal.py", "locations/copies.py"},
+        ),
         # Data that is sent from a file, or read back at once, has no place.
         (
             r"(TemporaryDirectory|NamedTemporaryFile)\(",

@@ -21,6 +21,7 @@ from livebode.cli.commands import SUMMARIES, command
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.first_page import ABOUT, OPTIONS
 from livebode.cli.log_options import File, Level, LogOptions, with_log
+from livebode.cli.remote import with_copies
 from livebode.cli.terminal import protect, unchecked_output
 from livebode.core import DamageWarning, LivebodeError
 from livebode.version import __version__
@@ -65,7 +66,7 @@ class _Commands(Mapping[str, TyperCommand]):
         if name not in SUMMARIES:
             raise KeyError(name)
         alone = typer.Typer(add_completion=False)
-        alone.command(name, cls=_Command, context_settings=_HELP)(with_log(command(name)))
+        alone.command(name, cls=_Command, context_settings=_HELP)(with_log(with_copies(command(name))))
         return cast("TyperCommand", typer.main.get_command(alone))
 
     def __iter__(self) -> Iterator[str]:

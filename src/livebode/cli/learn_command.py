@@ -10,6 +10,7 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.options import Json
 from livebode.core import OutputError, counted
+from livebode.locations import location
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -20,7 +21,9 @@ _MACHINE = ("stiffness", "load", "damping", "inertia")
 
 
 def learn_command(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN…", help="Run directories of the healthy machine.")],
+    runs: Annotated[
+        list[Path], typer.Argument(metavar="RUN…", help="Run directories of the healthy machine.", parser=location)
+    ],
     out: Annotated[Path, typer.Option(metavar="BASELINE", help="JSON file to write.")],
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     as_json: Json = False,

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from html import escape
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import pyarrow as pa
@@ -19,6 +18,7 @@ from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Event, Lines, LivebodeError, Loop, PlotKind, Response, Responses, counted, plot_responses
 from livebode.core.clock import moment, moments_by
 from livebode.fitting import Fit
+from livebode.locations import Url, local_copy, location, shared_copy
 from livebode.margins import Margins
 from livebode.records import PARAMETERS, RunRecord
 
@@ -35,12 +35,12 @@ class Run:
     Parameters
     ----------
     path
-        The run directory.
+        The run directory, or its URL (docs/how-to/remote.md).
 
     Attributes
     ----------
     path
-        Its directory.
+        Its directory; of a run at a URL that of the downloaded copy, which exists as long as this object.
     summary
         run.json: configuration, versions, counts (docs/run-directory.md).
     lines
@@ -53,6 +53,8 @@ class Run:
     RecordError
         If the directory is not of a run, or run.json cannot be read. A damaged part of the tables is skipped with a
         `DamageWarning`.
+    LocationError
+        If there is no complete run at the URL, or it cannot be downloaded.
 
     Examples
     --------
@@ -65,9 +67,11 @@ class Run:
     (array([20., 30., 40.]), 59.4)
     """
 
-    def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = Path(path)
-        self._record = RunRecord.open(self.path)
+    def __init__(self, path: str | PathLike[str] | Url) -> None:
+        place = location(path)
+        self._copy = shared_copy(place) if isinstance(place, Url) else None  # exists as long as this object
+        with local_copy(place) as self.path:
+            self._record = RunRecord.open(self.path)
         self.summary: Mapping[str, Any] = self._record.summary
         self.lines: Lines = self._record.lines
         self.finished = self._record.finished

@@ -6,7 +6,6 @@ import hashlib
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from livebode.configuration.axis import Axis
@@ -16,6 +15,7 @@ from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
 from livebode.estimation.successive import SuccessiveTrackers
 from livebode.fitting import RecordingsMean
+from livebode.locations import Location, local_copy
 from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.checks import ChannelCheck
 from livebode.preparation.part import configured_part
@@ -115,17 +115,17 @@ def _prepared(axis: Axis) -> list[_Part]:
     return parts
 
 
-def _sha256(path: Path, before: Sequence[_Part]) -> str:
+def _sha256(place: Location, before: Sequence[_Part]) -> str:
     """The file's checksum; RecordingError if it is that of an earlier one, which would count as twice the evidence."""
-    with path.open("rb") as file:
+    with local_copy(place) as path, path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
     same = next((part.log.path for part in before if part.sha256 == found), None)
     if same is not None:
         raise RecordingError(
             "recording-repeated",
-            f"{path} has the same content as {same}",
+            f"{place} has the same content as {same}",
             "give each recording once",
-            path=str(path),
+            path=str(place),
             other=str(same),
         )
     return found
@@ -162,6 +162,6 @@ def _about(part: _Part) -> dict[str, Any]:
 
 def _named(event: Event, part: _Part) -> Event:
     """The event of a recording in the numbers of the run."""
-    name = Path(part.log.path).name
+    name = part.log.path.name
     details = event.details | {"recording": name}
     return replace(event, sample=event.sample + part.shift, message=f"in {name}: {event.message}", details=details)

@@ -5,14 +5,46 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    SerializationInfo,
+    WithJsonSchema,
+)
+from pydantic_core import PydanticCustomError
 
 from livebode.core import Channel, ConfigError, QuantityKind
 from livebode.core.clock import ClockKind
+from livebode.locations import Location, Url, location
 from livebode.sources.part_limit import PATTERN, part_limit
 from livebode.sources.units import split_unit
 
+
+def _recording(given: Any) -> Location:
+    if not isinstance(given, str | Path | Url):
+        raise PydanticCustomError("location", "input is not a valid path or URL")
+    return location(given)
+
+
+def _plain_recording(value: Any, info: SerializationInfo) -> Any:
+    if info.mode != "json":
+        return value
+    # Of the union below, the first serializer gets a list too.
+    return list(map(str, value)) if isinstance(value, list) else str(value)
+
+
 File = Annotated[Path, Field(strict=False)]
+LocatedFile = Annotated[
+    Any,
+    PlainValidator(_recording),
+    PlainSerializer(_plain_recording),
+    WithJsonSchema({"type": "string", "format": "path"}),
+]
+"""A path or URL; as JSON without a secret in it."""
 FRAMES = {"rate_hz", "reorder_batches"}
 TLS = {"ca_file", "certificate_file", "key_file"}
 LOGIN = {"username", "password_env", "password_file"}
@@ -48,8 +80,8 @@ class SourceSettings(BaseModel):
     Parameters
     ----------
     log
-        The recording, relative to this file. Several, as ["a.mat", "b.mat"], are tracked one after the other, and their
-        means are averaged.
+        The recording, relative to this file, or its URL, such as "s3://bucket/a.mat". Several, as ["a.mat", "b.mat"],
+        are tracked one after the other, and their means are averaged.
     time
         Time column of the recording, with its unit if the file does not state it: "clock [us]". "none" ignores it.
         Default: found by name.
@@ -120,7 +152,7 @@ class SourceSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-    log: File | Annotated[list[File], Field(min_length=1, max_length=RECORDINGS_MAX)] | None = None
+    log: LocatedFile | Annotated[list[LocatedFile], Field(min_length=1, max_length=RECORDINGS_MAX)] | None = None
     time: str | None = None
     clock: ClockKind | None = None
     from_: Limit | None = Field(default=None, alias="from")
@@ -167,7 +199,7 @@ class SourceSettings(BaseModel):
         return f"{self.logs[0].name} and {more} more" if more else self.logs[0].name
 
     @property
-    def logs(self) -> tuple[Path, ...]:
+    def logs(self) -> tuple[Location, ...]:
         """The recordings; none for a live source."""
         if self.log is None:
             return ()
@@ -179,7 +211,7 @@ class SourceSettings(BaseModel):
             name: folder / value for name in self.model_fields_set if isinstance(value := getattr(self, name), Path)
         }
         if isinstance(self.log, list):
-            files["log"] = [folder / path for path in self.log]
+            files["log"] = [folder / place if isinstance(place, Path) else place for place in self.log]
         return self.model_copy(update=files)
 
 
