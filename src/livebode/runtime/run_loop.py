@@ -30,6 +30,7 @@ from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.recorder import Recorder
 from livebode.runtime.run_control import RunControl, StoppedError
 from livebode.runtime.run_counts import RunCounts
+from livebode.runtime.sender_numbers import SenderNumbers
 from livebode.runtime.shedding import LoadShedding
 from livebode.runtime.stream import Stream
 from livebode.runtime.whole_record import WholeRecord
@@ -134,7 +135,7 @@ class RunLoop:
         self._done: dict[str, Any] = {}
         self._found_on_the_way: dict[str, Any] = {}
         self._newest: Fit | None = None
-        self._relation = relation or ClockRelation()
+        self._relation, self._numbers = relation or ClockRelation(), SenderNumbers()
         self._origin_s = 0.0
         self._stepped_s = time.monotonic()
         self._events: list[Event] = []  # found in this Block, published after its responses
@@ -186,6 +187,8 @@ class RunLoop:
         for block in self._blocks:
             if paced and isinstance(block, LiveBlock) and self._relation.take(block, self._events.append):
                 self._set_clock()
+            if isinstance(block, LiveBlock) and self._numbers.take(block):
+                self._renew(numbering=self._numbers.pieces)
             if self._control.ended and not self._live:
                 raise StoppedError("ended before the end of the recording")
             yield block
@@ -417,6 +420,7 @@ class RunLoop:
             self._renew(left_out_samples=self._counts.left_out_samples)
         if self._recorder.clock:
             self._relation.clock.pieces = list(self._recorder.clock)
+        self._numbers = SenderNumbers.of(self._recorder.numbering)
         return self
 
     def __exit__(self, *error: Any) -> None:
@@ -437,7 +441,7 @@ class RunLoop:
             rate_hz=self._follower.settings.lines.rate_hz,
             parts=dict(self.pipeline.parts) | {"counts": self._counts},
             again=again,
-            ends=self.source.samples is not None,
+            ends=lambda: self.source.samples is not None and not self._control.ended,
             publish=lambda event: self._stream.announce(event),
             waiting=self._counts.groups.waiting,
             position=self._position,
