@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,7 @@ def learn(
         axes[0].motion is not None,
         tuple(str(run.path) for run in runs),
         remark,
+        learned=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
 
@@ -146,6 +148,7 @@ def _check_same(first: RunRecord, mine: Axis, run: RunRecord, axis: Axis) -> Non
         ("motion options", mine.motion, axis.motion),
         ("fit options", mine.fit, axis.fit),
         ("covariates", mine.monitoring.covariates, axis.monitoring.covariates),
+        ("the unit of the response", first.found.get("unit", ""), run.found.get("unit", "")),
     ):
         if one != other:
             raise BaselineError(

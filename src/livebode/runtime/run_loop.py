@@ -131,6 +131,8 @@ class RunLoop:
         self._about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
         self._plant = response_unit(source.channels, settings), plant_kinds(source.channels, settings)
         self._begun = summary.begun(self._about, self._follower, *self._plant)
+        if (detection := pipeline.detection) is not None and detection.baseline is not None:
+            self._begun["monitoring"] = detection.compared_with
         self._overview = Overview()
         self._done: dict[str, Any] = {}
         self._found_on_the_way: dict[str, Any] = {}
@@ -288,7 +290,7 @@ class RunLoop:
         """Publish the start, and what the record that it continues contains."""
         begun = self._begun | ({"record": {"finished": False}} if self._recorder.continues else {})
         if (detection := self.pipeline.detection) is not None:
-            begun = begun | {"monitoring": {"baseline": detection.baseline}}
+            begun = begun | {"monitoring": detection.compared_with}
         self._stream.announce(RunStarted(self.to.directory, begun, self._control, self._overview))
         channels = {channel.name: channel for channel in self.source.channels}
         used = tuple(channels[name] for name in self.pipeline.channels)
