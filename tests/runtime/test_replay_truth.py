@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -14,10 +15,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.analysis.learning import learn
 from livebode.configuration.axis import Axis
-from livebode.core import Channel, RecordError, Responses
+from livebode.core import BaselineError, Channel, RecordError, Responses
+from livebode.core.clock import RunClock
 from livebode.estimation import Settings, Tracker
 from livebode.records import RunRecord
+from livebode.records.summary_file import to_document
 from livebode.runtime import Document, RunControl, run
 from livebode.runtime.destination import Destination
 from livebode.runtime.documents import TrackerResults
@@ -27,6 +31,7 @@ from livebode.sources.live.address import Address
 from livebode.sources.live.ndjson import encode_line
 from livebode.sources.live.replayable import ReplaySource, SenderSample
 from tests.support.command import LINES, RATE_HZ, livebode, signals
+from tests.support.errors import refused
 from tests.support.live_runs import table
 from tests.support.small_axis import SMALL_AXIS
 
@@ -103,6 +108,11 @@ def test_a_replay_of_a_replay_is_the_same_to_the_last_bit(live, tmp_path):
         assert all(first[name].tobytes() == second[name].tobytes() for name in first)
 
 
+def test_a_run_and_its_replay_are_not_learned_together(live, tmp_path):
+    with refused(BaselineError, "run-repeated", other=str(live)):
+        learn([live, replayed(live, tmp_path / "again")])
+
+
 @pytest.mark.parametrize("stop_at", [900, 2300])
 def test_a_stopped_replay_continues_at_the_number_of_the_sender(live, tmp_path, stop_at):
     whole = table(replayed(live, tmp_path / "whole"))
@@ -133,10 +143,24 @@ def in_rows(batches: Iterable[Batch]) -> np.ndarray:
     return np.concatenate(rows)
 
 
+def test_the_time_of_day_of_each_sample_is_that_of_the_live_run(live, tmp_path):
+    """As far as it is known: a restart of the sender is a pause of unknown length."""
+    copy = shutil.copytree(live, tmp_path / "copy")
+    summary = json.loads((copy / "run.json").read_text())
+    del summary["crc32"]
+    summary |= {"clock": [[0.0, 1.8e9], [1.5, 1.8e9 + 0.25]]}
+    (copy / "run.json").write_bytes(to_document(summary))
+    assert RecordedRun(copy).clock.pieces == []
+    (copy / "run.json").write_bytes(to_document(summary | {"numbering": summary["numbering"][:1]}))
+    again = RunRecord.open(replayed(copy, tmp_path / "again")).clock
+    for second in (0.0, 1.2, 1.7):
+        assert again.unix_s(second + FIRST / RATE_HZ) == RunRecord.open(copy).clock.unix_s(second)
+
+
 class Memory:
     """A log in memory that cannot be read at times, as one of a server."""
 
-    channels, rate_hz, samples = CHANNELS, float(RATE_HZ), None
+    channels, rate_hz, samples, clock = CHANNELS, float(RATE_HZ), None, RunClock()
 
     def __init__(self, batches: list[Batch], fails: int) -> None:
         self.kept, self.fails = batches, fails

@@ -126,7 +126,8 @@ def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
     """Duplicated data would count as twice as much evidence."""
     seen: dict[Path, RunRecord] = {}
     for run, axis in zip(runs, axes):
-        things = [path.resolve() for path in (run.path, *axis.source.logs)]
+        replayed = () if axis.source.replay is None else (axis.source.replay,)
+        things = [path.resolve() for path in (run.path, *axis.source.logs, *replayed)]
         for thing in things:
             if thing in seen:
                 raise BaselineError(

@@ -22,6 +22,7 @@ from livebode.runtime.recorded_run import source_of
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
 from livebode.sources.live import LiveSource
+from livebode.sources.live.replayable import ReplaySource
 
 _logger = logging.getLogger(__name__)
 
@@ -77,6 +78,8 @@ class _Succession:
         self._source, self._position, self._to = source, position, to
         self._control, self._finishing = control, finishing
         self._relation = ClockRelation()
+        if isinstance(source, ReplaySource):
+            self._relation.clock.pieces = list(source.clock.pieces)
 
     def run(self, pipeline: Pipeline) -> Outcome:
         """The first run and all that follow, until the end."""

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from livebode.core import Channel, LivebodeError, RecordError
+from livebode.core.clock import RunClock
 from livebode.records import RunRecord
 from livebode.records.sample_table import channels_of
 from livebode.runtime.sender_numbers import NumberedFrom, SenderNumbers
@@ -61,6 +62,15 @@ class RecordedRun:
         files = self._run.files(["samples"])["samples"]
         closed = sum(pq.read_metadata(path).num_rows for path in files.paths)
         return int(closed + sum(batch.num_rows for batch in files.rows))
+
+    @property
+    def clock(self) -> RunClock:
+        """Time of day by the sender's numbers; not known after a restart of the sender, whose pause has no length."""
+        if len(self._pieces) > 1:
+            return RunClock()
+        (piece,) = self._pieces
+        later_s = (piece.sender_sample - piece.sample) / self.rate_hz
+        return RunClock([(from_s + later_s, unix_s - later_s) for from_s, unix_s in self._run.clock.pieces])
 
     def batches(self, begin: SenderSample | None = None) -> Iterator[Batch]:
         """As in `Replayable`; a batch is at most a second long."""

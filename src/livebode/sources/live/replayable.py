@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import ClassVar, NamedTuple, Protocol
 
 from livebode.core import Channel
+from livebode.core.clock import RunClock
 from livebode.sources.live.address import Address
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import LiveSource
@@ -35,6 +36,10 @@ class Replayable(Protocol):
     @property
     def samples(self) -> int | None:
         """Number of samples in it; None if it still grows."""
+
+    @property
+    def clock(self) -> RunClock:
+        """Time of day of its samples, where second 0 is that of the sender's number 0; empty if it is not known."""
 
     def batches(self, begin: SenderSample | None = None) -> Iterator[AnyBatch]:
         """The batches in the order of the log, from the one that contains sample `begin`; from the first by default.
@@ -69,6 +74,11 @@ class ReplaySource(LiveSource):
     @property
     def samples(self) -> int | None:
         return self._replayed.samples
+
+    @property
+    def clock(self) -> RunClock:
+        """Time of day of its Blocks."""
+        return self._replayed.clock
 
     def _receive(self) -> bool:
         left = self._resumed
