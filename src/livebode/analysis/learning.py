@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from datetime import UTC, datetime
 from os import PathLike
 from typing import Any
 
@@ -97,6 +98,7 @@ def _learned(runs: list[RunRecord], report: Callable[[str], None]) -> Baseline:
         axes[0].motion is not None,
         tuple(run.place for run in runs),
         remark,
+        learned=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
 
@@ -132,7 +134,8 @@ def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
     """Duplicated data would count as twice as much evidence."""
     seen: dict[Location, RunRecord] = {}
     for run, axis in zip(runs, axes):
-        things = [resolved(place) for place in (run.path, *axis.source.logs)]
+        replayed = () if axis.source.replay is None else (axis.source.replay,)
+        things = [resolved(place) for place in (run.path, *axis.source.logs, *replayed)]
         for thing in things:
             if thing in seen:
                 raise BaselineError(
@@ -154,6 +157,7 @@ def _check_same(first: RunRecord, mine: Axis, run: RunRecord, axis: Axis) -> Non
         ("motion options", mine.motion, axis.motion),
         ("fit options", mine.fit, axis.fit),
         ("covariates", mine.monitoring.covariates, axis.monitoring.covariates),
+        ("the unit of the response", first.found.get("unit", ""), run.found.get("unit", "")),
     ):
         if one != other:
             raise BaselineError(

@@ -110,6 +110,7 @@ class _AnySummary(_Part):
     record: _Record | None = None
     left_out_samples: Count | None = None
     clock: list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None = None
+    numbering: list[Annotated[list[Count], Field(min_length=3, max_length=3)]] = []
     files: dict[str, list[Section]] = {}
 
 

@@ -253,7 +253,7 @@ class Comparison:
         parts: list[Part] = [Table((tr("kind"), tr("before"), tr("after")), rows, (1, 2))] if rows else []
         for run, when in zip(self.found.runs, (tr("Before"), tr("After"))):
             monitoring = run.summary.get("monitoring", {})
-            judged = monitoring.get("baseline") is not None
+            judged = monitoring.get("baseline") is not None and "message" in monitoring
             message = monitoring["message"] if judged else marked("changes are not assessed.")
             parts.append(Paragraph(f"{when}: {recognised(message)}"))
         return Section(tr("Events"), tuple(parts))

@@ -28,6 +28,10 @@ class Recorder(Protocol):
     def clock(self) -> Sequence[tuple[float, float]]:
         """The clock of the run that it continues, as in `RunClock`."""
 
+    @property
+    def numbering(self) -> Sequence[tuple[int, int, int]]:
+        """The numbers of the senders in the run that it continues, as in `SenderNumbers`."""
+
     def previous(self) -> Iterator[Responses]:
         """The newest responses of the run that it continues."""
 

@@ -30,6 +30,7 @@ from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.recorder import Recorder
 from livebode.runtime.run_control import RunControl, StoppedError
 from livebode.runtime.run_counts import RunCounts
+from livebode.runtime.sender_numbers import SenderNumbers
 from livebode.runtime.shedding import LoadShedding
 from livebode.runtime.stream import Stream
 from livebode.runtime.whole_record import WholeRecord
@@ -130,11 +131,13 @@ class RunLoop:
         self._about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
         self._plant = response_unit(source.channels, settings), plant_kinds(source.channels, settings)
         self._begun = summary.begun(self._about, self._follower, *self._plant)
+        if (detection := pipeline.detection) is not None and detection.baseline is not None:
+            self._begun["monitoring"] = detection.compared_with
         self._overview = Overview()
         self._done: dict[str, Any] = {}
         self._found_on_the_way: dict[str, Any] = {}
         self._newest: Fit | None = None
-        self._relation = relation or ClockRelation()
+        self._relation, self._numbers = relation or ClockRelation(), SenderNumbers()
         self._origin_s = 0.0
         self._stepped_s = time.monotonic()
         self._events: list[Event] = []  # found in this Block, published after its responses
@@ -186,6 +189,8 @@ class RunLoop:
         for block in self._blocks:
             if paced and isinstance(block, LiveBlock) and self._relation.take(block, self._events.append):
                 self._set_clock()
+            if isinstance(block, LiveBlock) and self._numbers.take(block):
+                self._renew(numbering=self._numbers.pieces)
             if self._control.ended and not self._live:
                 raise StoppedError("ended before the end of the recording")
             yield block
@@ -285,7 +290,7 @@ class RunLoop:
         """Publish the start, and what the record that it continues contains."""
         begun = self._begun | ({"record": {"finished": False}} if self._recorder.continues else {})
         if (detection := self.pipeline.detection) is not None:
-            begun = begun | {"monitoring": {"baseline": detection.baseline}}
+            begun = begun | {"monitoring": detection.compared_with}
         self._stream.announce(RunStarted(self.to.directory, begun, self._control, self._overview))
         channels = {channel.name: channel for channel in self.source.channels}
         used = tuple(channels[name] for name in self.pipeline.channels)
@@ -417,6 +422,7 @@ class RunLoop:
             self._renew(left_out_samples=self._counts.left_out_samples)
         if self._recorder.clock:
             self._relation.clock.pieces = list(self._recorder.clock)
+        self._numbers = SenderNumbers.of(self._recorder.numbering)
         return self
 
     def __exit__(self, *error: Any) -> None:
@@ -437,7 +443,7 @@ class RunLoop:
             rate_hz=self._follower.settings.lines.rate_hz,
             parts=dict(self.pipeline.parts) | {"counts": self._counts},
             again=again,
-            ends=self.source.samples is not None,
+            ends=lambda: self.source.samples is not None and not self._control.ended,
             publish=lambda event: self._stream.announce(event),
             waiting=self._counts.groups.waiting,
             position=self._position,

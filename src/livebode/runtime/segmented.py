@@ -26,7 +26,7 @@ from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
 from livebode.runtime.documents import Document, FitResults
 from livebode.runtime.run_control import StoppedError
 
-FOUND_ON_THE_WAY = "clock", "left_out_samples"
+FOUND_ON_THE_WAY = "clock", "left_out_samples", "numbering"
 _PICTURES = "pictures"
 _INTERVAL_S = 0.5
 _PIECE_S = 0.25  # with the interval 0.75 s: most data that a kill can cost
@@ -55,7 +55,7 @@ class SegmentedRecord:
     again
         Whether the source begins with the same samples again each time; else its numbers continue.
     ends
-        Whether the source has an end, at which the run is finished; without an end a stopped run can continue.
+        Whether the source has reached its end, so that the run is finished; else a stopped run can continue.
     publish
         Called immediately with events of the record itself.
     waiting
@@ -77,7 +77,7 @@ class SegmentedRecord:
         parts: Mapping[str, Stateful],
         force: bool,
         again: bool,
-        ends: bool,
+        ends: Callable[[], bool],
         publish: Callable[[Event], None],
         waiting: Callable[[], Sequence[Event]] = tuple,
         position: StreamPosition | None = None,
@@ -169,6 +169,11 @@ class SegmentedRecord:
         """Relation of the run's seconds to the time of day, as in `RunClock` and run.json."""
         return RunClock.of(self._more).pieces
 
+    @property
+    def numbering(self) -> list[tuple[int, int, int]]:
+        """Numbers of the senders, as in `SenderNumbers` and run.json."""
+        return list(self._more.get("numbering", ()))
+
     def renew(self, **found: Any) -> None:
         """Write findings during the run to run.json."""
         self._more |= found
@@ -221,7 +226,7 @@ class SegmentedRecord:
         assert last is not None
         # Results that were delayed until the end were written after the last commit, and belong to the present states.
         self._store.commit(last.sample, last.time_s, self._states())
-        self._store.finish(self._named(summary), finished=self._ends or "continued_in" in summary)
+        self._store.finish(self._named(summary), finished=self._ends() or "continued_in" in summary)
 
     def _commit(self, sample: int, time_s: float) -> None:
         self._new, self._waited = False, self._waiting()

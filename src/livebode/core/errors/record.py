@@ -35,6 +35,7 @@ class RecordError(LivebodeError):
         "no-directory": "The run has no directory yet: it is written in one piece, at its end.",
         "no-parameters": "The run has no fitted parameters.",
         "no-responses": "The run has no responses.",
+        "no-samples": "The run has not recorded the samples that are needed.",
         "not-a-run": "The path is not the directory of a run.",
         "not-continuable": "The run has no whole journal to continue from.",
         "not-own-file": "A link, a pipe or a device is where a run has a regular file or a directory.",

@@ -75,7 +75,7 @@ Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PAT
 
 
 class SourceSettings(BaseModel):
-    """[source]: a recording (`log`), one that grows (`follow`), or a live source (`url`).
+    """[source]: a recording (`log`), one that grows (`follow`), a live source (`url`), or a recorded one (`replay`).
 
     Parameters
     ----------
@@ -99,6 +99,9 @@ class SourceSettings(BaseModel):
         DBC file that defines the signals of a recording of CAN frames, relative to this file.
     follow
         The recording grows: a text table, or a directory of recordings.
+    replay
+        Directory of a run with recorded samples, relative to this file: they are tracked again as the machine sent
+        them, with its own sample numbers.
     url
         Address of a live source, instead of log: kind://host:port; without user and password. Its scheme is the kind.
     rate_hz
@@ -160,6 +163,7 @@ class SourceSettings(BaseModel):
     skip_periods: Annotated[int, Field(ge=0, le=1 << 40)] = 0
     dbc: File | None = None
     follow: bool = False
+    replay: File | None = None
     url: str | None = None
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     timeout_s: Annotated[float, Field(gt=0, le=1e6)] = 30.0
@@ -187,12 +191,14 @@ class SourceSettings(BaseModel):
 
     @property
     def live(self) -> bool:
-        """Whether the samples arrive in real time."""
-        return self.url is not None or self.follow
+        """Whether the samples arrive as a machine sends them, or sent them."""
+        return self.url is not None or self.follow or self.replay is not None
 
     @property
     def title(self) -> str:
         """Name of the source in a picture."""
+        if self.replay is not None:
+            return self.replay.name
         if not self.logs:
             return self.url or ""
         more = len(self.logs) - 1
@@ -216,7 +222,7 @@ class SourceSettings(BaseModel):
 
 
 def check_keys(settings: SourceSettings, kind: str) -> None:
-    """ConfigError for a key that does not apply to this kind of source: the scheme of a URL, or "log"."""
+    """ConfigError for a key that does not apply to this kind of source: the scheme of a URL, "log" or "replay"."""
     if part := [name for key, name in PART.items() if key in settings.model_fields_set]:
         why = "this one grows" if kind == "log" else f"{kind} is a live source"
         raise ConfigError(
@@ -226,7 +232,7 @@ def check_keys(settings: SourceSettings, kind: str) -> None:
             key=f"source.{part[0]}",
             source=kind,
         )
-    taken = LOG if kind == "log" else TAKEN[kind] | {"url"}
+    taken = LOG if kind == "log" else {"replay"} if kind == "replay" else TAKEN[kind] | {"url"}
     if stray := sorted(settings.model_fields_set - taken - EVERY):
         raise ConfigError(
             "key-unused",
