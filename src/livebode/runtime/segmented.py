@@ -26,7 +26,7 @@ from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
 from livebode.runtime.documents import Document, FitResults
 from livebode.runtime.run_control import StoppedError
 
-FOUND_ON_THE_WAY = "clock", "left_out_samples"
+FOUND_ON_THE_WAY = "clock", "left_out_samples", "recorded"
 _PICTURES = "pictures"
 _INTERVAL_S = 0.5
 _PIECE_S = 0.25  # with the interval 0.75 s: most data that a kill can cost
@@ -89,6 +89,7 @@ class SegmentedRecord:
         self._new, self._waited = False, waiting()
         self._first = (0, 0.0) if previous is None else (previous.sample, previous.time_s)
         self._more: dict[str, Any] = {} if previous is None else {"continues": previous.name}
+        self.begun: str | None = None
         self._summary, self._rate_hz = dict(summary), rate_hz
         self._parts = dict(parts) | ({} if position is None else {SOURCE: position})
         self._force, self._again, self._ends, self._publish = force, again, ends, publish
@@ -247,6 +248,7 @@ class SegmentedRecord:
         for name, part in self._parts.items():
             part.restore(states[name])
         self._more = {name: before[name] for name in ("continues", *FOUND_ON_THE_WAY) if name in before}
+        self.begun = (before.get("recorded") or {}).get("from")
         self._store.renew(self._named(self._summary))
 
     def _named(self, summary: dict[str, Any]) -> dict[str, Any]:
