@@ -18,6 +18,7 @@ from livebode.records.segments.journal import Journal
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
 from livebode.records.wide_responses import wide_schema
+from livebode.version import __version__
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/reference/formats.md").read_text("utf-8")
@@ -72,9 +73,8 @@ def test_heads_have_the_fields_and_the_sizes_that_are_listed() -> None:
         assert names(rows[0][3]) == [magic.decode()]
         assert int(rows[-1][0]) == size == sum(int(row[1]) for row in rows[:-1])
     assert len(frames.to_frame(COMMIT)) == 16
-    assert len(state.encode(state.Stage("a", 1), {})) == 20 + len(
-        b'{"stage":"a","settings":"","plain":{},"arrays":{},"parts":{}}'
-    )
+    text = f'{{"stage":"a","settings":"","livebode":"{__version__}","plain":{{}},"arrays":{{}},"parts":{{}}}}'
+    assert len(state.encode(state.Stage("a", 1), {})) == 20 + len(text)
 
 
 def keys(rows: list[list[str]]) -> set[str]:
@@ -103,7 +103,8 @@ def test_the_keys_of_a_commit_and_of_a_state_are_listed() -> None:
     assert found is not None
     tracker = found.states["tracker"]
     described = json.loads(tracker[20 : 20 + int.from_bytes(tracker[8:12], "little")])
-    assert set(described) == keys(table(PAGE, "key", under="## States"))
+    written = json.loads(state.encode(state.Stage("a", 1), {})[20:])
+    assert set(described) | {"livebode"} == set(written) == keys(table(PAGE, "key", under="## States"))
 
 
 def plain(path: Path) -> Mapping[str, object]:
