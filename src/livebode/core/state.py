@@ -223,29 +223,45 @@ def _head(stage: Stage, data: bytes) -> tuple[int, bytes, int, int]:
         _damaged(stage, "wrong checksum of its head")
     _, encoding, version, length, check = _HEAD.unpack_from(data)
     if encoding > ENCODING:
-        _other_version("newer-version", stage, encoding, f"reads up to version {ENCODING}", _writer(data))
+        _newer(stage, encoding, ENCODING, _writer(data))
     return version, data[_SIZE : _SIZE + length], _SIZE + length, check
 
 
 def _check_version(stage: Stage, version: int, writer: str) -> None:
     oldest = stage.version if stage.converts_from is None else stage.converts_from
     if version > stage.version:
-        _other_version("newer-version", stage, version, f"reads up to version {stage.version}", writer)
+        _newer(stage, version, stage.version, writer)
     if version < oldest:
-        _other_version("older-version", stage, version, f"reads from version {oldest} on", writer)
+        raise StateError(
+            "older-version",
+            f"{_written(stage, version, writer)}, which reads from version {oldest} on",
+            _remedy(writer),
+            name=stage.name,
+            found=version,
+            readable=oldest,
+            written_by=writer,
+        )
 
 
-def _other_version(code: str, stage: Stage, found: int, reads: str, writer: str) -> NoReturn:
-    by = f"written by livebode {writer}" if writer else "written by another livebode"
+def _newer(stage: Stage, found: int, readable: int, writer: str) -> NoReturn:
     raise StateError(
-        code,
-        f"the state of {stage.name!r} has version {found}, {by}; this is livebode {__version__}, which {reads}",
-        f"finish the run with {f'livebode {writer}' if writer else 'the version that began it'}, or start a new run",
+        "newer-version",
+        f"{_written(stage, found, writer)}, which reads up to version {readable}",
+        _remedy(writer),
         name=stage.name,
         found=found,
-        readable=stage.version,
+        readable=readable,
         written_by=writer,
     )
+
+
+def _written(stage: Stage, version: int, writer: str) -> str:
+    by = f"livebode {writer}" if writer else "another livebode"
+    return f"the state of {stage.name!r} has version {version}, written by {by}; this is livebode {__version__}"
+
+
+def _remedy(writer: str) -> str:
+    return f"finish the run with {f'livebode {writer}' if writer else 'the version that began it'}, or start a new run"
 
 
 def _writer(data: bytes) -> str:
