@@ -17,6 +17,8 @@ from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE
 from livebode.records.segments.journal import Journal
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
+from livebode.records.wide_responses import wide_schema
+from livebode.version import __version__
 from tests.support.monitored import small_baseline
 
 ROOT = Path(__file__).parents[2]
@@ -43,6 +45,14 @@ def test_the_columns_of_the_tables_are_those_that_are_written(name: str, written
     assert isinstance(written.schema, pa.Schema)
 
 
+def test_the_columns_of_the_wide_form_are_those_that_are_written() -> None:
+    kinds = {"int64": "int64", "double": "double", "float": "float", "bool": "bool"}
+    kinds |= {f"list of {kind}, one for each line": f"fixed_size_list<item: {kind}>[3]" for kind in ("bool", "float")}
+    rows = table(PAGE, "column", under="### Wide responses")
+    listed = {name: kinds[row[1]] for row in rows for name in names(row[0])}
+    assert listed == {field.name: str(field.type) for field in wide_schema(3)}
+
+
 def test_the_versions_are_those_that_are_written() -> None:
     listed = {row[0]: row[1] for row in table(PAGE, "format")}
     found = {"run directory": VERSIONS["run"], "manifest": VERSIONS["manifest"], "journal": VERSIONS["journal"]}
@@ -64,9 +74,8 @@ def test_heads_have_the_fields_and_the_sizes_that_are_listed() -> None:
         assert names(rows[0][3]) == [magic.decode()]
         assert int(rows[-1][0]) == size == sum(int(row[1]) for row in rows[:-1])
     assert len(frames.to_frame(COMMIT)) == 16
-    assert len(state.encode(state.Stage("a", 1), {})) == 20 + len(
-        b'{"stage":"a","settings":"","plain":{},"arrays":{},"parts":{}}'
-    )
+    text = f'{{"stage":"a","settings":"","livebode":"{__version__}","plain":{{}},"arrays":{{}},"parts":{{}}}}'
+    assert len(state.encode(state.Stage("a", 1), {})) == 20 + len(text)
 
 
 def keys(rows: list[list[str]]) -> set[str]:
@@ -98,7 +107,8 @@ def test_the_keys_of_a_commit_and_of_a_state_are_listed() -> None:
     assert found is not None
     tracker = found.states["tracker"]
     described = json.loads(tracker[20 : 20 + int.from_bytes(tracker[8:12], "little")])
-    assert set(described) == keys(table(PAGE, "key", under="## States"))
+    written = json.loads(state.encode(state.Stage("a", 1), {})[20:])
+    assert set(described) | {"livebode"} == set(written) == keys(table(PAGE, "key", under="## States"))
 
 
 def plain(path: Path) -> Mapping[str, object]:

@@ -32,6 +32,10 @@ class Recorder(Protocol):
     def numbering(self) -> Sequence[tuple[int, int, int]]:
         """The numbers of the senders in the run that it continues, as in `SenderNumbers`."""
 
+    @property
+    def begun(self) -> str | None:
+        """When the run that it continues began, as in run.json; None for a new one, or if nothing recorded it."""
+
     def previous(self) -> Iterator[Responses]:
         """The newest responses of the run that it continues."""
 
