@@ -12,6 +12,7 @@ from livebode.core.errors.design import DesignError
 from livebode.core.errors.extra import ExtraError
 from livebode.core.errors.fit import FitError
 from livebode.core.errors.grid import GridError
+from livebode.core.errors.location import LocationError
 from livebode.core.errors.output import OutputError
 from livebode.core.errors.record import RecordError
 from livebode.core.errors.recording import RecordingError
@@ -32,6 +33,7 @@ __all__ = [
     "FitError",
     "GridError",
     "LivebodeError",
+    "LocationError",
     "OutputError",
     "RecordError",
     "RecordingError",
