@@ -50,7 +50,7 @@ def track_alone(job: Job, recording: Recording, scratch: Path | None = None) -> 
 
 def _watched(process: subprocess.Popen[bytes], memory_bytes: int) -> bool:
     """Wait for the end of a process; whether it was ended because it needs more memory."""
-    from psutil import NoSuchProcess, Process
+    from psutil import NoSuchProcess, Process  # type: ignore[import-untyped]
 
     while True:
         try:

@@ -46,7 +46,7 @@ class Committer:
     def commit(self) -> None:
         """Commit what waits; ArchiveError or LocationError if the lake cannot be written."""
         tracked = [one for one in self._waiting if isinstance(one, Tracked)]
-        bad = [one for one in self._waiting if isinstance(one, Failed)]
+        bad = [one for one in self._waiting if isinstance(one, Failed) and not one.by_storage]
         by_table: dict[str, list[DataFile]] = {"responses": [], "parameters": [], "events": []}
         for one in tracked:
             for file in one.files:

@@ -193,17 +193,18 @@ class Coordinator:
             if isinstance(result, Tracked):
                 self._outcome.tracked += 1
             elif isinstance(result, Failed):
-                self._outcome.quarantined.append(result)
+                bad = self._outcome.unreadable if result.by_storage else self._outcome.quarantined
+                bad.append(result)
 
     def _distributed(
         self, stage: str, items: Sequence[Any], together: Any, one: Any, stack: ExitStack, alone: bool = False
     ) -> Iterator[list[Any]]:
         """The results of items, in the order in which they come."""
+        cluster = self._started(stack)
         from livebode.archive.distributing import Distribution
 
-        cluster = self._started(stack)
         groups: Groups[Any] = Groups([] if alone else items)
-        work: Distribution[Any, Any] = Distribution(cluster, groups, together, one, lambda x: isinstance(x, Failed))
+        work: Distribution[Any, Any] = Distribution(cluster, groups, together, one, _again)
         work.last.extend(items if alone else ())
         done, done_bytes, total_bytes = 0, 0, sum(item.size_bytes for item in items)
         self._report(Progress(stage, 0, len(items), 0, total_bytes, cluster.dashboard))
@@ -225,6 +226,11 @@ class Coordinator:
 
             self._cluster = stack.enter_context(started(self._settings.cluster))
         return self._cluster
+
+
+def _again(result: Result) -> bool:
+    """Whether to try again alone: what the content is the reason of has the same result each time."""
+    return isinstance(result, Failed) and not result.by_content
 
 
 def _hash_alone(place: Place, scratch: Path | None = None) -> Hashed | Failed:  # noqa: ARG001

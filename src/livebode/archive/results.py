@@ -10,6 +10,9 @@ from livebode.core import ArchiveError, LivebodeError
 from livebode.lake import DataFile
 from livebode.locations import with_originals
 
+_STORAGE = ("location", "output")
+_LAKE = ("archive.lake-unusable", "archive.changed-meanwhile")
+
 
 @dataclass(frozen=True)
 class Hashed:
@@ -39,6 +42,16 @@ class Failed:
     code: str
     sentence: str
     seconds: float = 0.0
+
+    @property
+    def by_content(self) -> bool:
+        """Whether the content is the reason, so that the same sentence comes each time."""
+        return self.code.partition(".")[0] not in ("archive", *_STORAGE)
+
+    @property
+    def by_storage(self) -> bool:
+        """Whether the storage is the reason, so that it says nothing about the recording."""
+        return self.code.partition(".")[0] in _STORAGE or self.code in _LAKE
 
 
 Result = Hashed | Tracked | Failed

@@ -16,16 +16,15 @@ import pyarrow as pa
 
 from livebode.analysis.run_trend import trend_points
 from livebode.archive.recordings import Recording, levels_of
-from livebode.arrow import from_numpy
 from livebode.configuration.axis import Axis
 from livebode.configuration.recording import open_recording
-from livebode.core import ArchiveError, Event, Responses
+from livebode.core import ArchiveError, Event
 from livebode.lake import DataFile, Key, Lake
 from livebode.lake.data_file import write_data_file
-from livebode.lake.schemas import RESPONSES
 from livebode.locations import local_copy
 from livebode.records import RunRecord
 from livebode.records.content import content_sha256
+from livebode.records.wide_responses import to_wide
 from livebode.runtime import Destination, run
 from livebode.version import __version__
 
@@ -102,7 +101,7 @@ def _no_pictures(*_: object) -> None:
 
 def _files(folder: Path, key: Key, record: RunRecord) -> Iterator[DataFile]:
     parts = {
-        "responses": map(_wide, record.batches()),
+        "responses": map(to_wide, record.batches()),
         "parameters": record.tables("parameters"),
         "events": _event_tables(record),
     }
@@ -111,33 +110,6 @@ def _files(folder: Path, key: Key, record: RunRecord) -> Iterator[DataFile]:
         file = write_data_file(folder / table, table, key, rows)
         if file.rows:
             yield file
-
-
-def _wide(responses: Responses) -> pa.Table:
-    """One row for each response, with a list of the lines' values in each measured column."""
-    rows, lines = responses.value.shape
-    edges = pa.array(np.arange(0, (rows + 1) * lines, lines, dtype=np.int32))
-    columns = {
-        name: from_numpy(getattr(responses, name)) for name in ("first", "sample", "time_s", "schedule", "ready")
-    }
-    columns["dof"] = from_numpy(responses.dof.astype(np.float32))
-    for name in RESPONSES.names:
-        if pa.types.is_list(RESPONSES.field(name).type):
-            values = _per_line(responses, name)
-            kind = RESPONSES.field(name).type
-            flat = values.ravel() if values.dtype == bool else values.ravel().astype(np.float32)
-            columns[name] = pa.ListArray.from_arrays(edges, from_numpy(flat), type=kind)
-    return pa.table(columns)
-
-
-def _per_line(responses: Responses, name: str) -> np.ndarray[Any, Any]:
-    parts = {
-        "re": responses.value.real,
-        "im": responses.value.imag,
-        "weight_re": responses.weight.real,
-        "weight_im": responses.weight.imag,
-    }
-    return np.asarray(parts[name] if name in parts else getattr(responses, name))
 
 
 def _event_tables(record: RunRecord) -> Iterator[pa.Table]:
@@ -173,6 +145,7 @@ def _about(record: RunRecord, recording: Recording, files: tuple[DataFile, ...])
         "quantity": found["quantity"],
         "unit": found["unit"],
         "frequencies_hz": record.lines.frequency_hz.tolist(),
+        "quiet_bins": list(record.lines.quiet),
         "livebode": __version__,
     } | {name: rows.get(name, 0) for name in ("responses", "parameters", "events")}
 
