@@ -33,14 +33,14 @@ output = "y"
 frequencies = "20, 40, 60, 100"
 window = 400
 [tracking]
-hop = 200
+hop = 400
 [fit]
-model = "two-mass"
+model = "rigid"
 """
 DATA = ("responses", "parameters", "events")
 
 
-def write_recording(path: Path, seed: int, periods: int = 12) -> None:
+def write_recording(path: Path, seed: int, periods: int = 8) -> None:
     """A recording of a rigid axis with noise; another seed is another machine."""
     rng = np.random.default_rng(seed)
     t = np.arange(periods * _WINDOW) / _RATE_HZ
@@ -52,7 +52,9 @@ def write_recording(path: Path, seed: int, periods: int = 12) -> None:
 
 def write_damaged(folder: Path) -> list[Path]:
     """Recordings that cannot be tracked: cut off, no recording at all, other channels, and no excitation."""
-    cut, junk, other, silent = (folder / name for name in ("cut.parquet", "junk.parquet", "other.parquet", "zero.parquet"))
+    cut, junk, other, silent = (
+        folder / name for name in ("cut.parquet", "junk.parquet", "other.parquet", "zero.parquet")
+    )
     write_recording(cut, 900)
     cut.write_bytes(cut.read_bytes()[:-200])
     junk.write_bytes(np.random.default_rng(901).bytes(4000))
@@ -63,7 +65,7 @@ def write_damaged(folder: Path) -> list[Path]:
 
 def write_poison(path: Path, rows: int) -> None:
     """A recording of some kilobytes whose reader needs rows·8 bytes at once: a column is one page."""
-    table = pa.table({name: np.zeros(rows) for name in "twuy"})
+    table = pa.table({name: np.zeros(rows) for name in "wuy"}).replace_schema_metadata({"rate_hz": str(_RATE_HZ)})
     pq.write_table(
         table, path, compression="zstd", use_dictionary=False, data_page_size=1 << 31, row_group_size=rows,
         write_batch_size=rows, max_rows_per_page=rows,
@@ -139,5 +141,3 @@ def _sha256(path: Path) -> str:
 
 def _write(path: Path, columns: dict[str, Any]) -> None:
     pq.write_table(pa.table(columns), path)
-
-
