@@ -21,12 +21,15 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pyarrow as pa
 import pyarrow.parquet as pq
+import tomli_w
 
 from livebode.archive.alone import track_alone
 from livebode.archive.clusters import Cluster, started
@@ -49,7 +52,8 @@ from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
 WORKERS, RATE_HZ, WINDOW = 2, 4000.0, 400
 POOL_RATIO_MAX, LOOP_RATIO_MIN, KNOWN_S_MAX, MEMORY_MB_MAX = 1.05, 1.9, 5.0, 300
 KNOWN = 10_000
-LENGTHS = ((2.0, 48), (10.0, 16), (60.0, 6))
+PROGRAM = str(Path(sys.executable).with_name("livebode"))
+LENGTHS = ((2.0, 40), (10.0, 12), (40.0, 6))
 """Seconds of a recording, and the number of recordings."""
 MEMORY_S = (60.0, 600.0, 1800.0)
 CONFIGURATION = {
@@ -163,7 +167,7 @@ def known(folder: Path) -> None:
     for first in range(0, KNOWN, 100):  # as an archive commits them, so that the lake has many small files
         rows = [{"content": content, "recipe": recipe} for _, content in contents[first : first + 100]]
         lake.add_rows("runs", pa.Table.from_pylist(rows, schema=RUNS))
-    program = [str(Path(sys.executable).with_name("livebode")), "archive", "run", str(archive)]
+    program = [PROGRAM, "archive", "run", str(archive)]
     times = []
     for _ in range(3):
         began = time.perf_counter()
@@ -175,27 +179,36 @@ def known(folder: Path) -> None:
 
 
 def memory(folder: Path) -> None:
-    """Print the peak of a worker's resident memory by the length of the recording, each in a new worker."""
+    """Print the peak of a worker's resident memory by the length of the recording, each in a new archive."""
     for seconds in MEMORY_S:
-        path = folder / f"{seconds:g}.parquet"
-        write_recording(path, seconds, 1)
-        own = hash_places(find_places([Template(str(path))]))[0]
-        assert not isinstance(own, Failed)
-        job = job_of(folder / f"lake-{seconds:g}", fit=False)
-        with started(ClusterSection(workers=1, memory_mb=2000)) as cluster:
-            began = time.perf_counter()
-            list(by_dask(cluster, job, [Recording(own.content, own.item)]))
-            took, (peak,) = time.perf_counter() - began, cluster.client.run(peak_mb).values()
+        own = folder / f"{seconds:g}"
+        own.mkdir()
+        write_recording(own / "log.parquet", seconds, 1)
+        (own / "recipe.toml").write_text(tomli_w.dumps(CONFIGURATION))
+        (own / "archive.toml").write_text(
+            'inputs = ["log.parquet"]\nrecipe = "recipe.toml"\nlake = "lake"\n'
+            "[cluster]\nworkers = 1\nmemory_mb = 2000\n"
+        )
+        began = time.perf_counter()
+        peak, printed = _peak_mb([PROGRAM, "archive", "run", str(own / "archive.toml")])
+        took = time.perf_counter() - began
+        assert "1 tracked" in printed, printed
         verdict = "met" if peak <= MEMORY_MB_MAX else "missed"
-        size = f"{path.stat().st_size / 1e6:.0f} MB"
+        size = f"{(own / 'log.parquet').stat().st_size / 1e6:.0f} MB"
         print(f"recording of {seconds:.0f} s ({size}): worker {peak:.0f} MB, {verdict}; {took:.1f} s", flush=True)
 
 
-def peak_mb() -> float:
-    """The largest resident memory of this process so far, in MB."""
-    import resource
-
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
+def _peak_mb(program: list[str]) -> tuple[float, str]:
+    """The largest resident memory of a process that this program starts, in MB, and what the program prints."""
+    peak = 0
+    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        while process.poll() is None:
+            with suppress(psutil.Error):
+                workers = psutil.Process(process.pid).children(recursive=True)
+                peak = max(peak, *(worker.memory_info().rss for worker in workers), 0)
+            time.sleep(0.02)
+        assert process.stdout
+        return peak / 1e6, process.stdout.read()
 
 
 def main() -> None:
