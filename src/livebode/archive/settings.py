@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.archive.template import Template
 from livebode.configuration.axis import Axis
+from livebode.configuration.schema import Schema, schema_of
 from livebode.configuration.section import File
 from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.core import ConfigError, nearest_name
@@ -163,6 +164,11 @@ class ArchiveSettings(_Section):
             ).at(str(self.recipe))
         own = data | {"source": {**source, "log": "recording"}}
         return Axis.of(own, str(self.recipe)).beside(self.recipe.parent)
+
+
+def archive_schema() -> Schema:
+    """JSON Schema of archive.toml."""
+    return schema_of(ArchiveSettings, "archive")
 
 
 def lake_url(target: str) -> str:

@@ -36,8 +36,8 @@ SUMMARIES: Mapping[str, str] = {
     "recording.",
     "archive": "Track every recording of an archive on all cores or a cluster, and keep the results in one lake.",
     "doctor": "Check this computer, a configuration and whether its machine can be reached.",
-    "schema": "Print the JSON Schema of axis.toml or experiment.toml: an editor uses it to complete and check the "
-    "keys.",
+    "schema": "Print the JSON Schema of axis.toml, experiment.toml or archive.toml: an editor uses it to complete "
+    "and check the keys.",
 }
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
