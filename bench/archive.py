@@ -35,8 +35,8 @@ from livebode.archive.alone import track_alone
 from livebode.archive.clusters import Cluster, started
 from livebode.archive.committing import Committer
 from livebode.archive.distributing import Distribution
-from livebode.archive.grouping import Groups
-from livebode.archive.recordings import Place, Recording, file_rows, find_places
+from livebode.archive.grouping import RecordingGroups
+from livebode.archive.recordings import ArchivedRecording, Place, file_rows, find_places
 from livebode.archive.results import Failed, Tracked
 from livebode.archive.settings import ArchiveSettings, ClusterSection
 from livebode.archive.tasks import hash_places, track_one, track_recordings
@@ -78,10 +78,10 @@ def write_recording(path: Path, seconds: float, seed: int) -> None:
             file.write_table(pa.table([pa.array(t), *map(pa.array, block.data * noise)], schema=file.schema))
 
 
-def recordings_in(folder: Path) -> list[Recording]:
+def recordings_in(folder: Path) -> list[ArchivedRecording]:
     """The recordings of a directory, the longest first."""
     hashed = hash_places(find_places([Template(f"{folder}/*.parquet")]))
-    return [Recording(one.content, one.item) for one in hashed if not isinstance(one, Failed)]
+    return [ArchivedRecording(one.content, one.item) for one in hashed if not isinstance(one, Failed)]
 
 
 def job_of(lake: Path, fit: bool) -> Job:
@@ -102,10 +102,10 @@ def timed(job: Job, results: Callable[[], Iterable[Tracked | Failed]], recording
     return seconds
 
 
-def by_dask(cluster: Cluster, job: Job, recordings: list[Recording]) -> Iterator[Tracked | Failed]:
+def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> Iterator[Tracked | Failed]:
     """As the coordinator does it."""
-    groups = Groups(recordings)
-    work: Distribution[Recording, Tracked | Failed] = Distribution(
+    groups = RecordingGroups(recordings)
+    work: Distribution[ArchivedRecording, Tracked | Failed] = Distribution(
         cluster, groups, partial(track_recordings, job), partial(track_alone, job), lambda _: False
     )
     for pairs in work.results():

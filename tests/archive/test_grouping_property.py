@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.archive.grouping import Groups
+from livebode.archive.grouping import RecordingGroups
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ SIZES = st.lists(st.integers(0, 10**9), max_size=200)
 @given(SIZES, st.integers(1, 20), st.floats(0, 1e-5))
 def test_each_item_is_in_one_group_and_in_order(sizes: list[int], workers: int, s_per_byte: float) -> None:
     items = [Item(size) for size in sizes]
-    groups, found = Groups(items), []
+    groups, found = RecordingGroups(items), []
     while len(groups):
         group = groups.next(workers)
         assert group
@@ -38,7 +38,7 @@ def test_a_worker_has_four_groups_or_groups_are_as_short_as_their_overhead_allow
     workers: int, count: int, seconds: float
 ) -> None:
     items = [Item(1000)] * count
-    groups, lengths = Groups(items), []
+    groups, lengths = RecordingGroups(items), []
     while len(groups):
         group = groups.next(workers)
         groups.learn(sum(item.size_bytes for item in group), seconds * len(group))

@@ -15,16 +15,17 @@ import threading
 import time
 from pathlib import Path
 
-from livebode.archive.recordings import Recording
+from livebode.archive.recordings import ArchivedRecording
 from livebode.archive.results import Failed, Tracked, failed
 from livebode.archive.tasks import track_one
 from livebode.archive.tracking import Job
 from livebode.core import ArchiveError
+from livebode.core.files import write_whole
 
 _LOOK_S = 0.1
 
 
-def track_alone(job: Job, recording: Recording, scratch: Path | None = None) -> Tracked | Failed:
+def track_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Tracked | Failed:
     """Track a recording in a new process, and wait for it; one that needs too much memory is ended."""
     started = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="livebode-", dir=scratch) as name:
@@ -94,8 +95,7 @@ def _main(folder: Path) -> None:
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     job, recording = pickle.loads((folder / "task").read_bytes())
     result = track_one(job, recording, folder)
-    (folder / "written").write_bytes(pickle.dumps(result))
-    (folder / "written").rename(folder / "result")
+    write_whole(folder / "result", pickle.dumps(result))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import pyarrow as pa
 
-from livebode.archive.recordings import Recording, levels_of
+from livebode.archive.recordings import ArchivedRecording, levels_of
 from livebode.archive.results import Failed, Tracked
 from livebode.lake import QUANTITIES, QUARANTINE, RUNS, DataFile, Lake
 from livebode.version import __version__
@@ -65,7 +65,7 @@ class Committer:
         self._committed_s = time.monotonic()
 
     def _quarantined(self, one: Failed) -> dict[str, str | None]:
-        assert isinstance(one.item, Recording)
+        assert isinstance(one.item, ArchivedRecording)
         place = one.item.place
         return {
             "content": one.item.content,

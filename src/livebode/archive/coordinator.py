@@ -14,10 +14,10 @@ from packaging.version import Version
 from livebode.archive.alone import track_alone
 from livebode.archive.committing import Committer
 from livebode.archive.contents import quarantine
-from livebode.archive.grouping import Groups
+from livebode.archive.grouping import RecordingGroups
 from livebode.archive.recordings import (
+    ArchivedRecording,
     Place,
-    Recording,
     file_rows,
     find_places,
     known_contents,
@@ -146,7 +146,7 @@ class Coordinator:
         self._outcome.recordings = len(rows)
         with ExitStack() as stack:
             try:
-                self._track([Recording(row["content"], place_of(row)) for row in rows], stack, alone=True)
+                self._track([ArchivedRecording(row["content"], place_of(row)) for row in rows], stack, alone=True)
             except (KeyboardInterrupt, SystemExit):
                 self._outcome.stopped = True
         return self._outcome
@@ -174,7 +174,7 @@ class Coordinator:
         commit()
         return [(place, known[place.known_as]) for place in places if place.known_as in known]
 
-    def _track(self, recordings: Sequence[Recording], stack: ExitStack, alone: bool = False) -> None:
+    def _track(self, recordings: Sequence[ArchivedRecording], stack: ExitStack, alone: bool = False) -> None:
         if not recordings:
             return
         committer = Committer(self._lake, self._job.recipe, self._job.machine)
@@ -203,7 +203,7 @@ class Coordinator:
         cluster = self._started(stack)
         from livebode.archive.distributing import Distribution
 
-        groups: Groups[Any] = Groups([] if alone else items)
+        groups: RecordingGroups[Any] = RecordingGroups([] if alone else items)
         work: Distribution[Any, Any] = Distribution(cluster, groups, together, one, _again)
         work.last.extend(items if alone else ())
         done, done_bytes, total_bytes = 0, 0, sum(item.size_bytes for item in items)

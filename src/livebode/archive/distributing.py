@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 from distributed import KilledWorker, as_completed, get_worker
 
 from livebode.archive.clusters import Cluster
-from livebode.archive.grouping import Groups, Sized
+from livebode.archive.grouping import RecordingGroups, Sized
 
 S = TypeVar("S", bound=Sized)
 R = TypeVar("R")
@@ -44,7 +44,7 @@ class Distribution(Generic[S, R]):
     """
 
     cluster: Cluster
-    groups: Groups[S]
+    groups: RecordingGroups[S]
     together: Callable[[Sequence[S], Path], list[R]]
     alone: Callable[[S, Path], R]
     again: Callable[[R], bool]

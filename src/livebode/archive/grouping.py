@@ -20,7 +20,7 @@ class Sized(Protocol):
 S = TypeVar("S", bound=Sized)
 
 
-class Groups(Generic[S]):
+class RecordingGroups(Generic[S]):
     """What waits to be processed, in groups whose expected time shrinks towards the end.
 
     A group has at most a quarter of the time that remains for each worker, between 0.2 and 10 s: so a worker has at

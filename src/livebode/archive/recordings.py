@@ -43,7 +43,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Recording:
+class ArchivedRecording:
     """A content, and the place from which it is read."""
 
     content: str
@@ -100,12 +100,14 @@ def file_rows(contents: Iterable[tuple[Place, str]], machine: dict[str, str]) ->
     return pa.Table.from_pylist(rows, schema=FILES)
 
 
-def untracked(contents: Iterable[tuple[Place, str]], recipe: str, skipped: set[tuple[str, ...]]) -> list[Recording]:
+def untracked(
+    contents: Iterable[tuple[Place, str]], recipe: str, skipped: set[tuple[str, ...]]
+) -> list[ArchivedRecording]:
     """Each content once, at its first place, except those whose key is skipped; the longest first."""
-    found: dict[str, Recording] = {}
+    found: dict[str, ArchivedRecording] = {}
     for place, content in contents:
         if Key(content, recipe) not in skipped:
-            found.setdefault(content, Recording(content, place))
+            found.setdefault(content, ArchivedRecording(content, place))
     return sorted(found.values(), key=lambda one: (-one.place.size_bytes, one.content))
 
 

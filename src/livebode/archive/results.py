@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from livebode.archive.recordings import Place, Recording
+from livebode.archive.recordings import ArchivedRecording, Place
 from livebode.core import ArchiveError, LivebodeError
 from livebode.lake import DataFile
 from livebode.locations import with_originals
@@ -27,7 +27,7 @@ class Hashed:
 class Tracked:
     """A result whose files are in the lake's directory, and its rows of `runs` and `quantities`, not committed yet."""
 
-    item: Recording
+    item: ArchivedRecording
     files: tuple[DataFile, ...]
     run: dict[str, Any]
     quantities: tuple[dict[str, Any], ...]
@@ -38,7 +38,7 @@ class Tracked:
 class Failed:
     """A recording that cannot be read or tracked: the code of the error, and its sentence."""
 
-    item: Place | Recording
+    item: Place | ArchivedRecording
     code: str
     sentence: str
     seconds: float = 0.0
@@ -57,7 +57,7 @@ class Failed:
 Result = Hashed | Tracked | Failed
 
 
-def failed(item: Place | Recording, error: Exception, seconds: float = 0.0) -> Failed:
+def failed(item: Place | ArchivedRecording, error: Exception, seconds: float = 0.0) -> Failed:
     """The failure that an exception means."""
     if isinstance(error, MemoryError):
         error = ArchiveError(

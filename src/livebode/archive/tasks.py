@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from livebode.archive.recordings import Place, Recording
+from livebode.archive.recordings import ArchivedRecording, Place
 from livebode.archive.results import Failed, Hashed, Tracked, failed
 from livebode.archive.tracking import Job, track
 from livebode.locations import local_copy
@@ -18,12 +18,14 @@ def hash_places(places: Sequence[Place], scratch: Path | None = None) -> list[Ha
     return [_hashed(place) for place in places]
 
 
-def track_recordings(job: Job, recordings: Sequence[Recording], scratch: Path | None = None) -> list[Tracked | Failed]:
+def track_recordings(
+    job: Job, recordings: Sequence[ArchivedRecording], scratch: Path | None = None
+) -> list[Tracked | Failed]:
     """Track each recording; the files are written, and nothing is committed."""
     return [track_one(job, recording, scratch) for recording in recordings]
 
 
-def track_one(job: Job, recording: Recording, scratch: Path | None = None) -> Tracked | Failed:
+def track_one(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Tracked | Failed:
     """Track one recording."""
     started = time.perf_counter()
     try:

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.analysis.run_trend import trend_points
-from livebode.archive.recordings import Recording, levels_of
+from livebode.archive.recordings import ArchivedRecording, levels_of
 from livebode.configuration.axis import Axis
 from livebode.configuration.recording import open_recording
 from livebode.core import ArchiveError, Event
@@ -67,7 +67,7 @@ class TrackedRun:
     quantities: tuple[dict[str, Any], ...]
 
 
-def track(job: Job, recording: Recording, scratch: Path | None = None) -> TrackedRun:
+def track(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> TrackedRun:
     """Track a recording and put the files of its result in the lake's directory.
 
     Raises
@@ -130,7 +130,7 @@ def _plain(event: Event) -> dict[str, Any]:
     }
 
 
-def _about(record: RunRecord, recording: Recording, files: tuple[DataFile, ...]) -> dict[str, Any]:
+def _about(record: RunRecord, recording: ArchivedRecording, files: tuple[DataFile, ...]) -> dict[str, Any]:
     """Row of the table `runs`, without what all tables have."""
     found, recorded = record.found, record.summary.get("recorded") or {}
     rows = {file.table: file.rows for file in files}

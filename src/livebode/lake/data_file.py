@@ -64,6 +64,6 @@ def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table
     return DataFile(table, path.name, path.stat().st_size, rows, key)
 
 
-def parquet_writer(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
+def parquet_writer(path: Path | pa.BufferOutputStream, schema: pa.Schema) -> pq.ParquetWriter:
     """A Parquet file with the layout of wide responses, without Arrow's own schema: a lake has one for all files."""
     return pq.ParquetWriter(path, schema, store_schema=False, **wide_options(schema))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -19,7 +18,7 @@ from livebode.core.files import whole_file
 from livebode.core.installing import not_installed
 from livebode.lake.data_file import DataFile, parquet_writer
 from livebode.lake.schemas import TABLES
-from livebode.locations import Location, delta_options, location
+from livebode.locations import Location, delta_options, location, write_whole
 from livebode.locations.storage import make_parent, opened, reporting
 
 try:
@@ -129,15 +128,13 @@ class Lake:
             system.put_file(str(path), inside)
 
     def _group_file(self, name: str, rows: pa.Table) -> DataFile:
-        schema = TABLES[name].schema
-        with tempfile.TemporaryDirectory(prefix="livebode-") as folder:
-            path = Path(folder) / "rows.parquet"
-            with parquet_writer(path, schema) as writer:
-                writer.write_table(rows.cast(schema))
-            own = path.with_name(f"rows-{hashlib.sha256(path.read_bytes()).hexdigest()}.parquet")
-            path.rename(own)
-            self.store(own, name)
-            return DataFile(name, own.name, own.stat().st_size, rows.num_rows)
+        schema, buffer = TABLES[name].schema, pa.BufferOutputStream()
+        with parquet_writer(buffer, schema) as writer:
+            writer.write_table(rows.cast(schema))
+        data = buffer.getvalue().to_pybytes()
+        file = DataFile(name, f"rows-{hashlib.sha256(data).hexdigest()}.parquet", len(data), rows.num_rows)
+        write_whole(self._place / name / file.name, data)
+        return file
 
     def _commit(self, table: DeltaTable, name: str, files: Sequence[DataFile]) -> bool:
         """Add the files in the version after the one that was read; False if somebody else has written that one."""

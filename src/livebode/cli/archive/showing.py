@@ -79,9 +79,9 @@ def show(outcome: ArchiveOutcome, lake: str, archive: str, seconds: float, *, as
 
 
 def _url(one: Failed) -> str:
-    from livebode.archive.recordings import Recording
+    from livebode.archive.recordings import ArchivedRecording
 
-    return str((one.item.place if isinstance(one.item, Recording) else one.item).url)
+    return str((one.item.place if isinstance(one.item, ArchivedRecording) else one.item).url)
 
 
 def _plain(one: Failed) -> dict[str, str]:

@@ -27,5 +27,4 @@ class ArchiveError(LivebodeError):
         "memory-exceeded": "A recording needs more memory than a worker may use.",
         "no-recordings": "No file matches the inputs of the archive.",
         "process-ended": "The process that tracked a recording was ended by a signal, or ended itself.",
-        "workers-lost": "All workers ended and none is started again.",
     }
