@@ -102,6 +102,12 @@ EXAMPLES = {
             "livebode validate runs/standstill --on standstill-2.csv",
         ),
     ),
+    "moving": Example(
+        "an axis that moves, with the position as schedule",
+        {"moving.parquet": _moving(3, 8.2)},
+        ("moving.toml",),
+        ("livebode run moving.toml",),
+    ),
     "archive": Example(
         "three recordings as an archive, one of which is of another kind",
         {"standstill.csv": _standstill(1), "standstill-2.csv": _standstill(2), "chirp.csv": _single_chirp},
@@ -111,12 +117,6 @@ EXAMPLES = {
             "livebode archive list archive.toml",
             "livebode archive list archive.toml --quarantined",
         ),
-    ),
-    "moving": Example(
-        "an axis that moves, with the position as schedule",
-        {"moving.parquet": _moving(3, 8.2)},
-        ("moving.toml",),
-        ("livebode run moving.toml",),
     ),
     "chirp": Example(
         "a single chirp, which does not repeat",
