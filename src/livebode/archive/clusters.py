@@ -35,8 +35,8 @@ _SETTINGS = {
     # With a pool of its own, Arrow could not use what NumPy has freed. Dask's own threshold returns memory so often
     # that tracking takes a third longer.
     "distributed.nanny.pre-spawn-environ.ARROW_DEFAULT_MEMORY_POOL": "system",
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 64 << 20,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 4 << 20,
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 8 << 20,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 20,
     # Events of the scheduler, which nobody reads, grow with the number of tasks.
     "distributed.admin.low-level-log-length": 100,
 }
