@@ -14,11 +14,13 @@ from typing import Any
 import pytest
 import typer
 
+from livebode.archive.settings import ArchiveSettings
 from livebode.cli.app import app
 from livebode.configuration import Axis
 from livebode.configuration.axes import merged, tables_of
 from tests.support.pages import PAGES, ROOT, steps_of
 
+ARCHIVE = {"inputs": ["*.csv"], "recipe": "recipe.toml", "lake": "lake"}
 SMALLEST = {"source": {"log": "log.parquet"}, "signals": {"output": "y", "input": "u", "excitation": "w"}}
 
 
@@ -37,6 +39,9 @@ TOML = [pytest.param(text, id=f"{name_of(page)}-{n}") for page in PAGES for n, t
 def test_the_toml_of_a_page_is_a_configuration(text: str) -> None:
     """Alone where it has signals, otherwise with the smallest configuration around it."""
     data = tomllib.loads(text)
+    if data.keys() & {"inputs", "cluster"}:
+        assert ArchiveSettings.model_validate(ARCHIVE | data)
+        return
     below = {} if "signals" in data else SMALLEST | ({"source": {}} if "source" in data else {})
     for table in tables_of(merged(below, data), "axis.toml").values():
         assert Axis.of(table, "axis.toml")
@@ -50,6 +55,8 @@ def test_commands_of_a_page_and_their_options_exist(page: Path) -> None:
             continue
         words = [word.partition("=")[0] for word in step.words[1:]]
         command = next((group.commands[word] for word in words if word in group.commands), group)
+        inner = getattr(command, "commands", {})
+        command = next((inner[word] for word in words if word in inner), command)
         known = {name for options in (group, command) for parameter in options.params for name in parameter.opts}
         assert command is not group or words == ["--help"], step.text
         assert {word for word in words if re.match("--?[a-z]", word)} <= known, step.text

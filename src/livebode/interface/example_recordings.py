@@ -108,6 +108,16 @@ EXAMPLES = {
         ("moving.toml",),
         ("livebode run moving.toml",),
     ),
+    "archive": Example(
+        "three recordings as an archive, one of which is of another kind",
+        {"standstill.csv": _standstill(1), "standstill-2.csv": _standstill(2), "chirp.csv": _single_chirp},
+        ("archive.toml", "archive-recipe.toml"),
+        (
+            "livebode archive run archive.toml",
+            "livebode archive list archive.toml",
+            "livebode archive list archive.toml --quarantined",
+        ),
+    ),
     "chirp": Example(
         "a single chirp, which does not repeat",
         {"chirp.csv": _single_chirp},

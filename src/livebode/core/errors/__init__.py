@@ -3,6 +3,7 @@
 Wrong use by a programmer (a wrong type, a call in the wrong order) is a TypeError, ValueError or RuntimeError instead.
 """
 
+from livebode.core.errors.archive import ArchiveError
 from livebode.core.errors.base import LivebodeError
 from livebode.core.errors.baseline import BaselineError
 from livebode.core.errors.config import ConfigError
@@ -23,6 +24,7 @@ from livebode.core.errors.state import StateError
 from livebode.core.errors.usage import UsageError
 
 __all__ = [
+    "ArchiveError",
     "BaselineError",
     "ConfigError",
     "DamageWarning",
