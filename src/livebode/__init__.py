@@ -40,9 +40,9 @@ Names by subject:
 - Monitoring: Baseline, Event, Monitor, learn
 - Simulation: BeltAxis, SimulatedAxis, Strokes
 - Examples: example_axis, example_responses, example_run
-- Errors: LivebodeError (a ValueError) and its kinds BaselineError, ConfigError, DesignError, ExtraError, FitError,
-  GridError, OutputError, RecordError, RecordingError, ServerError, SignalError, SimulationError, SourceError,
-  StateError, UsageError
+- Errors: LivebodeError (a ValueError) and its kinds ArchiveError, BaselineError, ConfigError, DesignError, ExtraError,
+  FitError, GridError, OutputError, RecordError, RecordingError, ServerError, SignalError, SimulationError,
+  SourceError, StateError, UsageError
 
 Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the true value with probability
 1 − exp(−c²). Every public name loads its part of livebode when it is first used. These names are the public interface,
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from livebode.analysis.learning import learn
     from livebode.core import (
         PID,
+        ArchiveError,
         BaselineError,
         Block,
         Cascade,
@@ -140,10 +141,12 @@ _HOME = {
         "RecordError",
         "OutputError",
         "LivebodeError",
+        "LocationError",
         "FitError",
         "ExtraError",
         "DesignError",
         "ConfigError",
+        "ArchiveError",
         "BaselineError",
         "PID",
         "Block",
@@ -166,6 +169,7 @@ _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "PID",
+    "ArchiveError",
     "Baseline",
     "BaselineError",
     "BeltAxis",
@@ -183,6 +187,7 @@ __all__ = [
     "GridError",
     "Lines",
     "LivebodeError",
+    "LocationError",
     "Log",
     "Loop",
     "Model",

@@ -15,6 +15,7 @@ from livebode.core._unit_reading import QuantityKind, UnitReading, read_unit, sp
 from livebode.core._wording import counted, plural, rounded_down
 from livebode.core.controllers import PID, Cascade, PositionPD
 from livebode.core.errors import (
+    ArchiveError,
     BaselineError,
     ConfigError,
     DamageWarning,
@@ -23,6 +24,7 @@ from livebode.core.errors import (
     FitError,
     GridError,
     LivebodeError,
+    LocationError,
     OutputError,
     RecordError,
     RecordingError,
@@ -49,6 +51,7 @@ __all__ = [
     "PER_RESPONSE",
     "PID",
     "SPIKE",
+    "ArchiveError",
     "BaselineError",
     "Block",
     "Cascade",
@@ -64,6 +67,7 @@ __all__ = [
     "GridError",
     "Lines",
     "LivebodeError",
+    "LocationError",
     "Loop",
     "Model",
     "OutputError",

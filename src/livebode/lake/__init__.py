@@ -1,0 +1,19 @@
+"""The results of many runs as Delta tables below one URL, which DuckDB, Spark and Polars read as well."""
+
+from livebode.lake.data_file import DataFile, Key
+from livebode.lake.lake import Lake
+from livebode.lake.schemas import EVENTS, FILES, PARAMETERS, QUANTITIES, QUARANTINE, RESPONSES, RUNS, TABLES
+
+__all__ = [
+    "EVENTS",
+    "FILES",
+    "PARAMETERS",
+    "QUANTITIES",
+    "QUARANTINE",
+    "RESPONSES",
+    "RUNS",
+    "TABLES",
+    "DataFile",
+    "Key",
+    "Lake",
+]

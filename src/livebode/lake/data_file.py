@@ -1,0 +1,89 @@
+"""DataFile: a Parquet file of one result, whose name and bytes follow from the result alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from livebode.lake.schemas import TABLES
+
+_DICTIONARY = {"content", "recipe", "model", "name", "unit", "status", "kind", "site", "line", "machine", "axis"}
+
+
+class Key(NamedTuple):
+    """What a result belongs to: the recording by its content, and the settings by the recipe's id."""
+
+    content: str
+    recipe: str
+
+
+@dataclass(frozen=True)
+class DataFile:
+    """A file in the directory of a table, not yet in the table.
+
+    Attributes
+    ----------
+    table
+        Name of the table.
+    name
+        Of the file; the same result has the same one.
+    size_bytes, rows
+        For the table's log.
+    key
+        The result that it contains; None if there are several.
+    """
+
+    table: str
+    name: str
+    size_bytes: int
+    rows: int
+    key: Key | None = None
+
+    @property
+    def statistics(self) -> str:
+        """Statistics in Delta's form: a reader that looks for another result skips the file."""
+        limits = self.key._asdict() if self.key else {}
+        return json.dumps({"numRecords": self.rows, "minValues": limits, "maxValues": limits, "nullCount": {}})
+
+
+def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table]) -> DataFile:
+    """Write the rows of one result, without the key's columns, to a file in this directory; none if it has no rows."""
+    path = folder / f"{key.content}-{key.recipe}.parquet"
+    schema, rows = TABLES[table].schema, 0
+    with parquet_writer(path, schema) as writer:
+        for part in parts:
+            own = [pa.repeat(pa.scalar(text, pa.string()), part.num_rows) for text in key]
+            columns = [*own, *(part[name].cast(schema.field(name).type) for name in schema.names[len(key) :])]
+            writer.write_table(pa.table(columns, schema=schema))
+            rows += part.num_rows
+    return DataFile(table, path.name, path.stat().st_size, rows, key)
+
+
+def parquet_writer(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
+    """A Parquet file with the layout of a lake: zstd, dictionaries for names, split bytes for measured values."""
+    repeating = [name for name in schema.names if name in _DICTIONARY]
+    return pq.ParquetWriter(
+        path,
+        schema,
+        compression="zstd",
+        use_dictionary=repeating,
+        use_byte_stream_split=_measured(schema),
+        store_schema=False,
+    )
+
+
+def _measured(schema: pa.Schema) -> list[str]:
+    """Paths of the columns with floating-point values."""
+    found = []
+    for field in schema:
+        if pa.types.is_floating(field.type):
+            found.append(field.name)
+        elif pa.types.is_list(field.type) and pa.types.is_floating(field.type.value_type):
+            found.append(f"{field.name}.list.element")
+    return found
