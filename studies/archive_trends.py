@@ -1,9 +1,9 @@
 """Trends of simulated machines over a year: coverage of the bounds, power, and false discoveries of a fleet.
 
-`python -m studies.archive_trends` simulates machines with 200 runs over a year: 0.3 % scatter from run to run, an effect
-of the temperature of ±1 % over the year, 3 % outliers of up to 5 %, at random times. It prints how often the 95 % bound
-of the slope covers the truth, how often the trend, jump or bend is found, and the share of false discoveries among 1,000
-healthy and 50 bad machines.
+`python -m studies.archive_trends` simulates machines with 200 runs over a year: 0.3 % scatter from run to run, an
+effect of the temperature of ±1 % over the year, 3 % outliers of up to 5 %, at random times. It prints how often the
+95 % bound of the slope covers the truth, how often the trend, jump or bend is found, and the share of false discoveries
+among 1,000 healthy and 50 bad machines.
 """
 
 from __future__ import annotations

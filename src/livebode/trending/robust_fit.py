@@ -114,6 +114,8 @@ def robust_fit(terms: Floats, value: Floats, sigma: Floats) -> RobustFit:
 
 def _own_errors(terms: Floats, value: Floats, sigma: Floats) -> Floats:
     """√(τ² + σ²) of each row, relative to the median one."""
+    if sigma.min() == sigma.max():
+        return np.ones(len(value))
     q = np.linalg.qr(terms)[0]
     left = value - q @ _least_absolute(q, value)
     between = (_MAD * float(np.median(np.abs(left)))) ** 2 - float(np.median(sigma)) ** 2
@@ -125,10 +127,11 @@ def _own_errors(terms: Floats, value: Floats, sigma: Floats) -> Floats:
 def _least_absolute(q: Floats, y: Floats) -> Floats:
     """Least absolute deviations, by weighted least squares."""
     at = np.asarray(q.T @ y)
+    left = np.abs(y - q @ at)
+    least = 1e-3 * float(np.median(left)) + _TINY * float(np.abs(y).max()) + np.finfo(float).tiny
     for _ in range(15):
+        at = _weighted(q, y, least / np.maximum(left, least))
         left = np.abs(y - q @ at)
-        weight = 1 / np.maximum(left, 1e-3 * float(np.median(left)) + _TINY * float(np.abs(y).max()) + 1e-300)
-        at = _weighted(q, y, weight / weight.max())
     return at
 
 
@@ -148,7 +151,7 @@ def _weighted(q: Floats, y: Floats, weight: Floats) -> Floats:
     """Weighted least squares; a step or a bend whose rows are all outliers gets the smallest coefficients."""
     weighted = q * weight[:, np.newaxis]
     normal = weighted.T @ q
-    normal.flat[:: len(normal) + 1] += 1e-9 * normal.trace()
+    normal.flat[:: len(normal) + 1] += 1e-12 * normal.trace()
     return np.asarray(np.linalg.solve(normal, weighted.T @ y))
 
 

@@ -144,7 +144,11 @@ class NotAssessed:
 
 
 def trend_of(
-    time_s: Floats, value: Floats, bound_95: Floats, covariates: Mapping[str, Floats] | None = None
+    time_s: Floats,
+    value: Floats,
+    bound_95: Floats,
+    covariates: Mapping[str, Floats] | None = None,
+    member: NDArray[np.intp] | None = None,
 ) -> Trend | NotAssessed:
     """The trend of a quantity over the runs of one machine.
 
@@ -167,6 +171,9 @@ def trend_of(
         95 % bound of each value, (runs,); NaN where it is not known.
     covariates
         Mean of each covariate in each run, (runs,); NaN where it is not known.
+    member
+        Number of the axis of each run, (runs,), if they are of several: each has a level of its own, and the level of
+        the trend is that of the axis with the smallest number.
 
     Examples
     --------
@@ -189,7 +196,9 @@ def trend_of(
     month = (time - time[0]) / MONTH_S
     season = _season(time) if span_s >= _SEASON_S_MIN else np.zeros((len(rows), 0))
     others = np.column_stack([*(usable[name][rows] for name in names), season])
-    terms = np.column_stack([np.ones(len(rows)), month - month.mean(), others - others.mean(axis=0)])
+    levels = _levels(np.zeros_like(rows) if member is None else member[rows])
+    others = np.column_stack([others - others.mean(axis=0), levels])
+    terms = np.column_stack([np.ones(len(rows)), month - month.mean(), others])
     if rank_of(terms) < terms.shape[1]:
         return NotAssessed(len(rows), "the covariates cannot be separated from each other or from the time")
     bound = bound_95[rows]
@@ -276,6 +285,11 @@ def _usable(covariates: Mapping[str, Floats]) -> tuple[dict[str, Floats], list[s
 def _season(time_s: Floats) -> Floats:
     angle = tau * time_s[:, np.newaxis] / YEAR_S * np.array([1.0, 2.0])
     return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _levels(member: NDArray[np.intp]) -> Floats:
+    """A column for each member but the first, 1 where a row belongs to it."""
+    return np.asarray(member[:, np.newaxis] == np.unique(member)[1:], dtype=np.float64)
 
 
 def _alike(terms: Floats, names: list[str]) -> list[str]:
