@@ -62,4 +62,3 @@ def upload(directory: str | os.PathLike[str], url: Url) -> None:
             directory=str(directory),
             reason=error.code,
         ) from error
-
