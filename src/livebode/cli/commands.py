@@ -42,7 +42,9 @@ SUMMARIES: Mapping[str, str] = {
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
     "archive": {
+        "run": "Track the recordings of an archive that its lake does not have yet.",
         "list": "List the runs of a lake by machine, and the recordings in quarantine.",
+        "retry": "Track recordings in quarantine again, each in a process of its own.",
     },
 }
 """The commands with subcommands, and these as above."""

@@ -12,8 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from livebode.lake.schemas import TABLES
-
-_DICTIONARY = {"content", "recipe", "model", "name", "unit", "status", "kind", "site", "line", "machine", "axis"}
+from livebode.records.wide_responses import wide_options
 
 
 class Key(NamedTuple):
@@ -66,24 +65,5 @@ def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table
 
 
 def parquet_writer(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
-    """A Parquet file with the layout of a lake: zstd, dictionaries for names, split bytes for measured values."""
-    repeating = [name for name in schema.names if name in _DICTIONARY]
-    return pq.ParquetWriter(
-        path,
-        schema,
-        compression="zstd",
-        use_dictionary=repeating,
-        use_byte_stream_split=_measured(schema),
-        store_schema=False,
-    )
-
-
-def _measured(schema: pa.Schema) -> list[str]:
-    """Paths of the columns with floating-point values."""
-    found = []
-    for field in schema:
-        if pa.types.is_floating(field.type):
-            found.append(field.name)
-        elif pa.types.is_list(field.type) and pa.types.is_floating(field.type.value_type):
-            found.append(f"{field.name}.list.element")
-    return found
+    """A Parquet file with the layout of wide responses, without Arrow's own schema: a lake has one for all files."""
+    return pq.ParquetWriter(path, schema, store_schema=False, **wide_options(schema))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -14,10 +15,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from livebode.core import ArchiveError
+from livebode.core.files import whole_file
 from livebode.core.installing import not_installed
 from livebode.lake.data_file import DataFile, parquet_writer
 from livebode.lake.schemas import TABLES
-from livebode.lake.storage import stored, table_url
+from livebode.locations import Location, delta_options, location
+from livebode.locations.storage import make_parent, opened, reporting
 
 try:
     from deltalake import CommitProperties, DeltaTable
@@ -43,7 +46,9 @@ class Lake:
     """
 
     def __init__(self, url: str) -> None:
-        self.url = url
+        place = location(url)
+        self._place: Location = place.absolute() if isinstance(place, Path) else place
+        self.url = str(place)
         self._tables: dict[str, DeltaTable] = {}
         self._known: dict[str, tuple[int, set[Row]]] = {}
 
@@ -104,8 +109,24 @@ class Lake:
                     return
 
     def store(self, path: Path, table: str) -> None:
-        """Put a file in the directory of a table, completely or not at all."""
-        stored(path, f"{table_url(self.url, table)}/{path.name}")
+        """Put a file in the directory of a table, completely or not at all.
+
+        Raises
+        ------
+        ArchiveError, LocationError
+            If it cannot be written.
+        """
+        target = self._place / table / path.name
+        if isinstance(target, Path):
+            with self._reported(table):
+                target.parent.mkdir(parents=True, exist_ok=True)
+                with whole_file(target) as partial:
+                    shutil.copyfile(path, partial)
+            return
+        system, inside = opened(target)
+        with reporting(target):
+            make_parent(target, system, inside)
+            system.put_file(str(path), inside)
 
     def _group_file(self, name: str, rows: pa.Table) -> DataFile:
         schema = TABLES[name].schema
@@ -150,7 +171,7 @@ class Lake:
             if name in self._tables:
                 self._tables[name].update_incremental()
             else:
-                self._tables[name] = DeltaTable(table_url(self.url, name))
+                self._tables[name] = self._table(name)
         except TableNotFoundError:
             return None
         return self._tables[name]
@@ -159,9 +180,18 @@ class Lake:
         if (table := self._opened(name)) is not None:
             return table
         with suppress(CommitFailedError):  # another process has created it in the same moment
-            DeltaTable.create(table_url(self.url, name), TABLES[name].schema, mode="ignore")
-        self._tables[name] = DeltaTable(table_url(self.url, name))
+            DeltaTable.create(
+                self._uri(name), TABLES[name].schema, mode="ignore", storage_options=delta_options(self._place)
+            )
+        self._tables[name] = self._table(name)
         return self._tables[name]
+
+    def _table(self, name: str) -> DeltaTable:
+        return DeltaTable(self._uri(name), storage_options=delta_options(self._place))
+
+    def _uri(self, name: str) -> str:
+        place = self._place / name
+        return str(place) if isinstance(place, Path) else place.address
 
     @contextmanager
     def _reported(self, name: str) -> Iterator[None]:

@@ -11,6 +11,9 @@ from dataclasses import dataclass
 
 import pyarrow as pa
 
+from livebode.records import parameter_table
+from livebode.records.wide_responses import wide_schema
+
 _TIME = pa.timestamp("us", tz="UTC")
 _KEY = [("content", pa.string()), ("recipe", pa.string())]
 _MACHINE = [(level, pa.string()) for level in ("site", "line", "machine", "axis")]
@@ -18,6 +21,11 @@ _MACHINE = [(level, pa.string()) for level in ("site", "line", "machine", "axis"
 
 def _list(kind: pa.DataType) -> pa.DataType:
     return pa.list_(pa.field("element", kind))
+
+
+def _in_delta(kind: pa.DataType) -> pa.DataType:
+    """The type in Delta, whose lists have any length."""
+    return _list(kind.value_type) if pa.types.is_fixed_size_list(kind) else kind
 
 
 RUNS = pa.schema(
@@ -34,6 +42,7 @@ RUNS = pa.schema(
         ("quantity", pa.string()),
         ("unit", pa.string()),
         ("frequencies_hz", _list(pa.float64())),
+        ("quiet_bins", _list(pa.int64())),
         ("responses", pa.int64()),
         ("parameters", pa.int64()),
         ("events", pa.int64()),
@@ -66,37 +75,10 @@ QUANTITIES = pa.schema(
 )
 """One row for each run and quantity: what a trend reads. The covariates are means over the run."""
 
-RESPONSES = pa.schema(
-    [
-        *_KEY,
-        ("first", pa.int64()),
-        ("sample", pa.int64()),
-        ("time_s", pa.float64()),
-        ("schedule", pa.float64()),
-        ("dof", pa.float32()),
-        ("ready", pa.bool_()),
-        *((name, _list(pa.float32())) for name in ("re", "im", "sigma", "coherence")),
-        ("valid", _list(pa.bool_())),
-        *((name, _list(pa.float32())) for name in ("input_coherence", "weight_re", "weight_im", "distortion")),
-    ]
-)
-"""One row for each response; the lists have a value for each of the run's frequencies_hz."""
+RESPONSES = pa.schema([*_KEY, *((field.name, _in_delta(field.type)) for field in wide_schema(1))])
+"""One row for each response, in wide form; the lists have a value for each of the run's frequencies_hz."""
 
-PARAMETERS = pa.schema(
-    [
-        *_KEY,
-        ("sample", pa.int64()),
-        ("time_s", pa.float64()),
-        ("schedule", pa.float64()),
-        ("model", pa.string()),
-        ("name", pa.string()),
-        ("value", pa.float64()),
-        ("sigma", pa.float64()),
-        ("unit", pa.string()),
-        ("status", pa.string()),
-        ("epsilon", pa.float64()),
-    ]
-)
+PARAMETERS = pa.schema([*_KEY, *((field.name, field.type) for field in parameter_table.SCHEMA)])
 """As parameters.parquet of a run."""
 
 EVENTS = pa.schema(

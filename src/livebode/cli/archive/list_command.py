@@ -51,4 +51,4 @@ def _print(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
         table.add_column(column, overflow="fold", justify="right" if column in ("runs", "quarantined") else "left")
     for row in rows:
         table.add_row(*("" if value is None else str(value) for value in row))
-    terminal.console(width=None if terminal.is_terminal() else 1 << 14, markup=False, highlight=False).print(table)
+    terminal.console(width=None if terminal.is_terminal() else 1 << 14, markup=False).print(table)
