@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.trending import MONTH_S, NotAssessed, Trend, discoveries, ranking, trend_of
+from livebode.trending import MONTH_S, NotAssessed, Ranked, Trend, discoveries, months_to_limit, trend_of, urgency
 from studies.archive_trends import LEVEL, START_S, Tally, Year, false_share
 
 MACHINES = 200
@@ -141,7 +141,9 @@ def test_the_ranking_has_the_machine_that_reaches_its_limit_first_at_the_top() -
         "healthy": Year(), "slow": Year(per_month=-0.2), "fast": Year(per_month=-0.5), "jumped": Year(jump=-12.0),
         "jumped a little": Year(jump=-2.0),
     }  # fmt: skip
-    ranked = ranking({name: trend(year, seed) for seed, (name, year) in enumerate(machines.items())})
+    trends = {name: trend(year, seed) for seed, (name, year) in enumerate(machines.items())}
+    found = zip(trends.items(), discoveries([one.p for one in trends.values()]))
+    ranked = sorted((Ranked(*item, own, months_to_limit(item[1], 10.0)) for item, own in found), key=urgency)
     assert [one.machine for one in ranked] == ["jumped", "fast", "slow", "jumped a little", "healthy"]
     assert [one.significant for one in ranked] == [True] * 4 + [False]
     months = {one.machine: one.months for one in ranked}

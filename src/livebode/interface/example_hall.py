@@ -91,7 +91,7 @@ def write_hall(path: Path) -> None:
 
 def _results(axis: _Axis, number: int) -> Iterator[tuple[list[dict[str, Any]], dict[str, Any]]]:
     """Rows of `quantities`, and the row of `runs`, of each run."""
-    random = np.random.default_rng([2025, number])
+    random = np.random.default_rng([2026, number])
     days = np.sort(random.uniform(0, min(_DAYS, axis.until_month * _MONTH_DAYS), axis.runs))
     month = days / _MONTH_DAYS
     kelvin = -_SWING_C * np.cos(2 * np.pi * days / 365.25) + 2 * random.standard_normal(axis.runs)

@@ -1,20 +1,32 @@
 """Quantities over months and machines: trends with bounds, changes, and the ranking of a fleet."""
 
+from livebode.trending.assessment import LIMIT_PERCENT, Assessment, assess
 from livebode.trending.changes import SIGNIFICANT
-from livebode.trending.fleet import FALSE_DISCOVERIES, Ranked, discoveries, ranking
+from livebode.trending.fleet import FALSE_DISCOVERIES, Ranked, discoveries, months_to_limit, urgency
+from livebode.trending.quantity_history import History, Level, MachineHistory, Selection, histories, history
 from livebode.trending.trend import MONTH_S, RUNS_MIN, ChangePoint, Effect, NotAssessed, Trend, trend_of
 
 __all__ = [
     "FALSE_DISCOVERIES",
+    "LIMIT_PERCENT",
     "MONTH_S",
     "RUNS_MIN",
     "SIGNIFICANT",
+    "Assessment",
     "ChangePoint",
     "Effect",
+    "History",
+    "Level",
+    "MachineHistory",
     "NotAssessed",
     "Ranked",
+    "Selection",
     "Trend",
+    "assess",
     "discoveries",
-    "ranking",
+    "histories",
+    "history",
+    "months_to_limit",
     "trend_of",
+    "urgency",
 ]

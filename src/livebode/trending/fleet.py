@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import inf, isfinite, nan
 
 import numpy as np
 from scipy.stats import false_discovery_control
@@ -28,7 +28,7 @@ class Ranked:
     significant
         Whether it is among the discoveries.
     months
-        Until the limit; infinite if it does not approach it.
+        Until the limit; 0 if it is exceeded, infinite if it is not approached, NaN if percent have no meaning.
     """
 
     machine: str
@@ -37,39 +37,17 @@ class Ranked:
     months: float
 
 
-def ranking(trends: Mapping[str, Trend], limit_percent: float = 10.0) -> list[Ranked]:
-    """The machines, the worst first.
-
-    Discoveries are found by the step-up procedure over all machines (Benjamini and Hochberg, J. R. Stat. Soc. B 57,
-    1995): at most 5 % of the machines that are reported are expected to be unchanged. This is valid for independent
-    machines and for those with a positive dependence, such as a common temperature (Benjamini and Yekutieli, Ann.
-    Stat. 29, 2001).
-
-    Discoveries come first, by the months until the quantity has changed by `limit_percent` of its level at the first
-    run, then by the size of the change; the others follow by probability.
-
-    Parameters
-    ----------
-    trends
-        By path of the machine.
-    limit_percent
-        Change that needs maintenance.
-    """
-    found = discoveries([trend.p for trend in trends.values()])
-    ranked = [
-        Ranked(machine, trend, significant, months_to_limit(trend, limit_percent) if significant else nan)
-        for (machine, trend), significant in zip(trends.items(), found)
-    ]
-    return sorted(ranked, key=_urgency)
-
-
 def months_to_limit(trend: Trend, limit_percent: float) -> float:
     """Months until the change is so many percent of the level; NaN where percent have no meaning."""
     return trend.months_to(limit_percent / trend.relative) if isfinite(trend.relative) else nan
 
 
-def discoveries(p: list[float]) -> list[bool]:
+def discoveries(p: Sequence[float]) -> list[bool]:
     """Which of these probabilities are discoveries.
+
+    By the step-up procedure (Benjamini and Hochberg, J. R. Stat. Soc. B 57, 1995): at most 5 % of the machines that are
+    reported are expected to be unchanged. This is valid for independent machines and for those with a positive
+    dependence, such as a common temperature (Benjamini and Yekutieli, Ann. Stat. 29, 2001).
 
     >>> discoveries([0.001, 0.2, 0.03, 0.9])
     [True, False, False, False]
@@ -79,9 +57,14 @@ def discoveries(p: list[float]) -> list[bool]:
     return [bool(adjusted <= FALSE_DISCOVERIES) for adjusted in false_discovery_control(np.array(p), method="bh")]
 
 
-def _urgency(of: Ranked) -> tuple[bool, float, float, float]:
+def urgency(of: Ranked) -> tuple[bool, float, float, float]:
+    """The key by which machines are sorted, the worst first.
+
+    Discoveries come first, by the months until the limit, then by the size of the change; the others follow by
+    probability.
+    """
     relative = of.trend.relative if isfinite(of.trend.relative) else 1 / max(of.trend.scatter, 1e-300)
-    months = of.months if isfinite(of.months) else float("inf")
+    months = of.months if isfinite(of.months) else inf
     if not of.significant:
         return True, 0.0, of.trend.p, 0.0
     return False, months, -abs(of.trend.change) * relative, of.trend.p

@@ -184,13 +184,12 @@ def _machines(rows: pa.Table, of: Selection) -> Iterator[tuple[str, MachineHisto
     time_s = rows["recorded_from"].cast(pa.int64()).to_numpy() / 1e6
     value, bound = (_numbers(rows[name]) for name in ("value", "bound_95"))
     covariates = _covariates(rows["covariates"], of.covariates)
-    axis = rows["axis path"].combine_chunks().dictionary_encode()
-    axis_codes, axes = axis.indices.to_numpy(), axis.dictionary.to_pylist()
+    axes, axis_codes = np.unique(rows["axis path"].to_numpy(zero_copy_only=False).astype(str), return_inverse=True)
     for name, code in sorted(zip(names, range(len(names)))):
         here = np.flatnonzero(codes == code)
         own, member = np.unique(axis_codes[here], return_inverse=True)
         yield name, MachineHistory(
-            tuple(axes[i] for i in own), member, time_s[here], value[here], bound[here],
+            tuple(axes[own].tolist()), member, time_s[here], value[here], bound[here],
             {key: x[here] for key, x in covariates.items() if np.isfinite(x[here]).any()},
         )  # fmt: skip
 
