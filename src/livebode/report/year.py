@@ -46,6 +46,8 @@ class Year:
         The trend and its 95 % bound, (runs,).
     changes
         Time and text of each jump and bend.
+    jumps
+        Times of the jumps, at which the line ends and begins again.
     covariates
         Values by label, (runs,).
     """
@@ -60,6 +62,7 @@ class Year:
     line: Floats
     line_bound: Floats
     changes: Sequence[tuple[float, str]] = ()
+    jumps: Sequence[float] = ()
     covariates: Mapping[str, Floats] = field(default_factory=dict)
 
 
@@ -89,7 +92,7 @@ def year_figure(year: Year, *, dark: bool = False) -> Figure:
             panels.append(own)
         for own in panels[:-1]:
             own.tick_params(axis="x", labelbottom=False)
-        _key(figure, look, height_in)
+        _key(figure, look, year, height_in)
     return figure
 
 
@@ -126,7 +129,7 @@ def _panel(axes: Axes, look: Style, year: Year, label: str) -> None:
         axes.plot(at[shown], year.value[shown], ".", markersize=4.5, color=colour, gid="run")
     for beyond, edge, mark in ((year.value < low, low, "v"), (year.value > high, high, "^")):
         axes.plot(at[beyond], np.full(int(beyond.sum()), edge), mark, markersize=4, color=look.muted, clip_on=False)
-    edges = [0, *(int(np.searchsorted(year.time_s, t)) for t, _ in year.changes), len(at)]
+    edges = [0, *(int(np.searchsorted(year.time_s, t)) for t in year.jumps), len(at)]
     for first, stop in pairwise(edges):
         part = slice(first, stop)
         band = (year.line - year.line_bound)[part], (year.line + year.line_bound)[part]
@@ -175,7 +178,7 @@ def _date_ticks(axes: Axes, time_s: Floats) -> None:
     locator = AutoDateLocator(minticks=3, maxticks=8)  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
     days = float(time_s[-1] - time_s[0]) / _DAY_S
-    axes.xaxis.set_major_formatter(DateFormatter("%Y-%m" if days > 120 else "%Y-%m-%d", tz=UTC))
+    axes.xaxis.set_major_formatter(DateFormatter("%Y-%m" if days > 120 else "%Y-%m-%d", tz=UTC))  # type: ignore[no-untyped-call]
     axes.margins(x=0.015)
 
 
@@ -184,21 +187,24 @@ def _dates(time_s: Floats) -> Floats:
     return np.asarray(time_s / _DAY_S)
 
 
-def _key(figure: Figure, look: Style, height_in: float) -> None:
+def _key(figure: Figure, look: Style, year: Year, height_in: float) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
+    dot = {"linestyle": "", "marker": ".", "markersize": 6}
+    entries: list[tuple[Line2D | Patch, str]] = [
+        (Line2D([], [], color=look.run, **dot), tr("run with its bound")),  # type: ignore[arg-type]
+        (Line2D([], [], color=look.newest, linewidth=1.7), tr("trend")),
+        (Patch(facecolor=look.newest, alpha=0.3), tr("its 95 % bound")),
+    ]
+    if not year.counted.all():
+        entries.insert(1, (Line2D([], [], color=look.muted, **dot), tr("outlier")))  # type: ignore[arg-type]
+    if (np.diff(year.time_s) > _GAP_S).any():
+        entries.append((Patch(facecolor=look.nothing, alpha=0.6), tr("no runs")))
     figure.legend(
-        [
-            Line2D([], [], linestyle="", marker=".", markersize=6, color=look.run),
-            Line2D([], [], linestyle="", marker=".", markersize=6, color=look.muted),
-            Line2D([], [], color=look.newest, linewidth=1.7),
-            Patch(facecolor=look.newest, alpha=0.3),
-            Patch(facecolor=look.nothing, alpha=0.6),
-        ],
-        [tr("run with its bound"), tr("outlier"), tr("trend"), tr("its 95 % bound"), tr("no runs")],
-        loc="upper left", bbox_to_anchor=(0.095, 1 - 0.74 / height_in), ncols=5, borderpad=0.0, borderaxespad=0.0,
-        handlelength=1.4, columnspacing=1.8,
+        [handle for handle, _ in entries], [text for _, text in entries], loc="upper left",
+        bbox_to_anchor=(0.095, 1 - 0.74 / height_in), ncols=5, borderpad=0.0, borderaxespad=0.0, handlelength=1.4,
+        columnspacing=1.8,
     )  # fmt: skip
 
 

@@ -10,12 +10,12 @@ from livebode.language import listed, number, tr, trn
 from livebode.report.parameters import labelled
 from livebode.report.year import Year, day
 from livebode.reporting.wording import with_bound
-from livebode.trending import ChangePoint, History, Ranked, Trend
+from livebode.trending import LOGARITHMIC, ChangePoint, History, Ranked, Trend
 
 
 def scale(trend: Trend, unit: str) -> tuple[float, str]:
     """Factor and unit in which changes are given: percent of the level, or the unit where percent have no meaning."""
-    return (trend.relative, "%") if isfinite(trend.relative) else (1.0, unit)
+    return (trend.relative, "%") if isfinite(trend.relative) and unit not in LOGARITHMIC else (1.0, unit)
 
 
 def amount(trend: Trend, value: float, bound: float, unit: str) -> str:
@@ -111,5 +111,6 @@ def year_of(history: History, machine: str, trend: Trend) -> Year:
         line=trend.line,
         line_bound=trend.line_bound_95,
         changes=[(change.time_s, change_words(trend, change, unit)) for change in trend.changes],
+        jumps=[change.time_s for change in trend.changes if change.kind == "jump"],
         covariates=trend.covariates,
     )

@@ -2,13 +2,14 @@
 
 from livebode.trending.assessment import LIMIT_PERCENT, Assessment, assess
 from livebode.trending.changes import SIGNIFICANT
-from livebode.trending.fleet import FALSE_DISCOVERIES, Ranked, discoveries, months_to_limit, urgency
+from livebode.trending.fleet import FALSE_DISCOVERIES, LOGARITHMIC, Ranked, discoveries, months_to_limit, urgency
 from livebode.trending.quantity_history import History, Level, MachineHistory, Selection, histories, history
 from livebode.trending.trend import MONTH_S, RUNS_MIN, ChangePoint, Effect, NotAssessed, Trend, trend_of
 
 __all__ = [
     "FALSE_DISCOVERIES",
     "LIMIT_PERCENT",
+    "LOGARITHMIC",
     "MONTH_S",
     "RUNS_MIN",
     "SIGNIFICANT",

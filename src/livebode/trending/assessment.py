@@ -58,7 +58,8 @@ def assess(found: Sequence[History], limit_percent: float = LIMIT_PERCENT) -> li
     significant = discoveries([trend.p for *_, trend in trends])
     ranked: list[list[Ranked]] = [[] for _ in found]
     for (number, machine, trend), own in zip(trends, significant):
-        ranked[number].append(Ranked(machine, trend, own, months_to_limit(trend, limit_percent)))
+        months = months_to_limit(trend, limit_percent, found[number].unit_of(machine))
+        ranked[number].append(Ranked(machine, trend, own, months))
     return [
         Assessment(one, tuple(sorted(ranked[number], key=urgency)), refused[number], silent_since(one))
         for number, one in enumerate(found)

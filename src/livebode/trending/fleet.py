@@ -14,6 +14,9 @@ from livebode.trending.trend import Trend
 FALSE_DISCOVERIES = 0.05
 """Expected share of unchanged machines among those that are reported as changed."""
 
+LOGARITHMIC = ("dB",)
+"""Units of which percent have no meaning."""
+
 
 @dataclass(frozen=True)
 class Ranked:
@@ -37,9 +40,11 @@ class Ranked:
     months: float
 
 
-def months_to_limit(trend: Trend, limit_percent: float) -> float:
+def months_to_limit(trend: Trend, limit_percent: float, unit: str = "") -> float:
     """Months until the change is so many percent of the level; NaN where percent have no meaning."""
-    return trend.months_to(limit_percent / trend.relative) if isfinite(trend.relative) else nan
+    if unit in LOGARITHMIC or not isfinite(trend.relative):
+        return nan
+    return trend.months_to(limit_percent / trend.relative)
 
 
 def discoveries(p: Sequence[float]) -> list[bool]:
