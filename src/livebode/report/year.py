@@ -104,18 +104,18 @@ def years_figure(years: Sequence[Year], *, dark: bool = False) -> Figure:
         figure = new_figure(9.0, 0.35 + 1.85 * rows)
         height_in = figure.get_size_inches()[1]
         grid = figure.add_gridspec(
-            rows, _COLUMNS, left=0.075, right=0.985, top=1 - 0.3 / height_in, bottom=0.32 / height_in, hspace=0.5,
+            rows, _COLUMNS, left=0.075, right=0.965, top=1 - 0.3 / height_in, bottom=0.32 / height_in, hspace=0.5,
             wspace=0.2,
         )  # fmt: skip
         for i, year in enumerate(years):
             axes = figure.add_subplot(grid[i // _COLUMNS, i % _COLUMNS])
-            _panel(axes, look, year, "")
+            _panel(axes, look, year, "", dates=6)
             axes.set_title(shortened(year.title, 60), loc="left", size=10, color=look.ink, pad=5)
             axes.locator_params(axis="y", nbins=4)
     return figure
 
 
-def _panel(axes: Axes, look: Style, year: Year, label: str) -> None:
+def _panel(axes: Axes, look: Style, year: Year, label: str, dates: int = 8) -> None:
     low, high = _limits(year)
     at = _dates(year.time_s)
     _gaps(axes, look, year.time_s)
@@ -140,7 +140,7 @@ def _panel(axes: Axes, look: Style, year: Year, label: str) -> None:
     axes.set_ylim(low, high)
     axes.set_ylabel(label)
     axes.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 7))
-    _date_ticks(axes, year.time_s)
+    _date_ticks(axes, year.time_s, dates)
     plain(axes)
 
 
@@ -172,10 +172,10 @@ def _name_changes(axes: Axes, look: Style, year: Year) -> None:
         )  # fmt: skip
 
 
-def _date_ticks(axes: Axes, time_s: Floats) -> None:
+def _date_ticks(axes: Axes, time_s: Floats, most: int) -> None:
     from matplotlib.dates import AutoDateLocator, DateFormatter
 
-    locator = AutoDateLocator(minticks=3, maxticks=8)  # type: ignore[no-untyped-call]
+    locator = AutoDateLocator(minticks=3, maxticks=most)  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
     days = float(time_s[-1] - time_s[0]) / _DAY_S
     axes.xaxis.set_major_formatter(DateFormatter("%Y-%m" if days > 120 else "%Y-%m-%d", tz=UTC))  # type: ignore[no-untyped-call]

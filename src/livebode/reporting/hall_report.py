@@ -8,10 +8,10 @@ from datetime import datetime
 from typing import Any
 
 from livebode.core.clock import date_and_time
-from livebode.core.document import Document, Finding, Paragraph, Part, Picture, Section, Table, Tone
+from livebode.core.document import Document, Finding, Paragraph, Picture, Section, Table, Tone
 from livebode.language import listed, number, recognised, tr, trn
 from livebode.report.year import day
-from livebode.reporting.trend_words import amount, change_words, months, scale, sentence, year_of
+from livebode.reporting.trend_words import amount, change_words, months, outlook, scale, sentence, year_of
 from livebode.trending import LIMIT_PERCENT, Assessment, History, Ranked, urgency
 
 _SENTENCES, _PICTURES, _ROWS = 12, 6, 40
@@ -80,17 +80,16 @@ class Hall:
 
     def document(self, made: datetime) -> Document:
         """The report."""
-        verdict = tuple(self._verdict())
         sections = (self._changes(), self._silent(), self._not_assessed(), self._how())
         return Document(
             kind=tr("Report of a hall"),
             title=self.name,
             facts=self._facts(made),
-            verdict=verdict,
+            verdict=(),
             sections=tuple(section for section in sections if section is not None),
             foot=self.name,
-            heading=tr("What changed"),
-            result=(self._result(),),
+            result=(self._result(), *self._findings()),
+            picture=self._picture(),
             made=made,
         )
 
@@ -126,11 +125,10 @@ class Hall:
     def _tone(self, one: Ranked) -> Tone:
         return "alarm" if one.months == 0 else "check"
 
-    def _verdict(self) -> Iterator[Finding]:
+    def _findings(self) -> Iterator[Finding]:
         for one, history in self.changed[:_SENTENCES]:
             words = sentence(one, _quantity(history), history.unit_of(one.machine))
-            left = months(one, self.limit_percent)
-            yield Finding(self._tone(one), f"{words} ({left})" if left else words)
+            yield Finding(self._tone(one), " ".join(filter(None, (words, outlook(one, self.limit_percent)))))
         if (more := len(self.changed) - _SENTENCES) > 0:
             yield Finding(
                 "check", trn("{n:,} more change is in the table.", "{n:,} more changes are in the table.", more)
@@ -147,13 +145,15 @@ class Hall:
             tr("runs"),
         )  # fmt: skip
         note = tr("± covers 95 %. Of the rows, at most 5 % are expected to be unchanged.")
+        return Section(tr("Axes that changed"), (Table(headings, rows, (2, 3, 7), note),))
+
+    def _picture(self) -> Picture | None:
         years = [year_of(history, one.machine, one.trend) for one, history in self.changed[:_PICTURES]]
         caption = tr(
-            "The first of the table: each run with its bound, without the influence of the covariates; the trend with "
-            "its 95 % bound; jumps and other slopes."
+            "The first of the changes: each run with its bound, without the influence of the covariates; the trend "
+            "with its 95 % bound; jumps and other slopes."
         )
-        parts: tuple[Part, ...] = (Picture("years", {"years": years}, caption), Table(headings, rows, (2, 3, 7), note))
-        return Section(tr("Axes that changed"), parts)
+        return Picture("years", {"years": years}, caption) if years else None
 
     def _row(self, one: Ranked, history: History) -> tuple[str, ...]:
         trend, unit = one.trend, history.unit_of(one.machine)
@@ -202,9 +202,9 @@ class Hall:
         words = tr(
             "Each quantity of each axis is regressed on the time and on the covariates, with little weight for "
             "outliers; jumps and other slopes are added where they are significant. The bounds contain the scatter "
-            "from run to run and its correlation. An axis is listed if chance does not explain its trend or its change, "
-            "so that at most 5 % of the listed ones are expected to be unchanged (Benjamini and Hochberg). The ranking "
-            "is by the months until a quantity has changed by {limit} %.",
+            "from run to run and its correlation. An axis is listed if chance does not explain its trend or its "
+            "change, so that at most 5 % of the listed ones are expected to be unchanged (Benjamini and Hochberg). The "
+            "ranking is by the months until a quantity has changed by {limit} %.",
             limit=number(self.limit_percent, "g"),
         )
         return Section(tr("How it was assessed"), (Paragraph(words),))

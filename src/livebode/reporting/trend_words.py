@@ -12,6 +12,8 @@ from livebode.report.year import Year, day
 from livebode.reporting.wording import with_bound
 from livebode.trending import LOGARITHMIC, ChangePoint, History, Ranked, Trend
 
+_MONTHS_MAX = 120
+
 
 def scale(trend: Trend, unit: str) -> tuple[float, str]:
     """Factor and unit in which changes are given: percent of the level, or the unit where percent have no meaning."""
@@ -70,9 +72,22 @@ def months(of: Ranked, limit_percent: float) -> str:
     limit = number(limit_percent, "g")
     if of.months == 0:
         return tr("changed by more than {limit} %", limit=limit)
-    if of.months > 120:
+    if of.months > _MONTHS_MAX:
         return tr("more than 10 years to {limit} %", limit=limit)
     return trn("{n} month to {limit} %", "{n} months to {limit} %", max(1, round(of.months)), limit=limit)
+
+
+def outlook(of: Ranked, limit_percent: float) -> str:
+    """When the limit is reached, as a sentence; empty if it is not approached within ten years."""
+    limit = number(limit_percent, "g")
+    if of.months == 0:
+        return tr("This is more than {limit} %.", limit=limit)
+    if not of.months <= _MONTHS_MAX:
+        return ""
+    return trn(
+        "The change will be {limit} % in about {n} month.", "The change will be {limit} % in about {n} months.",
+        max(1, round(of.months)), limit=limit,
+    )  # fmt: skip
 
 
 def _size(factor: float, value: float, bound: float) -> str:
