@@ -53,7 +53,11 @@ class MachineHistory:
     covariates: Mapping[str, Floats]
 
     def trend(self) -> Trend | NotAssessed:
-        """The trend; of several axes in percent of the median of each."""
+        """The trend; of several axes in percent of the median of each.
+
+        Several axes are taken to change alike. Where they do not, the result is between their trends, and jumps of one
+        axis may be outliers of all.
+        """
         if len(self.axes) == 1:
             return trend_of(self.time_s, self.value, self.bound_95, self.covariates)
         share = np.ones(len(self.value))
@@ -179,7 +183,7 @@ def _ascending() -> list[tuple[str, str]]:
 
 
 def _machines(rows: pa.Table, of: Selection) -> Iterator[tuple[str, MachineHistory]]:
-    paths = _path(rows, LEVELS[: LEVELS.index(of.by) + 1]).combine_chunks().dictionary_encode()
+    paths = _path(rows, LEVELS[: LEVELS.index(of.by) + 1]).dictionary_encode()
     codes, names = paths.indices.to_numpy(), paths.dictionary.to_pylist()
     time_s = rows["recorded_from"].cast(pa.int64()).to_numpy() / 1e6
     value, bound = (_numbers(rows[name]) for name in ("value", "bound_95"))
@@ -216,11 +220,14 @@ def _numbers(column: pa.ChunkedArray | pa.Array) -> Floats:
     return np.asarray(pc.fill_null(column, np.nan).to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
-def _path(rows: pa.Table, levels: Sequence[str]) -> pa.ChunkedArray:
+def _path(rows: pa.Table, levels: Sequence[str]) -> pa.Array:
     """site/line/machine/axis without the levels that are not known."""
-    known = [pc.if_else(pc.equal(rows[level], ""), None, rows[level]) for level in levels]
-    joined = pc.binary_join_element_wise(*known, "/", null_handling="skip")
-    return pc.if_else(pc.equal(joined, ""), UNNAMED, joined)
+    path = pa.repeat("", rows.num_rows)
+    for level in levels:
+        own = pc.fill_null(rows[level].combine_chunks(), "")
+        between = pc.if_else(pc.or_(pc.equal(path, ""), pc.equal(own, "")), "", "/")
+        path = pc.binary_join_element_wise(path, between, own, "")
+    return pc.if_else(pc.equal(path, ""), UNNAMED, path)
 
 
 def _counted(lake: Lake, rows: pa.Table) -> pa.Table:

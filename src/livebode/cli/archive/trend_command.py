@@ -149,6 +149,8 @@ def remarks(of: Assessment) -> list[str]:
     lines += [f"{one.machine}: {remark}" for one in of.ranked for remark in one.trend.remarks]
     lines += [f"{one.machine}: {one.trend.left_out} runs without a value or a covariate are left out"
               for one in of.ranked if one.trend.left_out]  # fmt: skip
+    several = {one.machine: len(found.machines[one.machine].axes) for one in of.ranked}
+    lines += [f"{machine}: {axes} axes together; --by axis shows each" for machine, axes in several.items() if axes > 1]
     lines += [f"{machine}: not assessed: {reason}" for machine, reason in of.not_assessed.items()]
     lines += [f"{machine}: no run since {_day(time_s)}" for machine, time_s in of.silent.items()]
     if found.undated:
