@@ -11,7 +11,16 @@ from livebode.core.clock import date_and_time
 from livebode.core.document import Document, Finding, Paragraph, Picture, Section, Table, Tone
 from livebode.language import listed, number, recognised, tr, trn
 from livebode.report.year import day
-from livebode.reporting.trend_words import amount, change_words, months, outlook, scale, sentence, year_of
+from livebode.reporting.trend_words import (
+    amount,
+    change_words,
+    months,
+    outlook,
+    quantity_name,
+    scale,
+    sentence,
+    year_of,
+)
 from livebode.trending import LIMIT_PERCENT, Assessment, History, Ranked, urgency
 
 _SENTENCES, _PICTURES, _ROWS = 12, 6, 40
@@ -104,7 +113,7 @@ class Hall:
             (tr("axes"), number(len(axes), ",")),
             (tr("runs"), number(sum(runs for runs, _, _ in axes.values()), ",")),
             (tr("recordings in quarantine"), number(len(self.quarantined), ",")),
-            (tr("quantities"), listed(_quantity(of.history) for of in self.assessments)),
+            (tr("quantities"), listed(quantity_name(of.history) for of in self.assessments)),
             (tr("report written"), date_and_time(made.timestamp())),
         )
 
@@ -127,7 +136,7 @@ class Hall:
 
     def _findings(self) -> Iterator[Finding]:
         for one, history in self.changed[:_SENTENCES]:
-            words = sentence(one, _quantity(history), history.unit_of(one.machine))
+            words = sentence(one, quantity_name(history), history.unit_of(one.machine))
             yield Finding(self._tone(one), " ".join(filter(None, (words, outlook(one, self.limit_percent)))))
         if (more := len(self.changed) - _SENTENCES) > 0:
             yield Finding(
@@ -159,7 +168,7 @@ class Hall:
         trend, unit = one.trend, history.unit_of(one.machine)
         return (
             one.machine,
-            _quantity(history),
+            quantity_name(history),
             amount(trend, trend.per_month, trend.per_month_bound_95, unit),
             amount(trend, trend.change, trend.change_bound_95, unit),
             scale(trend, unit)[1],
@@ -179,15 +188,15 @@ class Hall:
         reasons: dict[tuple[str, str], list[str]] = {}
         for of in self.assessments:
             for axis, reason in of.not_assessed.items():
-                reasons.setdefault((axis, reason), []).append(_quantity(of.history))
+                reasons.setdefault((axis, reason), []).append(quantity_name(of.history))
             if of.history.undated:
                 reason = trn("{n:,} run without a date", "{n:,} runs without a date", of.history.undated)
-                reasons.setdefault(("", reason), []).append(_quantity(of.history))
+                reasons.setdefault(("", reason), []).append(quantity_name(of.history))
             if of.history.other_recipes:
                 reason = trn(
                     "{n:,} run with other settings", "{n:,} runs with other settings", of.history.other_recipes
                 )
-                reasons.setdefault(("", reason), []).append(_quantity(of.history))
+                reasons.setdefault(("", reason), []).append(quantity_name(of.history))
         rows = [(axis, listed(names), recognised(reason)) for (axis, reason), names in reasons.items()]
         rows += [(axis, tr("recording in quarantine"), reason) for axis, reason in self.quarantined]
         if not rows:
@@ -208,7 +217,3 @@ class Hall:
             limit=number(self.limit_percent, "g"),
         )
         return Section(tr("How it was assessed"), (Paragraph(words),))
-
-
-def _quantity(history: History) -> str:
-    return recognised(history.name.replace("_", " "))

@@ -6,7 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from livebode.language import listed, number, tr, trn
+from livebode.language import listed, number, recognised, tr, trn
 from livebode.report.parameters import labelled
 from livebode.report.year import Year, day
 from livebode.reporting.wording import with_bound
@@ -18,6 +18,11 @@ _MONTHS_MAX = 120
 def scale(trend: Trend, unit: str) -> tuple[float, str]:
     """Factor and unit in which changes are given: percent of the level, or the unit where percent have no meaning."""
     return (trend.relative, "%") if isfinite(trend.relative) and unit not in LOGARITHMIC else (1.0, unit)
+
+
+def quantity_name(history: History) -> str:
+    """The name of the quantity in the language in use."""
+    return recognised(history.name.replace("_", " "))
 
 
 def amount(trend: Trend, value: float, bound: float, unit: str) -> str:
@@ -116,7 +121,7 @@ def year_of(history: History, machine: str, trend: Trend) -> Year:
     if trend.slope_since_s > trend.since_s:
         slope = tr("{slope} since {day}", slope=slope, day=day(trend.slope_since_s))
     return Year(
-        title=tr("{quantity} of {machine}", quantity=history.name.replace("_", " "), machine=machine),
+        title=tr("{quantity} of {machine}", quantity=quantity_name(history), machine=machine),
         facts=f"{slope} · {about_method(trend)}",
         label=labelled(history.name, unit),
         time_s=trend.time_s,

@@ -148,10 +148,13 @@ def history(lake: Lake, quantity: str, of: Selection) -> History:
         If there is no such quantity, several have the name, no run has the recipe or a covariate, or the lake cannot
         be read.
     """
-    model, name = _resolved(lake, quantity)
-    where = _where(of) & (pc.field("name") == name) & (pc.field("model") == model)
-    found = _counted(lake, lake.read("quantities", _COLUMNS, where))
-    return _history(found, of, model, name)
+    found = lake.read("quantities", _COLUMNS, _where(of) & (pc.field("name") == quantity))
+    models = pc.unique(found["model"]).to_pylist()
+    model, name = (models[0], quantity) if len(models) == 1 else _resolved(lake, quantity)
+    if name != quantity or not models:
+        of_it = (pc.field("name") == name) & (pc.field("model") == model)
+        found = lake.read("quantities", _COLUMNS, _where(of) & of_it)
+    return _history(_counted(lake, found), of, model, name)
 
 
 def histories(lake: Lake, of: Selection) -> list[History]:
