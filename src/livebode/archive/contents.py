@@ -8,7 +8,7 @@ from typing import Any
 
 from packaging.version import Version
 
-from livebode.archive.template import LEVELS
+from livebode.configuration.machine_section import LEVELS
 from livebode.lake import Lake
 
 _COLUMNS = ["content", "recipe", *LEVELS, "recorded_from"]

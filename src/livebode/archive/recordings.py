@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from livebode.archive.template import LEVELS, Template
+from livebode.archive.template import Template
+from livebode.configuration.machine_section import LEVELS
 from livebode.core import ArchiveError
 from livebode.lake import FILES, Key, Lake
 from livebode.locations import Location, find, location
@@ -110,7 +111,7 @@ def untracked(contents: Iterable[tuple[Place, str]], recipe: str, skipped: set[t
 
 def levels_of(place: Place, machine: dict[str, str]) -> dict[str, str | None]:
     """The levels of the machine of a place, with those of `machine` where the place names none."""
-    own = dict(place.machine) or machine
+    own = machine | dict(place.machine)
     return {level: own.get(level) or None for level in LEVELS}
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from livebode.configuration.machine_section import LEVELS
 from livebode.core import ConfigError
 
-LEVELS = ("site", "line", "machine", "axis")
 _PARTS = re.compile(r"\*\*/|\*|\?|\{(\w*)\}")
 _WILD = {"**/": "(?:.*/)?", "*": "[^/]*", "?": "[^/]"}
 

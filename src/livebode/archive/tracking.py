@@ -55,7 +55,7 @@ class Job:
     @property
     def machine(self) -> dict[str, str]:
         """Levels of the machine for recordings whose place names none."""
-        return {}
+        return self.axis.machine.levels if self.axis.machine else {}
 
 
 @dataclass(frozen=True)

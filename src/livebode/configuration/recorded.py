@@ -7,10 +7,13 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from livebode.configuration.axis import FitSection, LoopSection
+from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.report_section import ReportSection
 from livebode.core import RecordError
 
-_SECTIONS: dict[str, type[BaseModel]] = {"fit": FitSection, "loop": LoopSection, "report": ReportSection}
+_SECTIONS: dict[str, type[BaseModel]] = {
+    "fit": FitSection, "loop": LoopSection, "report": ReportSection, "machine": MachineSection,
+}  # fmt: skip
 
 
 def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:
@@ -24,7 +27,7 @@ def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:
     RecordError
         If a section that is used again is not in the form that a run writes.
     """
-    found = dict(_kept(summary.get("configuration", {})))
+    found = dict(without_null(summary.get("configuration", {})))
     for name, section in _SECTIONS.items():
         try:
             section.model_validate(found.get(name, {}))
@@ -40,6 +43,19 @@ def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _kept(values: dict[str, Any]) -> dict[str, Any]:
+def recorded_report(summary: dict[str, Any]) -> ReportSection:
+    """The [report] with which a run was recorded; where it names no machine, with the path of [machine].
+
+    >>> recorded_report({"configuration": {"machine": {"line": "2", "machine": "press"}}}).machine
+    '2/press'
+    """
+    configuration = recorded_configuration(summary)
+    report = ReportSection.model_validate(configuration.get("report", {}))
+    path = MachineSection.model_validate(configuration.get("machine", {})).path
+    return report if report.machine else report.over({"machine": path})
+
+
+def without_null(values: dict[str, Any]) -> dict[str, Any]:
+    """The values that are not null, also in inner tables."""
     kept = {name: value for name, value in values.items() if value is not None}
-    return {name: _kept(value) if isinstance(value, dict) else value for name, value in kept.items()}
+    return {name: without_null(value) if isinstance(value, dict) else value for name, value in kept.items()}

@@ -15,6 +15,7 @@ from livebode.analysis.averaged import Averaged, averaged
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import loop_report
 from livebode.configuration.axis import Axis, FitSection, LoopSection
+from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Event, Lines, LivebodeError, Loop, PlotKind, Response, Responses, counted, plot_responses
 from livebode.core.clock import moment, moments_by
@@ -71,6 +72,11 @@ class Run:
         self.summary: Mapping[str, Any] = self._record.summary
         self.lines: Lines = self._record.lines
         self.finished = self._record.finished
+
+    @property
+    def machine(self) -> str:
+        """The machine as a path, such as "Graz/line 2/press 4/X", from [machine]; empty without one."""
+        return MachineSection(**self.summary.get("machine", {})).path
 
     @cached_property
     def responses(self) -> Responses:

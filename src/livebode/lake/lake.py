@@ -62,8 +62,8 @@ class Lake:
         ArchiveError
             If the table cannot be read.
         """
-        with self._reported(name):
-            table = self._opened(name)
+        with self.reported(name):
+            table = self.opened(name)
             if table is None:
                 empty = TABLES[name].schema.empty_table()
                 return empty.select(columns) if columns else empty
@@ -77,12 +77,12 @@ class Lake:
 
     def keys(self, name: str) -> set[Row]:
         """The keys of the rows of a table."""
-        with self._reported(name):
-            return self._keys(name, self._opened(name))
+        with self.reported(name):
+            return self._keys(name, self.opened(name))
 
     def add_rows(self, name: str, rows: pa.Table) -> int:
         """Append the rows whose key is not in the table, and return their number."""
-        with self._reported(name):
+        with self.reported(name):
             while True:
                 table = self._created(name)
                 present, own = self._keys(name, table), _rows_of(rows, TABLES[name].key)
@@ -100,7 +100,7 @@ class Lake:
         Adding a file twice has no effect. A file whose rows were joined with others by `compact` belongs to a result
         in `runs`.
         """
-        with self._reported(name):
+        with self.reported(name):
             while files:
                 table = self._created(name)
                 counted = self.keys("runs")
@@ -118,7 +118,7 @@ class Lake:
         """
         target = self._place / table / path.name
         if isinstance(target, Path):
-            with self._reported(table):
+            with self.reported(table):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 with whole_file(target) as partial:
                     shutil.copyfile(path, partial)
@@ -165,7 +165,7 @@ class Lake:
             self._known[name] = (table.version(), found)
         return found
 
-    def _opened(self, name: str) -> DeltaTable | None:
+    def opened(self, name: str) -> DeltaTable | None:
         """The table at its newest version; None if it does not exist."""
         try:
             if name in self._tables:
@@ -177,7 +177,7 @@ class Lake:
         return self._tables[name]
 
     def _created(self, name: str) -> DeltaTable:
-        if (table := self._opened(name)) is not None:
+        if (table := self.opened(name)) is not None:
             return table
         with suppress(CommitFailedError):  # another process has created it in the same moment
             DeltaTable.create(
@@ -194,7 +194,8 @@ class Lake:
         return str(place) if isinstance(place, Path) else place.address
 
     @contextmanager
-    def _reported(self, name: str) -> Iterator[None]:
+    def reported(self, name: str) -> Iterator[None]:
+        """Within, an error of a table is an ArchiveError that names it."""
         try:
             yield
         except (DeltaError, OSError) as error:

@@ -18,6 +18,7 @@ from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition, stream_position
 from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.provenance import provenance
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
 from livebode.sources.live import LiveSource, make_source
@@ -103,6 +104,7 @@ class _Succession:
             # Most keys of a source apply to other kinds of source.
             "configuration": axis.model_dump(mode="json", exclude={"serve", "source"}, by_alias=True)
             | {"source": axis.source.model_dump(mode="json", exclude_defaults=True, by_alias=True)},
+            **provenance(axis),
             "found": {"format": self._source.format, "rate_from": "the sender", "clock": "relative"},
         }
         return RunLoop(

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import nan
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -27,6 +28,7 @@ from livebode.runtime.documents import Channels, ClockSet, FitResults, RunEnded,
 from livebode.runtime.drift_event import drift_events
 from livebode.runtime.live_checks import LiveChecks
 from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.provenance import recorded_live
 from livebode.runtime.recorder import Recorder
 from livebode.runtime.run_control import RunControl, StoppedError
 from livebode.runtime.run_counts import RunCounts
@@ -91,6 +93,8 @@ class RunLoop:
         Events on the whole recording, found before tracking.
     relation
         The clock of a live source while it is open.
+    recorded
+        Gives the date of a recording, as in run.json, from the time after its last sample.
     delivery
         Arguments for the source's `blocks`.
     """
@@ -110,6 +114,7 @@ class RunLoop:
         previous: PreviousRun | None = None,
         noticed: Sequence[Event] = (),
         relation: ClockRelation | None = None,
+        recorded: Callable[[float], dict[str, Any]] | None = None,
         **delivery: Any,
     ) -> None:
         _keep_freed_memory()
@@ -134,7 +139,7 @@ class RunLoop:
         self._done: dict[str, Any] = {}
         self._found_on_the_way: dict[str, Any] = {}
         self._newest: Fit | None = None
-        self._relation = relation or ClockRelation()
+        self._relation, self._recorded = relation or ClockRelation(), recorded
         self._origin_s = 0.0
         self._stepped_s = time.monotonic()
         self._events: list[Event] = []  # found in this Block, published after its responses
@@ -320,7 +325,14 @@ class RunLoop:
         """Publish the clock of a live run."""
         pieces = self._relation.clock.pieces
         self._stream.announce(ClockSet(tuple(pieces)))
-        self._renew(clock=list(pieces))
+        self._renew(clock=list(pieces), recorded=self._date(None))
+
+    def _date(self, to_s: float | None) -> dict[str, Any]:
+        """Date of a live run, up to the time after its last sample; None while it runs."""
+        clock, previous = self._relation.clock, self._previous
+        from_s = previous.time_s if previous is not None else clock.pieces[0][0] if clock.pieces else nan
+        date = recorded_live(clock, from_s, to_s)
+        return date | ({"from": self._recorder.begun} if self._recorder.begun else {})
 
     def _renew(self, **found: Any) -> None:
         """Write findings during the run to run.json, now and at the end."""
@@ -370,6 +382,10 @@ class RunLoop:
             self._stream.publish_all(between_events(self._done["between"], *self.position))
         self._stream.finish_groups()
         self._done |= self._found_on_the_way
+        if self._live:
+            self._done["recorded"] = self._date(self.position[1])
+        elif self._recorded is not None:
+            self._done["recorded"] = self._recorded(self.position[1])
         if continued_in is not None:
             self._done["continued_in"] = continued_in
 

@@ -20,6 +20,7 @@ class WholeRecord:
 
     continues = False
     clock = ()
+    begun = None
 
     def __init__(self, path: Path, *, force: bool, responses: bool = True) -> None:
         self.path = path

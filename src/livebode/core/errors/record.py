@@ -41,6 +41,7 @@ class RecordError(LivebodeError):
         "not-removable": "The run cannot be removed.",
         "not-tracked": "The run does not name the channels that are needed.",
         "not-written": "The system refuses to write the run.",
+        "states-differ": "The unfinished run has the states of another version of livebode.",
         "too-large": "A file of the run is larger than a run writes it.",
         "unexpected-content": "A file of the run is whole, but contains what a run does not write.",
         "unreadable": "The system or a library cannot read a file of the run.",
