@@ -20,8 +20,8 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.lake import TABLES, Lake
+from livebode.simulation.machine_year import MachineYear
 from livebode.trending import Selection, assess, histories, history
-from studies.archive_trends import Year
 
 RUNS, MACHINES, QUANTITIES = 10_000, 50, 8
 LIMIT_S = 2.0
@@ -32,7 +32,7 @@ def written(path: Path, commits: int) -> Lake:
     lake, each = Lake(str(path)), RUNS // MACHINES
     rows, runs = [], []
     for machine in range(MACHINES):
-        time_s, value, bound, covariates = Year(runs=each).measured(machine)
+        time_s, value, bound, covariates = MachineYear(runs=each).measured(machine)
         for i in range(each):
             own = {"content": sha256(f"{machine} {i}".encode()).hexdigest(), "recipe": "a" * 16, "site": "A"}
             own |= {"line": f"L{machine % 5}", "machine": f"M{machine:02}", "axis": "x"}

@@ -13,58 +13,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.simulation.machine_year import START_S, MachineYear
 from livebode.trending import FALSE_DISCOVERIES, MONTH_S, NotAssessed, Trend, discoveries, trend_of
 
-Floats = NDArray[np.float64]
 
-START_S = 1_735_689_600.0  # 2025-01-01
-LEVEL = 100.0  # so that the quantity is in percent
-MEAN_C = 25.0
-
-
-@dataclass(frozen=True)
-class Year:
-    """Runs of a machine: percent of change, °C, and the correlation of the scatter from run to run."""
-
-    runs: int = 200
-    months: float = 12.0
-    scatter: float = 0.3
-    correlation: float = 0.0
-    per_month: float = 0.0
-    jump: float = 0.0
-    bend: float = 0.0
-    change_month: float = 7.0
-    per_kelvin: float = 0.1
-    swing_kelvin: float = 10.0
-    outliers: float = 0.03
-    bound_95: float = 0.2
-
-    def measured(self, seed: int) -> tuple[Floats, Floats, Floats, dict[str, Floats]]:
-        """Times in s, values, bounds and covariates, as `trend_of` takes them."""
-        rng = np.random.default_rng(seed)
-        month = np.sort(rng.uniform(0, self.months, self.runs))
-        own = rng.standard_normal(self.runs)
-        scatter = np.empty(self.runs)
-        before = rng.standard_normal()
-        for i, new in enumerate(own):
-            before = scatter[i] = self.correlation * before + np.sqrt(1 - self.correlation**2) * new
-        season = np.sin(2 * np.pi * (month / 12 + rng.uniform()))
-        kelvin = self.swing_kelvin * season + 0.2 * self.swing_kelvin * rng.standard_normal(self.runs)
-        error = self.bound_95 / 2 * rng.standard_normal(self.runs)
-        after = month - self.change_month
-        value = LEVEL + self.scatter * scatter + self.per_kelvin * kelvin + error + self.per_month * month
-        value += self.jump * (after >= 0) + self.bend * np.maximum(after, 0)
-        off = rng.random(self.runs) < self.outliers
-        value[off] += rng.uniform(-5, 5, int(off.sum()))
-        return START_S + month * MONTH_S, value, np.full(self.runs, self.bound_95), {"temperature": MEAN_C + kelvin}
-
-    def trend(self, seed: int) -> Trend:
-        found = trend_of(*self.measured(seed))
-        if isinstance(found, NotAssessed):
-            raise ValueError(found.reason)
-        return found
+def trend(year: MachineYear, seed: int) -> Trend:
+    """The trend of one machine."""
+    found = trend_of(*year.measured(seed))
+    if isinstance(found, NotAssessed):
+        raise ValueError(found.reason)
+    return found
 
 
 @dataclass(frozen=True)
@@ -90,8 +49,8 @@ class Tally:
     bound: float
 
     @classmethod
-    def of(cls, year: Year, seeds: Iterable[int]) -> Tally:
-        trends = [year.trend(seed) for seed in seeds]
+    def of(cls, year: MachineYear, seeds: Iterable[int]) -> Tally:
+        trends = [trend(year, seed) for seed in seeds]
         slope = year.per_month + year.bend
         kinds = ["jump"] * bool(year.jump) + ["bend"] * bool(year.bend)
         rows = [
@@ -109,33 +68,33 @@ class Tally:
         return cls(*(float(share.mean()) for share in shares), float(np.median(bounds)))
 
 
-def true_change(year: Year, trend: Trend) -> float:
+def true_change(year: MachineYear, trend: Trend) -> float:
     first, last = ((at - START_S) / MONTH_S for at in (trend.since_s, trend.until_s))
     return year.per_month * (last - first) + year.jump + year.bend * (last - year.change_month)
 
 
-def false_share(seed: int, healthy: int, bad: int, year: Year, **fault: float) -> tuple[float, float]:
+def false_share(seed: int, healthy: int, bad: int, year: MachineYear, **fault: float) -> tuple[float, float]:
     """Share of healthy machines among the discoveries, and share of the bad ones that are discovered."""
-    machines = [year] * healthy + [Year(**{**vars(year), **fault})] * bad
-    found = np.array(discoveries([one.trend(seed * 100_000 + i).p for i, one in enumerate(machines)]))
+    machines = [year] * healthy + [MachineYear(**{**vars(year), **fault})] * bad
+    found = np.array(discoveries([trend(one, seed * 100_000 + i).p for i, one in enumerate(machines)]))
     return float(found[:healthy].sum() / max(found.sum(), 1)), float(found[healthy:].mean())
 
 
-KINDS: dict[str, Year] = {
-    "healthy": Year(),
-    "−0.1 % a month": Year(per_month=-0.1),
-    "−0.1 %, correlation 0.3": Year(per_month=-0.1, correlation=0.3),
-    "−0.1 %, correlation 0.6": Year(per_month=-0.1, correlation=0.6),
-    "−0.1 %, correlation 0.9": Year(per_month=-0.1, correlation=0.9),
-    "−0.1 %, 50 runs": Year(per_month=-0.1, runs=50),
-    "−0.1 %, 20 runs": Year(per_month=-0.1, runs=20),
-    "−0.1 %, 1,000 runs": Year(per_month=-0.1, runs=1000),
-    "−0.1 %, 10 % outliers": Year(per_month=-0.1, outliers=0.1),
-    "−0.1 %, 3 years": Year(per_month=-0.1, months=36.0, runs=600),
-    "jump of −1 %": Year(jump=-1.0),
-    "jump of −3 %": Year(jump=-3.0),
-    "−0.3 % a month from month 7": Year(bend=-0.3),
-    "−0.8 % a month from month 7": Year(bend=-0.8),
+KINDS: dict[str, MachineYear] = {
+    "healthy": MachineYear(),
+    "−0.1 % a month": MachineYear(per_month=-0.1),
+    "−0.1 %, correlation 0.3": MachineYear(per_month=-0.1, correlation=0.3),
+    "−0.1 %, correlation 0.6": MachineYear(per_month=-0.1, correlation=0.6),
+    "−0.1 %, correlation 0.9": MachineYear(per_month=-0.1, correlation=0.9),
+    "−0.1 %, 50 runs": MachineYear(per_month=-0.1, runs=50),
+    "−0.1 %, 20 runs": MachineYear(per_month=-0.1, runs=20),
+    "−0.1 %, 1,000 runs": MachineYear(per_month=-0.1, runs=1000),
+    "−0.1 %, 10 % outliers": MachineYear(per_month=-0.1, outliers=0.1),
+    "−0.1 %, 3 years": MachineYear(per_month=-0.1, months=36.0, runs=600),
+    "jump of −1 %": MachineYear(jump=-1.0),
+    "jump of −3 %": MachineYear(jump=-3.0),
+    "−0.3 % a month from month 7": MachineYear(bend=-0.3),
+    "−0.8 % a month from month 7": MachineYear(bend=-0.8),
 }
 
 
@@ -156,7 +115,7 @@ def main() -> None:
     )
     for name, fault in (("−0.1 % a month", {"per_month": -0.1}), ("jump of −1 %", {"jump": -1.0})):
         for correlation in (0.0, 0.3, 0.6):
-            year = Year(correlation=correlation)
+            year = MachineYear(correlation=correlation)
             rows = [false_share(seed, 1000, 50, year, **fault) for seed in range(options.fleets)]
             share, power = np.mean(rows, axis=0)
             print(f"{name:20} correlation {correlation:g}: {share:6.1%} {power:7.1%}", flush=True)

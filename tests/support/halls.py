@@ -11,10 +11,10 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.lake import TABLES, Lake
-from studies.archive_trends import Year
+from livebode.simulation.machine_year import MachineYear
 
 
-def hall(path: Path, machines: Mapping[str, Year], **columns: Any) -> Lake:
+def hall(path: Path, machines: Mapping[str, MachineYear], **columns: Any) -> Lake:
     """A lake with these machines, by site/line/machine/axis, each with the quantity Keff in percent."""
     lake = Lake(str(path))
     for number, (machine, year) in enumerate(machines.items()):
@@ -22,14 +22,14 @@ def hall(path: Path, machines: Mapping[str, Year], **columns: Any) -> Lake:
     return lake
 
 
-def add(lake: Lake, machine: str, year: Year, seed: int, **columns: Any) -> None:
+def add(lake: Lake, machine: str, year: MachineYear, seed: int, **columns: Any) -> None:
     """Add the runs of a machine; `columns` replace those of its rows."""
     quantities = rows(machine, year, seed) if not columns else [row | columns for row in rows(machine, year, seed)]
     lake.add_rows("quantities", pa.Table.from_pylist(quantities, TABLES["quantities"].schema))
     lake.add_rows("runs", pa.Table.from_pylist([own(row) for row in quantities], TABLES["runs"].schema))
 
 
-def rows(machine: str, year: Year, seed: int) -> list[dict[str, Any]]:
+def rows(machine: str, year: MachineYear, seed: int) -> list[dict[str, Any]]:
     """The rows of the table of quantities."""
     time_s, value, bound, covariates = year.measured(seed)
     levels = dict(zip(("site", "line", "machine", "axis"), machine.split("/"))) if machine else {}

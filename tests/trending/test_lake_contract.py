@@ -11,24 +11,24 @@ import pytest
 
 from livebode import ArchiveError
 from livebode.lake import TABLES, Lake
+from livebode.simulation.machine_year import START_S, MachineYear
 from livebode.trending import Selection, assess, histories, history
-from studies.archive_trends import START_S, Year
 from tests.support.halls import add, hall, rows
 
-SHORT = Year(runs=30)
+SHORT = MachineYear(runs=30)
 
 
 @pytest.fixture(scope="module")
 def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
     return hall(
         tmp_path_factory.mktemp("hall") / "lake",
-        {"A/L1/M1/x": Year(per_month=-0.3), "A/L1/M1/y": SHORT, "A/L1/M2/x": SHORT, "A/L2/M3": SHORT, "": SHORT},
+        {"A/L1/M1/x": MachineYear(per_month=-0.3), "A/L1/M1/y": SHORT, "A/L1/M2/x": SHORT, "A/L2/M3": SHORT, "": SHORT},
     )
 
 
 def test_the_arrays_are_those_that_were_written(lake: Lake) -> None:
     found = history(lake, "Keff", Selection(by="axis"))
-    time_s, value, bound, covariates = Year(per_month=-0.3).measured(0)
+    time_s, value, bound, covariates = MachineYear(per_month=-0.3).measured(0)
     own = found.machines["A/L1/M1/x"]
     np.testing.assert_allclose(own.time_s, time_s, atol=1e-6)
     np.testing.assert_array_equal(own.value, value)
@@ -55,8 +55,8 @@ def test_levels_join_the_axes_below_them(lake: Lake, by: str, names: list[str]) 
 
 
 def test_axes_of_a_machine_have_one_trend_in_percent_of_each(tmp_path: Path) -> None:
-    lake = hall(tmp_path / "lake", {"M/x": Year(per_month=-0.3)})
-    add(lake, "M/y", Year(per_month=-0.3), 1, unit="N/m")
+    lake = hall(tmp_path / "lake", {"M/x": MachineYear(per_month=-0.3)})
+    add(lake, "M/y", MachineYear(per_month=-0.3), 1, unit="N/m")
     found = history(lake, "Keff", Selection(by="site"))
     (of,) = assess([found])
     (one,) = of.ranked
@@ -73,7 +73,7 @@ def test_a_span_a_place_and_a_covariate_are_selected(lake: Lake) -> None:
         assert since.timestamp() <= machine.time_s[0] <= machine.time_s[-1] < until.timestamp()
     assert found.runs == sum(
         int(((t := year.measured(seed)[0]) >= since.timestamp()).sum() - (t >= until.timestamp()).sum())
-        for seed, year in enumerate((Year(per_month=-0.3), SHORT))
+        for seed, year in enumerate((MachineYear(per_month=-0.3), SHORT))
     )
     assert list(history(lake, "Keff", Selection(below="A/L1/M")).machines) == []  # a name is not a prefix
 
@@ -106,8 +106,8 @@ def test_a_name_of_two_models_needs_the_model(tmp_path: Path) -> None:
 
 def test_runs_without_a_date_or_with_other_settings_or_without_their_row_are_left_out(tmp_path: Path) -> None:
     lake = hall(tmp_path / "lake", {"M/a": SHORT})
-    add(lake, "M/b", Year(runs=3), 1, recorded_from=None)
-    add(lake, "M/c", Year(runs=4), 2, recipe="b" * 16)
+    add(lake, "M/b", MachineYear(runs=3), 1, recorded_from=None)
+    add(lake, "M/c", MachineYear(runs=4), 2, recipe="b" * 16)
     half = rows("M/d", SHORT, 3)  # a coordinator was killed before the rows of `runs`
     lake.add_rows("quantities", pa.Table.from_pylist(half, TABLES["quantities"].schema))
     found = history(lake, "Keff", Selection())
@@ -116,7 +116,7 @@ def test_runs_without_a_date_or_with_other_settings_or_without_their_row_are_lef
 
 
 def test_a_machine_that_stopped_sending_is_reported(tmp_path: Path) -> None:
-    lake = hall(tmp_path / "lake", {"M/a": Year(), "M/b": Year(months=10.0), "M/c": Year(runs=5)})
+    lake = hall(tmp_path / "lake", {"M/a": MachineYear(), "M/b": MachineYear(months=10.0), "M/c": MachineYear(runs=5)})
     (of,) = assess(histories(lake, Selection()))
     assert {one.machine for one in of.ranked} == {"M/a", "M/b"}
     assert "M/b" in of.silent

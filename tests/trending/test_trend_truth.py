@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.simulation.machine_year import LEVEL, START_S, MachineYear
 from livebode.trending import MONTH_S, NotAssessed, Ranked, Trend, discoveries, months_to_limit, trend_of, urgency
-from studies.archive_trends import LEVEL, START_S, Tally, Year, false_share
-
-MACHINES = 200
 
 
-def trend(year: Year, seed: int = 1, **replaced: object) -> Trend:
+def trend(year: MachineYear, seed: int = 1, **replaced: object) -> Trend:
     time_s, value, bound, covariates = year.measured(seed)
     given = {"time_s": time_s, "value": value, "bound_95": bound, "covariates": covariates} | replaced
     found = trend_of(**given)  # type: ignore[arg-type]
@@ -21,43 +19,9 @@ def trend(year: Year, seed: int = 1, **replaced: object) -> Trend:
     return found
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.5])
-def test_a_tenth_of_a_percent_a_month_is_found_and_the_bound_covers(correlation: float) -> None:
-    """200 runs over a year, 0.3 % scatter, ±1 % by temperature, 3 % outliers of up to 5 %."""
-    of = Tally.of(Year(per_month=-0.1, correlation=correlation), range(MACHINES))
-    print(of)
-    # A bound that covers 95 % covers fewer than 91 % of 200 in one case of 150.
-    assert of.covered >= 0.91
-    assert of.change_covered >= 0.91
-    assert of.found >= 0.99
-    assert of.bound < 0.04
-
-
-def test_a_healthy_machine_has_no_trend_and_no_change() -> None:
-    of = Tally.of(Year(correlation=0.3), range(1000, 1000 + MACHINES))
-    assert of.covered >= 0.9
-    assert of.found <= 0.03  # more than six of 200 below 1 % are by chance in one case of 200
-    assert of.named >= 0.97
-
-
-@pytest.mark.parametrize("year", [Year(jump=-1.0, correlation=0.3), Year(bend=-0.8)], ids=["jump", "bend"])
-def test_a_change_is_named_and_dated_and_the_slope_after_it_is_covered(year: Year) -> None:
-    of = Tally.of(year, range(25))
-    assert of.named >= 0.88
-    assert of.covered >= 0.8
-    assert of.found == 1.0
-
-
-def test_false_discoveries_of_a_fleet_are_at_most_five_percent() -> None:
-    # Fewer runs than in the study: one fleet of 210 instead of twenty of 1,050.
-    share, power = false_share(3, 200, 10, Year(runs=60, correlation=0.3), per_month=-0.3)
-    assert share <= 0.17  # two false ones beside ten; expected is half a machine
-    assert power == 1.0
-
-
 def test_the_temperature_explains_what_would_be_a_trend() -> None:
     """Half a year from winter to summer; without its temperature the machine seems to change."""
-    year = Year(months=6.0, per_kelvin=0.2, runs=120)
+    year = MachineYear(months=6.0, per_kelvin=0.2, runs=120)
     with_it, without = trend(year, 4), trend(year, 4, covariates={})
     assert abs(with_it.per_month) <= with_it.per_month_bound_95
     assert with_it.p > 0.05 > without.p
@@ -66,22 +30,22 @@ def test_the_temperature_explains_what_would_be_a_trend() -> None:
 
 
 def test_a_season_is_part_of_the_regression_from_a_year_and_a_half() -> None:
-    year = Year(months=30.0, runs=400, per_month=-0.1)
+    year = MachineYear(months=30.0, runs=400, per_month=-0.1)
     found = trend(year, 5, covariates={})
     assert abs(found.per_month + 0.1) <= found.per_month_bound_95 < 0.02
     assert not found.changes
 
 
 def test_a_covariate_that_goes_with_the_time_is_reported_and_widens_the_bound() -> None:
-    time_s = Year().measured(6)[0]
+    time_s = MachineYear().measured(6)[0]
     rising = {"temperature": 20 + (time_s - START_S) / MONTH_S + np.random.default_rng(6).normal(0, 0.2, len(time_s))}
-    found, free = trend(Year(), 6, covariates=rising), trend(Year(), 6, covariates={})
+    found, free = trend(MachineYear(), 6, covariates=rising), trend(MachineYear(), 6, covariates={})
     assert found.per_month_bound_95 > 5 * free.per_month_bound_95
     assert found.remarks == ("temperature changes with the time, so the bound of the trend is wide",)
 
 
 def test_a_failed_sensor_does_not_move_the_trend() -> None:
-    year = Year(per_month=-0.1)
+    year = MachineYear(per_month=-0.1)
     covariates = year.measured(7)[3]
     broken = covariates["temperature"].copy()
     broken[::20] = -9999.0
@@ -96,7 +60,7 @@ def test_a_failed_sensor_does_not_move_the_trend() -> None:
     [(0, 12.0, "0 runs"), (19, 12.0, "19 runs"), (60, 0.5, "days")],
 )
 def test_too_few_runs_and_too_short_a_time_are_not_assessed(runs: int, months: float, words: str) -> None:
-    year = Year(runs=max(runs, 1), months=months)
+    year = MachineYear(runs=max(runs, 1), months=months)
     time_s, value, bound, covariates = (part if isinstance(part, dict) else part[:runs] for part in year.measured(8))
     found = trend_of(time_s, value, bound, {"temperature": covariates["temperature"][:runs]})  # type: ignore[index,arg-type,call-overload]
     assert isinstance(found, NotAssessed)
@@ -104,7 +68,7 @@ def test_too_few_runs_and_too_short_a_time_are_not_assessed(runs: int, months: f
 
 
 def test_axes_of_one_machine_share_a_trend_but_not_a_level() -> None:
-    year = Year(per_month=-0.3)
+    year = MachineYear(per_month=-0.3)
     value = year.measured(9)[1]
     member = np.arange(len(value)) % 2
     value = np.where(member == 1, value + 40, value)
@@ -113,7 +77,7 @@ def test_axes_of_one_machine_share_a_trend_but_not_a_level() -> None:
 
 
 def test_the_order_of_the_rows_does_not_matter() -> None:
-    year = Year(jump=-2.0)
+    year = MachineYear(jump=-2.0)
     time_s, value, bound, covariates = year.measured(10)
     shuffled = np.random.default_rng(0).permutation(len(value))
     one = trend(year, 10)
@@ -128,7 +92,7 @@ def test_the_order_of_the_rows_does_not_matter() -> None:
 @settings(max_examples=6)
 @given(scale=st.floats(1e-3, 1e9), seed=st.integers(0, 20))
 def test_the_unit_does_not_matter(scale: float, seed: int) -> None:
-    year = Year(runs=60, jump=-2.0)
+    year = MachineYear(runs=60, jump=-2.0)
     _, value, bound, _ = year.measured(seed)
     one, other = trend(year, seed), trend(year, seed, value=scale * value, bound_95=scale * bound)
     assert [c.kind for c in other.changes] == [c.kind for c in one.changes]
@@ -138,9 +102,12 @@ def test_the_unit_does_not_matter(scale: float, seed: int) -> None:
 
 def test_the_ranking_has_the_machine_that_reaches_its_limit_first_at_the_top() -> None:
     machines = {
-        "healthy": Year(), "slow": Year(per_month=-0.2), "fast": Year(per_month=-0.5), "jumped": Year(jump=-12.0),
-        "jumped a little": Year(jump=-2.0),
-    }  # fmt: skip
+        "healthy": MachineYear(),
+        "slow": MachineYear(per_month=-0.2),
+        "fast": MachineYear(per_month=-0.5),
+        "jumped": MachineYear(jump=-12.0),
+        "jumped a little": MachineYear(jump=-2.0),
+    }
     trends = {name: trend(year, seed) for seed, (name, year) in enumerate(machines.items())}
     found = zip(trends.items(), discoveries([one.p for one in trends.values()]))
     ranked = sorted((Ranked(*item, own, months_to_limit(item[1], 10.0)) for item, own in found), key=urgency)

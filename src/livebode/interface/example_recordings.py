@@ -22,7 +22,7 @@ from livebode.core import Block, Lines, OutputError
 from livebode.core.files import whole_directory, whole_files
 from livebode.core.writing import writing
 from livebode.excitation import chirp, multisine
-from livebode.interface.example_hall import write_hall
+from livebode.interface._example_hall import write_hall
 from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Standstill, Strokes, TensionLoss
 
 _RATE_HZ, _WINDOW = 4000.0, 400
