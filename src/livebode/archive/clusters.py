@@ -31,6 +31,8 @@ _SETTINGS = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
+    # With a pool of its own, Arrow could not use what NumPy has freed.
+    "distributed.nanny.pre-spawn-environ.ARROW_DEFAULT_MEMORY_POOL": "system",
     # Events of the scheduler, which nobody reads, grow with the number of tasks.
     "distributed.admin.low-level-log-length": 100,
 }

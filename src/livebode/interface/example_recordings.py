@@ -112,6 +112,16 @@ EXAMPLES = {
             "livebode validate runs/standstill --on standstill-2.csv",
         ),
     ),
+    "archive": Example(
+        "three recordings as an archive, one of which is of another kind",
+        {"standstill.csv": _standstill(1), "standstill-2.csv": _standstill(2), "chirp.csv": _single_chirp},
+        ("archive.toml", "archive-recipe.toml"),
+        (
+            "livebode archive run archive.toml",
+            "livebode archive list archive.toml",
+            "livebode archive list archive.toml --quarantined",
+        ),
+    ),
     "moving": Example(
         "an axis that moves, with the position as schedule",
         {"moving.parquet": _moving(3, 8.2)},
