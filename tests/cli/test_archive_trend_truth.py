@@ -105,3 +105,22 @@ def test_a_hall_without_enough_runs_has_a_report_that_says_so(hall: Path, tmp_pa
     page = (tmp_path / "few.html").read_text("utf-8")
     assert "No axis has enough runs for a trend." in page
     assert "<svg" not in page
+
+
+def test_two_spans_of_an_axis_differ_by_its_fault_and_in_nothing_else(hall: Path) -> None:
+    found = json.loads(livebode("archive", "compare", hall, "A/L1/M2/x", "--split", "2025-06-15", "--json").out)
+    one = {each["name"]: each for each in found["differences"]}
+    assert {name for name, each in one.items() if each["significant"]} == {"Keff", "gain_margin"}
+    assert (
+        abs(one["Keff"]["amount"] / one["Keff"]["first"] + 0.06)
+        <= 1.05 * one["Keff"]["bound_95"] / one["Keff"]["first"]
+    )
+
+
+def test_two_healthy_axes_do_not_differ(hall: Path) -> None:
+    shown = livebode("archive", "compare", hall, "A/L1/M1/x", "A/L2/M2/x").out
+    assert "*" not in shown
+    assert "160 / 160" in shown
+    refused = livebode("archive", "compare", hall, "A/L1/M1/x", "A/L2/M2/z")
+    assert (refused.code, "did you mean 'A/L2/M2/" in refused.err) == (2, True)
+    assert livebode("archive", "compare", hall, "A/L1/M1/x").code == 2

@@ -55,18 +55,19 @@ def selection(
 
     from livebode.trending import Selection
 
-    last = _day(until, "--until")
+    last = day(until, "--until")
     return Selection(
         by.value,
         below.strip("/"),
-        _day(since, "--since"),
+        day(since, "--since"),
         last and last + timedelta(days=1),
         covariates or None,
         recipe,
     )
 
 
-def _day(text: str | None, option: str) -> datetime | None:
+def day(text: str | None, option: str) -> datetime | None:
+    """The begin of a day in UTC; UsageError if it is not a date."""
     if text is None:
         return None
     try:
