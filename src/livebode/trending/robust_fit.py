@@ -37,6 +37,8 @@ class RobustFit:
         Of the scatter of neighbours; increased by its own standard error and by the bias of an estimate from residuals.
     freedom
         Degrees of freedom of `scatter`, reduced by the correlation.
+    covariance
+        Of the coefficients' errors, (terms, terms).
     """
 
     coefficients: Floats
@@ -45,14 +47,12 @@ class RobustFit:
     scatter: float
     correlation: float
     freedom: float
-    _q: Floats
-    _to_q: Floats
-    _variance: float
+    covariance: Floats
 
     def error(self, contrasts: Floats) -> Floats:
         """Standard error of each combination of the coefficients, (combinations, terms) in."""
-        along = np.atleast_2d(contrasts) @ self._to_q @ self._q.T
-        return np.sqrt(self._variance * _correlated_sum(along, self.correlation))
+        rows = np.atleast_2d(contrasts)
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", rows @ self.covariance, rows)))
 
     def bound_95(self, contrasts: Floats) -> Floats:
         """95 % bound of each combination."""
@@ -106,10 +106,12 @@ def robust_fit(terms: Floats, value: Floats, sigma: Floats) -> RobustFit:
     left = y - q @ at
     influence = _influence(left, weight, scale)
     phi = _correlation(influence, count)
-    variance = float(influence @ influence) / max(rows - float(_correlated_sum(q.T, phi).sum()), 1.0)
+    among = _correlated_products(q, phi)
+    variance = float(influence @ influence) / max(rows - float(among.trace()), 1.0)
     freedom = max((rows - count) * (1 - phi) / (1 + phi), 2.0)
     to_q = solve_triangular(r, np.eye(count), lower=False)
-    return RobustFit(to_q @ at, left * own, weight, sqrt(variance), phi, freedom, q, to_q, variance)
+    covariance = variance * to_q @ among @ to_q.T
+    return RobustFit(to_q @ at, left * own, weight, sqrt(variance), phi, freedom, covariance)
 
 
 def _own_errors(terms: Floats, value: Floats, sigma: Floats) -> Floats:
@@ -172,16 +174,14 @@ def _correlation(influence: Floats, count: int) -> float:
     return min(max(phi, 0.0), _CORRELATION_MAX)
 
 
-def _correlated_sum(along: Floats, phi: float) -> Floats:
-    """Variance of Σ aᵢeᵢ for each row of `along`, where e has variance 1 and correlation φ^|i−j|."""
-    total = np.einsum("ij,ij->i", along, along)
+def _correlated_products(q: Floats, phi: float) -> Floats:
+    """QᵀRQ, where the correlation of rows i and j is R_ij = φ^|i−j|; the sum over j < i is a filter of first order."""
     if phi == 0:
-        return np.asarray(total)
-    # The sum over j < i of φ^(i−j)·a_j is a filter of first order.
+        return np.asarray(q.T @ q)
     from scipy.signal import lfilter
 
-    before = lfilter([0.0, phi], [1.0, -phi], along, axis=1)
-    return np.asarray(total + 2 * np.einsum("ij,ij->i", along, before))
+    before = q.T @ lfilter([0.0, phi], [1.0, -phi], q, axis=0)
+    return np.asarray(q.T @ q + before + before.T)
 
 
 def rank_of(terms: Floats) -> int:
