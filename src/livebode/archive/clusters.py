@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -42,7 +43,9 @@ class QuietWorker(WorkerPlugin):  # type: ignore[misc]
     """Ctrl-C is for the coordinator, and what a damaged file lets a library print is not for the terminal."""
 
     def setup(self, worker: Any) -> None:  # noqa: ARG002
-        """Apply it to a worker's process."""
+        """Apply it to a worker's process; nothing to a worker in another program, which is a thread there."""
+        if threading.current_thread() is not threading.main_thread():
+            return
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         warnings.simplefilter("ignore")
         logging.disable(logging.CRITICAL)
@@ -87,7 +90,7 @@ def started(section: ClusterSection) -> Iterator[Cluster]:
             security = Security() if section.encrypted else None
             client = stack.enter_context(Client(target, security=security, timeout=_CONNECT_S, set_as_default=False))
             client.register_plugin(QuietWorker())
-            client.wait_for_workers(1, timeout=None if section.kind in ("slurm", "kubernetes") else _CONNECT_S)
+            client.wait_for_workers(1, timeout=None if section.kind == "slurm" else _CONNECT_S)
         except (OSError, TimeoutError) as error:
             raise ArchiveError(
                 "cluster-unreachable",

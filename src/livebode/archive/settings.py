@@ -28,7 +28,7 @@ class ClusterSection(_Section):
     Parameters
     ----------
     kind
-        "local": processes on this computer. "ssh", "slurm" and "kubernetes": workers on others.
+        "local": processes on this computer. "ssh": on other computers. "slurm": jobs of Slurm.
     address
         Scheduler of Dask that is running already, such as "tls://head:8786", instead of starting workers.
     workers
@@ -39,8 +39,6 @@ class ClusterSection(_Section):
         Computers of a cluster by ssh; the first one has the scheduler.
     queue
         Partition of Slurm.
-    image
-        Container image of a cluster in Kubernetes, with livebode and its extra "archive".
     certificate
         Certificate of this computer in PEM, relative to this file. Required except on the loopback.
     key
@@ -50,13 +48,12 @@ class ClusterSection(_Section):
         file.
     """
 
-    kind: Literal["local", "ssh", "slurm", "kubernetes"] = "local"
+    kind: Literal["local", "ssh", "slurm"] = "local"
     address: Text | None = None
     workers: Annotated[int, Field(ge=1, le=10_000)] | None = None
     memory_mb: Annotated[int, Field(ge=256)] = 1024
     hosts: list[Text] = []
     queue: Text | None = None
-    image: Text | None = None
     certificate: File | None = None
     key: File | None = None
     authority: File | None = None
@@ -78,13 +75,12 @@ class ClusterSection(_Section):
                 key="cluster.address" if self.address else "cluster.kind",
                 value=self.address or self.kind,
             )
-        needed = {"ssh": "hosts", "kubernetes": "image"}.get(self.kind, "")
-        if needed and self.address is None and not getattr(self, needed):
+        if self.kind == "ssh" and self.address is None and len(self.hosts) < 2:
             raise ConfigError(
                 "incomplete",
-                f"a cluster of the kind {self.kind!r} needs cluster.{needed}",
-                "add it",
-                key=f"cluster.{needed}",
+                "a cluster by ssh needs cluster.hosts: the computer of the scheduler, and at least one for workers",
+                "add them; a computer may be there twice",
+                key="cluster.hosts",
             )
 
     def beside(self, folder: Path) -> ClusterSection:

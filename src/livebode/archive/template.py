@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass
 
@@ -47,13 +48,13 @@ class Template:
         >>> Template("plant/{machine}/*.csv").machine("plant/press 4/a.csv")
         {'machine': 'press 4'}
         """
-        found = self._expression.fullmatch(place.replace("\\", "/"))
+        found = self._expression.fullmatch(place.replace(os.sep, "/"))
         return found.groupdict() if found else {}
 
     @property
     def _expression(self) -> re.Pattern[str]:
         parts, end = [], 0
-        text = self.text.replace("\\", "/")
+        text = self.text.replace(os.sep, "/")
         for found in _PARTS.finditer(text):
             parts.append(re.escape(text[end : found.start()]))
             parts.append(_WILD.get(found[0]) or f"(?P<{found[1]}>[^/]+)")

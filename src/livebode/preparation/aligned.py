@@ -12,7 +12,7 @@ from livebode.estimation import Settings
 from livebode.excitation import Slip, find_slips
 from livebode.sources import Log
 
-_PART = 1 << 19  # samples per search
+_PART = 1 << 20  # samples per search
 _OVERLAP = 8  # periods common to two parts, so that a phase slip at their border is detected
 _LISTED_MAX = 1000
 
