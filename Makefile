@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature fuzz crash damage archive-faults soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -109,6 +109,9 @@ fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lac
 
 common-modes: $(BUILT) ## order and coverage of the bounds of modes common to two outputs (docs/explanation/fits.md)
 	$(BIN)/python -m studies.common_modes
+
+trends: $(BUILT) ## trends over a year of runs: coverage, power, false discoveries of a fleet (docs/explanation/trends.md, 10 min)
+	$(BIN)/python -m studies.archive_trends
 
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/how-to/monitoring.md
 	$(BIN)/python -m studies.monitoring

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pytest
 
 from livebode import ArchiveError
@@ -78,3 +79,15 @@ def test_a_damaged_table_is_an_error_that_names_it(lake: Lake) -> None:
     with pytest.raises(ArchiveError, match="table runs") as caught:
         Lake(lake.url).read("runs")
     assert caught.value.code == "archive.lake-unusable"
+
+
+def test_a_filter_on_any_column_finds_its_rows(lake: Lake, tmp_path: Path) -> None:
+    own = {**KEYS[0]._asdict(), "model": "two-mass", "name": "Keff", "value": 2.0}
+    lake.add_rows("quantities", pa.Table.from_pylist([own], schema=TABLES["quantities"].schema))
+    assert lake.read("quantities", ["value"], pc.field("name") == "Keff")["value"].to_pylist() == [2.0]
+    assert lake.read("quantities", ["value"], pc.field("site").is_null()).num_rows == 1
+    file = write_data_file(tmp_path, "events", KEYS[0], [events()])
+    lake.store(tmp_path / file.name, "events")
+    lake.add_files("events", [file])
+    assert lake.read("events", where=pc.field("kind") == "gap").num_rows == 3
+    assert lake.read("events", where=pc.field("content") == KEYS[1].content).num_rows == 0

@@ -46,6 +46,9 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "list": "List the runs of a lake by machine, and the recordings in quarantine.",
         "retry": "Track recordings in quarantine again, each in a process of its own.",
         "compact": "Join the small files of a lake, and remove files that belong to no result.",
+        "trend": "Find how a quantity changes over months, for each machine: slope, jumps and bends with bounds.",
+        "compare": "Find the quantities that differ between two axes, or between two spans of one, with bounds.",
+        "report": "Write the trends of all quantities and machines as one page, the worst machine first.",
     },
 }
 """The commands with subcommands, and these as above."""

@@ -5,6 +5,9 @@ kinds of events, the names of parameters and the statuses here with those of the
 """
 
 SENTENCES = (
+    "{runs} runs with a value, and a trend needs {needed}",
+    "the runs span {days} days, and a trend needs {needed}",
+    "the covariates cannot be separated from each other or from the time",
     "{channel} repeats every {period} samples rather than every {window}: {share} % of its power changes from one "
     "window to the next, {rest} % from one such period to the next",
     "compare lines.window with the design of the excitation",

@@ -22,9 +22,13 @@ class ArchiveError(LivebodeError):
     codes: ClassVar[Mapping[str, str]] = {
         "changed-meanwhile": "A recording changed between two steps of the same archive run.",
         "cluster-unreachable": "The scheduler of the cluster does not answer, or refuses the certificate.",
+        "covariate-unknown": "No run has a covariate of that name.",
         "internal": "Tracking a recording ended with an internal error.",
         "lake-unusable": "A table of the lake cannot be read or written.",
         "memory-exceeded": "A recording needs more memory than a worker may use.",
         "no-recordings": "No file matches the inputs of the archive.",
         "process-ended": "The process that tracked a recording was ended by a signal, or ended itself.",
+        "quantity-ambiguous": "Several models have a quantity of that name.",
+        "quantity-unknown": "No run of the lake has a quantity of that name.",
+        "recipe-unknown": "No run was tracked with these settings.",
     }
