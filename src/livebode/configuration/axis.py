@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.output_only import check_output_only
 from livebode.configuration.ready import ReadyCondition, ready_condition
 from livebode.configuration.report_section import ReportSection, report_error
@@ -502,6 +503,7 @@ class Axis(_Section):
     monitoring: MonitoringSection = MonitoringSection()
     serve: ServeSection = ServeSection()
     report: ReportSection | None = None
+    machine: MachineSection | None = None
 
     @classmethod
     def read(cls, path: Path) -> Axis:
