@@ -41,8 +41,8 @@ Names by subject:
 - Simulation: BeltAxis, SimulatedAxis, Strokes
 - Examples: example_axis, example_responses, example_run
 - Errors: LivebodeError (a ValueError) and its kinds BaselineError, ConfigError, DesignError, ExtraError, FitError,
-  FleetError, GridError, OutputError, RecordError, RecordingError, ServerError, SignalError, SimulationError, SourceError,
-  StateError, UsageError
+  FleetError, GridError, OutputError, RecordError, RecordingError, ServerError, SignalError, SimulationError,
+  SourceError, StateError, UsageError
 
 Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the true value with probability
 1 − exp(−c²). Every public name loads its part of livebode when it is first used. These names are the public interface,

@@ -23,7 +23,7 @@ class FleetError(LivebodeError):
         "axis-duplicated": "Two axes of the fleet have the same site, line, machine and axis.",
         "axis-unknown": "The fleet has no axis of this path.",
         "axis-unnamed": "An axis of the fleet has no [machine] section, so its place in the log is not defined.",
-        "buffer-damaged": "The disk buffer of an edge cannot be read.",
+        "buffer-unusable": "The disk buffer of an edge cannot be read or written.",
         "log-incomplete": "The log no longer has its beginning, so the results cannot be computed again.",
         "log-unreachable": "The server of the log cannot be reached, or rejects the connection.",
         "not-exactly-once": "Stored responses are missing, doubled or different from one uninterrupted computation.",
