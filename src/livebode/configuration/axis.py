@@ -489,6 +489,8 @@ class Axis(_Section):
         Address of the dashboard, and access to it.
     report
         The first page of the report, and the limits that the machine must meet.
+    machine
+        Which machine it is.
     """
 
     source: SourceSettings
@@ -613,10 +615,9 @@ def _first_of(error: ValidationError) -> ConfigError:
         return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
     secret = MAY_BE_SECRET & {str(part) for part in first["loc"]}
     value = "its value" if secret else shortened(first["input"])
+    why = first["msg"].removeprefix("Value error, ").lower()
     facts = {"key": place} | ({} if secret else {"value": value})
-    return ConfigError(
-        "value-invalid", f"{place} = {value} is not usable: {first['msg'].lower()}", "correct it", **facts
-    )
+    return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", "correct it", **facts)
 
 
 def nearest(loc: tuple[int | str, ...]) -> str:
