@@ -38,7 +38,9 @@ class EdgeBuffer:
     directory
         Created if it is missing; of this buffer alone.
     bytes_max
-        Most bytes on disk.
+        Most bytes on disk, at least two files.
+    file_bytes
+        Size of a file.
 
     Raises
     ------
@@ -46,8 +48,9 @@ class EdgeBuffer:
         If the directory or a file in it cannot be read or written.
     """
 
-    def __init__(self, directory: Path, bytes_max: int) -> None:
-        self._directory, self._bytes_max = directory, max(bytes_max, 2 * FILE_BYTES)
+    def __init__(self, directory: Path, bytes_max: int, file_bytes: int = FILE_BYTES) -> None:
+        self._directory, self._file_bytes = directory, file_bytes
+        self._bytes_max = max(bytes_max, 2 * file_bytes)
         self._lock = threading.Lock()
         self._files: deque[_File] = deque()
         self._taken: deque[bytes] = deque()
@@ -80,7 +83,7 @@ class EdgeBuffer:
         record = _HEAD.pack(len(message), zlib.crc32(message)) + message
         with self._lock:
             try:
-                if self._files[-1].size_bytes + len(record) > FILE_BYTES and self._files[-1].count:
+                if self._files[-1].size_bytes + len(record) > self._file_bytes and self._files[-1].count:
                     self._begin_file()
                 while sum(file.size_bytes for file in self._files) > self._bytes_max and len(self._files) > 1:
                     self._drop()
@@ -107,10 +110,13 @@ class EdgeBuffer:
                 return
             self._taken.popleft()
             self._files[0].count -= 1
-            if not self._files[0].count:
-                if len(self._files) == 1:
-                    self._begin_file()
+            if self._files[0].count:
+                return
+            if len(self._files) > 1:
                 self._files.popleft().path.unlink(missing_ok=True)
+            else:
+                os.ftruncate(self._write, 0)
+                self._files[0].size_bytes = 0
 
     def close(self) -> None:
         """Close the file; what it contains remains."""
