@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import time
+from collections.abc import Mapping
 from multiprocessing.context import ForkServerProcess
 from typing import Any
 
@@ -20,6 +20,7 @@ from livebode.fleet.partition import PartitionOwner
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.settings import LogSection, machine_key
+from livebode.fleet.status import status_of
 from livebode.fleet.subjects import EDGE, RESULT_STREAM, RESULTS
 from livebode.fleet.worker import own_partitions
 from livebode.sources.live import Batch
@@ -110,17 +111,28 @@ def _own(settings: LogSection, axes: Mapping[str, Axis], kind: type[PartitionOwn
     own_partitions(settings, axes, range(PARTITIONS), threading.Event(), kind)
 
 
-@contextmanager
-def owner_here(settings: LogSection, axes: Mapping[str, Axis]) -> Iterator[None]:
-    """An owner of all partitions in a thread, that is stopped in order at the end."""
+def owned_until_current(settings: LogSection, axes: Mapping[str, Axis]) -> None:
+    """Own all partitions in a thread until everything in the log is processed, and stop in order."""
     stop = threading.Event()
     thread = threading.Thread(target=own_partitions, args=(settings, axes, range(PARTITIONS), stop))
     thread.start()
     try:
-        yield
+        asyncio.run(_until_current(settings))
     finally:
         stop.set()
         thread.join()
+
+
+async def _until_current(settings: LogSection) -> None:
+    """Wait until every partition reports that it has waited for nothing since now."""
+    async with Log(settings, "test") as log:
+        began_s = time.time()
+        for number in range(PARTITIONS):
+            while True:
+                about = await status_of(log, number)
+                if about is not None and about["at_s"] > began_s and not about["waiting"]:
+                    break
+                await asyncio.sleep(0.05)
 
 
 def stored_responses(settings: LogSection) -> int:

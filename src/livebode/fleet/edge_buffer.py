@@ -104,9 +104,10 @@ class EdgeBuffer:
             return self._taken[0] if self._taken else None
 
     def remove(self, message: bytes) -> None:
-        """Remove the oldest message, which is stored; nothing if it was dropped meanwhile."""
+        """Remove the oldest message, which is stored; one that was dropped meanwhile is not counted as dropped."""
         with self._lock:
             if not self._taken or self._taken[0] is not message:
+                self.dropped -= 1
                 return
             self._taken.popleft()
             self._files[0].count -= 1

@@ -70,6 +70,7 @@ class Reader:
     async def _subscribe(self) -> None:
         self._subscription = await self._log.subscription(self._stream, self._subject, self.next, _INACTIVE_S)
         self._delivered, self._heard_s = 0, time.monotonic()
+        self.pending = (await self._subscription.consumer_info()).num_pending
 
     async def _checked(self, found: list[Msg]) -> list[StoredMessage]:
         messages = []
@@ -107,7 +108,7 @@ async def stored_messages(
     last = await log.last(stream, subject)
     reader = Reader(log, stream, subject, first)
     try:
-        while reader.next <= min(through, 0 if last is None else last.number):
+        while last is not None and reader.next <= min(through, last.number):
             for message in await reader.read(_READ_S):
                 if message.number <= through:
                     yield message

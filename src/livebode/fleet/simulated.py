@@ -121,9 +121,12 @@ class SimulatedMachines:
     def _take(self) -> None:
         began = time.monotonic()
         while not self._ended.wait(max(0.0, began + (self.sent + 1) * BLOCK_S - time.monotonic())):
-            for axis, edge in enumerate(self._edges):
-                edge.take(self.batch(axis, self.sent))
+            self._take_batches(self.sent)
             self.sent += 1
+
+    def _take_batches(self, number: int) -> None:
+        for axis, edge in enumerate(self._edges):
+            edge.take(self.batch(axis, number))
 
     def _send(self) -> None:
         edges = [(edge, self._taking) for edge in self._edges]
