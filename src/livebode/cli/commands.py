@@ -46,7 +46,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "send": "Send the samples of live sources to the log, through a buffer on disk.",
         "status": "Show partitions, axes, backlog and losses of a fleet.",
         "check": "Compute all responses of a fleet again from its log, and compare the stored ones bit for bit.",
-        "replay": "Compute the responses of an axis again from the log into a run directory.",
+        "replay": "Compute the responses of an axis again from the log, and write them as a table.",
         "server": "Write the configuration of nats-server for a fleet.",
         "demo": "Start a log, three workers and 20 simulated axes, kill a worker, and check that nothing is lost.",
     },

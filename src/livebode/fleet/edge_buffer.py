@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import struct
 import threading
@@ -13,6 +14,7 @@ from pathlib import Path
 from livebode.core.errors import FleetError
 
 FILE_BYTES = 1 << 20
+_logger = logging.getLogger(__name__)
 _HEAD = struct.Struct("<II")
 _SUFFIX = ".buffer"
 
@@ -62,7 +64,11 @@ class EdgeBuffer:
         try:
             directory.mkdir(parents=True, exist_ok=True)
             for path in sorted(directory.glob(f"*{_SUFFIX}")):
-                self._files.append(_File(path, len(self._read(path)), path.stat().st_size))
+                size_bytes, found = path.stat().st_size, self._read(path)
+                self._files.append(_File(path, len(found), size_bytes))
+                if sum(map(len, found)) + _HEAD.size * len(found) != size_bytes:
+                    self.damaged += 1
+                    _logger.warning("%s has an incomplete end, as after a power cut; its message is lost", path)
             self._begin_file()
         except OSError as error:
             raise _unusable(directory, error) from None
@@ -149,7 +155,6 @@ class EdgeBuffer:
                 break
             found.append(message)
             at += _HEAD.size + length
-        self.damaged += at != len(data)
         return found
 
 

@@ -19,7 +19,7 @@ from livebode.fleet.settings import LogSection
 _logger = logging.getLogger(__name__)
 _EXPECTED, _WRITE = "Nats-Expected-Last-Subject-Sequence", "Livebode-Write"
 _WRONG_LAST_SEQUENCE = 10071
-_REQUEST_S, _CONNECT_S, _RETRY_S, _RETRY_S_MAX = 2.0, 2.0, 0.1, 1.0
+_REQUEST_S, _CONNECT_S, _START_S, _RETRY_S, _RETRY_S_MAX = 2.0, 2.0, 4.0, 0.1, 1.0
 _DUPLICATES_S = 120.0
 T = TypeVar("T")
 
@@ -85,7 +85,7 @@ class Log:
             ) from None
         self._nats = nats
         try:
-            self._connection = await nats.connect(
+            connecting = nats.connect(
                 self.settings.url.split(","),
                 name=self._name,
                 connect_timeout=_CONNECT_S,
@@ -96,6 +96,7 @@ class Log:
                 error_cb=self._note,
                 allow_reconnect=True,
             )
+            self._connection = await asyncio.wait_for(connecting, _START_S)
         except (TimeoutError, OSError, nats.errors.Error) as error:
             raise FleetError(
                 "log-unreachable",
