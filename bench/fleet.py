@@ -1,10 +1,10 @@
 """How many axes of a fleet a core tracks, and what a message of the log costs.
 
-    python -m bench.fleet [--messages 60]
+    python -m bench.fleet [--seconds 20]
 
-One process computes the messages of 20 simulated axes (4 kHz, three channels, 6 lines, 20 responses per second) from bytes
-to rows of results, and takes snapshots as an owner does. It prints processor time per second of machine time, and the
-axes that use 60 % of a core, for blocks of 100 and of 500 ms; and the bytes of results and states per byte of data.
+One process computes the messages of 20 simulated axes (4 kHz, three channels, 6 lines, 20 responses per second) from
+bytes to rows of results, and takes snapshots as an owner does. It prints processor time per second of machine time, and
+the axes that use 60 % of a core, for blocks of 100 and of 500 ms; and the bytes of results and states per byte of data.
 """
 
 from __future__ import annotations
@@ -69,14 +69,14 @@ def measured(machines: SimulatedMachines, settings: FleetSettings, blocks: int, 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m bench.fleet", description=__doc__)
-    parser.add_argument("--messages", type=int, default=60)
+    parser.add_argument("--seconds", type=float, default=20.0)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         path = write_simulated_fleet(Path(folder), "nats://127.0.0.1:4222", axes=AXES, partitions=1, workers=1)
         settings = FleetSettings.read(path)
         machines = SimulatedMachines(settings)
         for blocks in (1, 5):
-            found = measured(machines, settings, blocks, asked.messages)
+            found = measured(machines, settings, blocks, round(asked.seconds / (blocks * BLOCK_S)))
             print(
                 f"blocks of {blocks * BLOCK_S * 1e3:.0f} ms: {found['load']:.2%} of a core an axis, "
                 f"{LOAD / found['load']:.0f} axes at {LOAD:.0%} of a core; {found['bytes_per_s'] / 1e3:.0f} kB/s, "

@@ -12,6 +12,7 @@ import pytest
 from livebode.configuration.axis import Axis
 from livebode.core.errors import FleetError
 from livebode.fleet.log import Log
+from livebode.fleet.message import write_message
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
@@ -20,6 +21,7 @@ from livebode.fleet.status import fleet_status
 from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS, STATE_STREAM, axis_path
 from tests.support.fleet_runs import (
     PARTITIONS,
+    batch,
     checked,
     fleet_axes,
     log_section,
@@ -117,6 +119,21 @@ def test_foreign_and_damaged_messages_are_reported_and_disturb_no_axis(server: L
     assert result.total.responses == 2 * (40 * 2)
     assert [event["axis"] for event in _events(settings) if event["kind"] == "malformed"] == [key]
     assert any("ulm/unknown/x" in alarm for alarm in _status(settings, axes)["alarms"])
+
+
+def test_repeated_and_reordered_messages_give_the_responses_of_ordered_ones(server: LogServer) -> None:
+    settings, axes = log_section(server.url), fleet_axes(1)
+    ((key, _),) = axes.items()
+    sent(settings, axes, 20)
+    for first in (1000, 1100, 1050, 1200, 1150, 1100, 1250):
+        asyncio.run(_append(settings, f"{EDGE}.{key}", write_message(batch(0, first))))
+    sent(settings, axes, 10, 26)
+    owned_until_current(settings, axes)
+    kinds = [event["kind"] for event in _events(settings)]
+    assert (kinds.count("reordered"), kinds.count("repeat"), kinds.count("loss")) == (2, 1, 0)
+    result = checked(settings, axes)
+    assert result.exact
+    assert result.total.responses == 36 * 2
 
 
 def test_missing_samples_are_reported_with_their_exact_number(server: LogServer) -> None:
