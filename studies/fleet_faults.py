@@ -25,8 +25,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from livebode.fleet.check import AxisVerdict, CheckResult, check_results
-from livebode.fleet.log import Log
+from livebode.fleet.check import AxisCheck, CheckResult, check_results
+from livebode.fleet.log import FleetLog
 from livebode.fleet.message import write_message
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import FleetSettings
@@ -62,7 +62,7 @@ class Campaign:
     """
 
     faults: int = 0
-    total: AxisVerdict = field(default_factory=AxisVerdict)
+    total: AxisCheck = field(default_factory=AxisCheck)
     takeovers: int = 0
     dropped: int = 0
     lost: int = 0
@@ -75,7 +75,7 @@ class Campaign:
     def add(self, check: CheckResult, faults: int, dropped: int, lost: int) -> None:
         """Add a round."""
         sums = {name: value + getattr(check.total, name) for name, value in vars(self.total).items()}
-        self.total = AxisVerdict(**sums)
+        self.total = AxisCheck(**sums)
         self.faults, self.takeovers = self.faults + faults, self.takeovers + check.claims - PARTITIONS
         self.dropped, self.lost = self.dropped + dropped, self.lost + lost
 
@@ -136,11 +136,11 @@ class Fleet:
         self._process.send_signal(number)
         self._process.wait()
 
-    def asked(self, question: Callable[[Log], Any]) -> Any:
+    def asked(self, question: Callable[[FleetLog], Any]) -> Any:
         """The answer of the log to a question."""
 
         async def ask() -> Any:
-            async with Log(self.settings.log, "faults") as log:
+            async with FleetLog(self.settings.log, "faults") as log:
                 return await question(log)
 
         return asyncio.run(ask())
@@ -153,7 +153,7 @@ class Fleet:
                 raise TimeoutError(f"a partition is behind for {_RECOVERY_S_MAX:g} s")
             time.sleep(0.25)
 
-    async def _current(self, log: Log, since_s: float) -> bool:
+    async def _current(self, log: FleetLog, since_s: float) -> bool:
         found = [await status_of(log, number) for number in range(PARTITIONS)]
         return all(one is not None and one["at_s"] > since_s and one["lag_s"] < _RECOVERED_S for one in found)
 
@@ -186,7 +186,7 @@ class Fleet:
         self._start()
 
     def _repeats(self) -> None:
-        async def repeat(log: Log) -> None:
+        async def repeat(log: FleetLog) -> None:
             for axis, key in enumerate(self.machines.keys):
                 for number in range(max(0, self.machines.sent - _REPEATED), self.machines.sent - 1):
                     # Without an identity, as after more time than the log remembers them.

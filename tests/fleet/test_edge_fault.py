@@ -15,7 +15,7 @@ from livebode.core import Channel, SpectraLayout
 from livebode.core.errors import FleetError
 from livebode.fleet.edge import Edge
 from livebode.fleet.edge_buffer import EdgeBuffer
-from livebode.fleet.log import Log
+from livebode.fleet.log import FleetLog
 from livebode.fleet.message import read_message, write_message
 from livebode.fleet.server import LogServer
 from livebode.fleet.subjects import LOG_STREAM
@@ -119,7 +119,7 @@ def test_an_edge_outlasts_the_log_and_stores_each_message_once(tmp_path: Path) -
     edge, taking = Edge(key, buffer), Future[None]()
 
     async def outage() -> int:
-        async with Log(log_section(server.url), "test") as log:
+        async with FleetLog(log_section(server.url), "test") as log:
             await log.create_streams()
             sending = asyncio.create_task(edge.send(log, taking))
             for first in range(0, 500, 50):

@@ -11,7 +11,7 @@ import pytest
 
 from livebode.configuration.axis import Axis
 from livebode.core.errors import FleetError
-from livebode.fleet.log import Log
+from livebode.fleet.log import FleetLog
 from livebode.fleet.message import write_message
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
@@ -181,22 +181,22 @@ def test_the_server_maps_every_axis_to_one_partition(server: LogServer) -> None:
 
 
 async def _subjects(settings: LogSection) -> list[str]:
-    async with Log(settings, "test") as log:
+    async with FleetLog(settings, "test") as log:
         return list((await log.extent(LOG_STREAM, f"{LOG}.>")).subjects)
 
 
 async def _purge(settings: LogSection, stream: str, keep: int = 0) -> None:
-    async with Log(settings, "test") as log:
+    async with FleetLog(settings, "test") as log:
         await log._js.purge_stream(stream, keep=keep or None)
 
 
 async def _append(settings: LogSection, subject: str, data: bytes) -> None:
-    async with Log(settings, "test") as log:
+    async with FleetLog(settings, "test") as log:
         await log.append(subject, data)
 
 
 async def _results(settings: LogSection) -> list[tuple[str, bytes]]:
-    async with Log(settings, "test") as log:
+    async with FleetLog(settings, "test") as log:
         last = (await log.extent(RESULT_STREAM)).last
         return [(m.subject, m.data) async for m in stored_messages(log, RESULT_STREAM, f"{RESULTS}.*", last)]
 
@@ -217,7 +217,7 @@ def _events(settings: LogSection) -> list[dict[str, object]]:
 
 def _status(settings: LogSection, axes: dict[str, Axis]) -> dict[str, list[dict[str, object]]]:
     async def status() -> dict[str, list[dict[str, object]]]:
-        async with Log(settings, "test") as log:
+        async with FleetLog(settings, "test") as log:
             found: dict[str, list[dict[str, object]]] = json.loads(json.dumps(await fleet_status(log, axes)))
             return found
 

@@ -14,7 +14,7 @@ import numpy as np
 from livebode.configuration.axis import Axis
 from livebode.core import Channel
 from livebode.fleet.check import CheckResult, check_results
-from livebode.fleet.log import ClaimLostError, Log
+from livebode.fleet.log import ClaimLostError, FleetLog
 from livebode.fleet.message import message_id, write_message
 from livebode.fleet.partition import PartitionOwner
 from livebode.fleet.reader import stored_messages
@@ -65,7 +65,7 @@ def batch(axis: int, first: int, epoch: int = EPOCH) -> Batch:
     return Batch(first, np.vstack([w, u, y]).astype("f4").astype("f8"), CHANNELS, RATE_HZ, epoch)
 
 
-async def send(log: Log, axes: Mapping[str, Axis], firsts: range) -> None:
+async def send(log: FleetLog, axes: Mapping[str, Axis], firsts: range) -> None:
     """Publish the batches that begin at these numbers, for all axes."""
     for first in firsts:
         for number, key in enumerate(axes):
@@ -77,7 +77,7 @@ def sent(settings: LogSection, axes: Mapping[str, Axis], batches: int, first: in
     """The same from a program without a loop: `batches` of them from batch number `first` on."""
 
     async def publish() -> None:
-        async with Log(settings, "test") as log:
+        async with FleetLog(settings, "test") as log:
             await log.create_streams()
             await send(log, axes, range(first * SAMPLES, (first + batches) * SAMPLES, SAMPLES))
 
@@ -125,7 +125,7 @@ def owned_until_current(settings: LogSection, axes: Mapping[str, Axis]) -> None:
 
 async def _until_current(settings: LogSection) -> None:
     """Wait until every partition reports that it has waited for nothing since now."""
-    async with Log(settings, "test") as log:
+    async with FleetLog(settings, "test") as log:
         began_s = time.time()
         for number in range(PARTITIONS):
             while True:
@@ -139,7 +139,7 @@ def stored_responses(settings: LogSection) -> int:
     """How many responses are stored, doubled ones included."""
 
     async def count() -> int:
-        async with Log(settings, "count") as log:
+        async with FleetLog(settings, "count") as log:
             last = (await log.extent(RESULT_STREAM)).last
             return sum(
                 [
@@ -153,7 +153,7 @@ def stored_responses(settings: LogSection) -> int:
 
 def checked(settings: LogSection, axes: Mapping[str, Axis]) -> CheckResult:
     async def check() -> CheckResult:
-        async with Log(settings, "check") as log:
+        async with FleetLog(settings, "check") as log:
             return await check_results(log, axes)
 
     return asyncio.run(check())

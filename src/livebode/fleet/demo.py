@@ -13,8 +13,8 @@ from pathlib import Path
 
 from livebode.configuration.axis import Axis
 from livebode.fleet.check import CheckResult, check_results
-from livebode.fleet.coordinator import Coordinator
-from livebode.fleet.log import Log
+from livebode.fleet.coordinator import FleetCoordinator
+from livebode.fleet.log import FleetLog
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import FleetSettings
 from livebode.fleet.simulated import RATE_HZ, SimulatedMachines, write_simulated_fleet
@@ -48,7 +48,7 @@ def demo(folder: Path, *, axes: int, workers: int, seconds: float, say: Callable
         configured = settings.read_axes()
         say(f"nats-server stores the log at {server.url}")
         asyncio.run(_create_streams(settings))
-        with Coordinator(settings, configured) as coordinator:
+        with FleetCoordinator(settings, configured) as coordinator:
             say(f"{workers} workers share {PARTITIONS} partitions")
             with SimulatedMachines(settings) as machines:
                 say(f"{axes} axes send {RATE_HZ:g} samples per second each")
@@ -64,7 +64,7 @@ def demo(folder: Path, *, axes: int, workers: int, seconds: float, say: Callable
         return DemoResult(asyncio.run(_check(settings, configured)), longest)
 
 
-def _wait(coordinator: Coordinator, seconds: float) -> None:
+def _wait(coordinator: FleetCoordinator, seconds: float) -> None:
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         coordinator.step()
@@ -81,7 +81,7 @@ def _kill(settings: FleetSettings, axes: dict[str, Axis], say: Callable[[str], N
 
 def _owners(settings: FleetSettings, axes: dict[str, Axis]) -> Counter[str]:
     async def owners() -> Counter[str]:
-        async with Log(settings.log, "livebode demo") as log:
+        async with FleetLog(settings.log, "livebode demo") as log:
             return Counter(one["owner"] for one in (await fleet_status(log, axes))["partitions"])
 
     return asyncio.run(owners())
@@ -92,7 +92,7 @@ def _shares(settings: FleetSettings, axes: dict[str, Axis]) -> str:
     return f"partitions of each worker now: {', '.join(str(count) for _, count in sorted(owners.items()))}"
 
 
-def _drain(coordinator: Coordinator, settings: FleetSettings, axes: dict[str, Axis]) -> None:
+def _drain(coordinator: FleetCoordinator, settings: FleetSettings, axes: dict[str, Axis]) -> None:
     """Wait until the owners have processed what the log has."""
     until = time.monotonic() + _DRAIN_S
     while time.monotonic() < until:
@@ -102,20 +102,20 @@ def _drain(coordinator: Coordinator, settings: FleetSettings, axes: dict[str, Ax
 
 
 async def _create_streams(settings: FleetSettings) -> None:
-    async with Log(settings.log, "livebode demo") as log:
+    async with FleetLog(settings.log, "livebode demo") as log:
         await log.create_streams()
 
 
 async def _waiting(settings: FleetSettings, axes: dict[str, Axis]) -> int:
-    async with Log(settings.log, "livebode demo") as log:
+    async with FleetLog(settings.log, "livebode demo") as log:
         return int((await fleet_status(log, axes))["log"]["waiting"])
 
 
 async def _longest(settings: FleetSettings, from_s: float) -> float:
-    async with Log(settings.log, "livebode demo") as log:
+    async with FleetLog(settings.log, "livebode demo") as log:
         return max((await silences(log, from_s, time.time())).values(), default=0.0)
 
 
 async def _check(settings: FleetSettings, axes: dict[str, Axis]) -> CheckResult:
-    async with Log(settings.log, "livebode check") as log:
+    async with FleetLog(settings.log, "livebode check") as log:
         return await check_results(log, axes)

@@ -12,7 +12,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 
 from livebode.fleet.edge_buffer import EdgeBuffer
-from livebode.fleet.log import Log
+from livebode.fleet.log import FleetLog
 from livebode.fleet.message import message_id, read_message, write_message
 from livebode.fleet.settings import FleetSettings, LogSection
 from livebode.fleet.subjects import EDGE
@@ -48,7 +48,7 @@ class Edge:
             lost, self._dropped = self._buffer.dropped - self._dropped, self._buffer.dropped
             _logger.warning("the buffer is full: the oldest %d messages were deleted", lost)
 
-    async def send(self, log: Log, taking: Future[None]) -> None:
+    async def send(self, log: FleetLog, taking: Future[None]) -> None:
         """Send until the thread that fills the buffer has ended, and the buffer is empty."""
         while True:
             over = taking.done()
@@ -131,7 +131,7 @@ def _take_all(source: LiveSource, edge: Edge) -> None:
 
 async def send_edges(settings: LogSection, edges: list[tuple[Edge, Future[None]]], stop: threading.Event) -> None:
     """Send the messages of each edge until the thread that fills it has ended, or a second after `stop`."""
-    async with Log(settings, "livebode send") as log:
+    async with FleetLog(settings, "livebode send") as log:
         await log.create_streams()
         sending = asyncio.gather(*(edge.send(log, taking) for edge, taking in edges))
         while not sending.done() and not stop.is_set():

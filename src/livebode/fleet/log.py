@@ -1,4 +1,4 @@
-"""Log: the connection to NATS JetStream. Everything that is stored, is stored here."""
+"""FleetLog: the connection to NATS JetStream. Everything that is stored, is stored here."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class StreamExtent:
     subjects: Mapping[str, int]
 
 
-class Log:
+class FleetLog:
     """A connection to the server of the log. Each request is repeated until the server answers.
 
     Use it as an asynchronous context manager.
@@ -67,7 +67,7 @@ class Log:
         self.trouble = ""
         """Why the server does not answer at the moment; empty while it does."""
 
-    async def __aenter__(self) -> Log:
+    async def __aenter__(self) -> FleetLog:
         """Connect.
 
         Raises

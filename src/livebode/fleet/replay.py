@@ -12,13 +12,13 @@ from livebode.core.errors import FleetError
 from livebode.core.files import whole_file
 from livebode.core.writing import writing
 from livebode.fleet.axis_stream import AxisStream
-from livebode.fleet.log import Log
+from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import SCHEMA, response_rows
 from livebode.fleet.subjects import LOG, LOG_STREAM, axis_path
 
 
-async def replayed(log: Log, key: str, axis: Axis, from_s: float) -> pa.Table:
+async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> pa.Table:
     """The responses of the messages of an axis that the log has stored since `from_s` (seconds since 1970).
 
     The tracker begins at the first of them. The table has the columns of the stored results.

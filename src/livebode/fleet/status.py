@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from livebode.configuration.axis import Axis
-from livebode.fleet.log import Log
+from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.subjects import (
@@ -27,7 +27,7 @@ BACKLOG_SHARE_MAX = 0.7
 """Share of the log's capacity that is not processed yet, above which it is reported: at 1, data are lost."""
 
 
-async def fleet_status(log: Log, axes: Mapping[str, Axis]) -> dict[str, Any]:
+async def fleet_status(log: FleetLog, axes: Mapping[str, Axis]) -> dict[str, Any]:
     """Partitions, axes, the log, and alarms, as plain data."""
     extent = await log.extent(LOG_STREAM, f"{LOG}.>")
     partitions = []
@@ -73,7 +73,7 @@ def _alarms(partitions: list[dict[str, Any]], axes: list[dict[str, Any]], share:
     return alarms
 
 
-async def silences(log: Log, from_s: float, to_s: float) -> dict[int, float]:
+async def silences(log: FleetLog, from_s: float, to_s: float) -> dict[int, float]:
     """For each partition the longest time between two messages of results that overlaps a span of time, in seconds."""
     extent = await log.extent(RESULT_STREAM)
     before: dict[int, float] = {}
@@ -89,7 +89,7 @@ async def silences(log: Log, from_s: float, to_s: float) -> dict[int, float]:
     return longest
 
 
-async def status_of(log: Log, number: int) -> dict[str, Any] | None:
+async def status_of(log: FleetLog, number: int) -> dict[str, Any] | None:
     """What the owner of a partition has reported last."""
     message = await log.last(STATUS_STREAM, f"{STATUS}.{number}")
     return None if message is None else json.loads(message.data)

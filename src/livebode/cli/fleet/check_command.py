@@ -15,7 +15,7 @@ def check_command(fleet: Fleet, as_json: Json = False) -> None:
     """
     from livebode.cli.fleet.verdict import require_exact, verdict
     from livebode.fleet.check import CheckResult, check_results
-    from livebode.fleet.log import Log
+    from livebode.fleet.log import FleetLog
     from livebode.fleet.settings import FleetSettings
     from livebode.records import to_json
 
@@ -23,7 +23,7 @@ def check_command(fleet: Fleet, as_json: Json = False) -> None:
     axes = settings.read_axes()
 
     async def check() -> CheckResult:
-        async with Log(settings.log, "livebode check") as log:
+        async with FleetLog(settings.log, "livebode check") as log:
             return await check_results(log, axes)
 
     result = asyncio.run(check())

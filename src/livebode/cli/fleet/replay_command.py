@@ -26,7 +26,7 @@ def replay_command(
     """Compute the responses of an axis again from the log, and write them as a table."""
     from livebode.core import nearest_name
     from livebode.core.errors import FleetError
-    from livebode.fleet.log import Log
+    from livebode.fleet.log import FleetLog
     from livebode.fleet.replay import replayed, write_replayed
     from livebode.fleet.settings import FleetSettings
     from livebode.fleet.subjects import axis_path
@@ -38,7 +38,7 @@ def replay_command(
         raise FleetError("axis-unknown", f"the fleet has no axis {axis!r}", nearest_name(axis, sorted(keys)), axis=axis)
 
     async def replay() -> pa.Table:
-        async with Log(settings.log, "livebode replay") as log:
+        async with FleetLog(settings.log, "livebode replay") as log:
             return await replayed(log, keys[axis], axes[keys[axis]], 0.0 if from_ is None else from_.timestamp())
 
     table = asyncio.run(replay())

@@ -15,19 +15,19 @@ def run_command(fleet: Fleet) -> None:
 
     Nothing has to be ended in order: what is not stored yet is computed again from the log at the next start.
     """
-    from livebode.fleet.coordinator import Coordinator
-    from livebode.fleet.log import Log
+    from livebode.fleet.coordinator import FleetCoordinator
+    from livebode.fleet.log import FleetLog
     from livebode.fleet.settings import FleetSettings
 
     settings = FleetSettings.read(fleet)
     axes = settings.read_axes()
 
     async def create_streams() -> None:
-        async with Log(settings.log, "livebode run") as log:
+        async with FleetLog(settings.log, "livebode run") as log:
             await log.create_streams()
 
     asyncio.run(create_streams())
-    with Coordinator(settings, axes) as coordinator:
+    with FleetCoordinator(settings, axes) as coordinator:
         print(f"{settings.workers} workers share {settings.partitions} partitions of {len(axes)} axes; Ctrl-C ends")
         try:
             while True:

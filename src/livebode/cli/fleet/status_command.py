@@ -14,7 +14,7 @@ _SHOWN = 20
 
 def status_command(fleet: Fleet, as_json: Json = False) -> None:
     """Show partitions, axes, backlog and losses of a fleet."""
-    from livebode.fleet.log import Log
+    from livebode.fleet.log import FleetLog
     from livebode.fleet.settings import FleetSettings
     from livebode.fleet.status import fleet_status
     from livebode.records import to_json
@@ -23,7 +23,7 @@ def status_command(fleet: Fleet, as_json: Json = False) -> None:
     axes = settings.read_axes()
 
     async def status() -> dict[str, Any]:
-        async with Log(settings.log, "livebode status") as log:
+        async with FleetLog(settings.log, "livebode status") as log:
             return await fleet_status(log, axes)
 
     found = asyncio.run(status())
