@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from livebode.cli.fleet.options import Fleet
+from livebode.cli.options import Json
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -22,6 +23,7 @@ def replay_command(
         datetime | None, typer.Option("--from", metavar="TIME", help="Beginning, in local time. Default: of the log.")
     ] = None,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Parquet file to write.")] = Path("replay.parquet"),
+    as_json: Json = False,
 ) -> None:
     """Compute the responses of an axis again from the log, and write them as a table."""
     from livebode.core import nearest_name
@@ -30,6 +32,7 @@ def replay_command(
     from livebode.fleet.replay import replayed, write_replayed
     from livebode.fleet.settings import FleetSettings
     from livebode.fleet.subjects import axis_path
+    from livebode.records import to_json
 
     settings = FleetSettings.read(fleet)
     axes = settings.read_axes()
@@ -43,4 +46,4 @@ def replay_command(
 
     table = asyncio.run(replay())
     write_replayed(table, out)
-    print(f"{out}: {table.num_rows:,} rows")
+    print(to_json({"file": str(out), "rows": table.num_rows}) if as_json else f"{out}: {table.num_rows:,} rows")

@@ -6,11 +6,12 @@ import asyncio
 import time
 
 from livebode.cli.fleet.options import Fleet
+from livebode.cli.options import Json
 
 _STEP_S = 0.25
 
 
-def run_command(fleet: Fleet) -> None:
+def run_command(fleet: Fleet, as_json: Json = False) -> None:
     """Start the workers of a fleet on this computer, and replace those that die, until Ctrl-C.
 
     Nothing has to be ended in order: what is not stored yet is computed again from the log at the next start.
@@ -28,10 +29,12 @@ def run_command(fleet: Fleet) -> None:
 
     asyncio.run(create_streams())
     with FleetCoordinator(settings, axes) as coordinator:
-        print(f"{settings.workers} workers share {settings.partitions} partitions of {len(axes)} axes; Ctrl-C ends")
+        if not as_json:
+            print(f"{settings.workers} workers share {settings.partitions} partitions of {len(axes)} axes; Ctrl-C ends")
         try:
             while True:
                 coordinator.step()
                 time.sleep(_STEP_S)
         except KeyboardInterrupt:
-            print("stopped; the log has everything that is not processed yet")
+            if not as_json:
+                print("stopped; the log has everything that is not processed yet")

@@ -11,11 +11,13 @@ from typing import Annotated
 import typer
 
 from livebode.cli.fleet.options import Fleet
+from livebode.cli.options import Json
 
 
 def send_command(
     axis: Annotated[Path, typer.Argument(metavar="AXIS.TOML", help="Axes with a live source and a [machine] section.")],
     fleet: Fleet,
+    as_json: Json = False,
 ) -> None:
     """Send the samples of live sources to the log, through a buffer on disk, until they end or Ctrl-C.
 
@@ -24,6 +26,7 @@ def send_command(
     from livebode.configuration.axes import ConfigurationFile
     from livebode.fleet.edge import send_sources
     from livebode.fleet.settings import FleetSettings, machine_key
+    from livebode.records import to_json
     from livebode.sources.live import make_source
 
     settings = FleetSettings.read(fleet)
@@ -33,6 +36,7 @@ def send_command(
     signal.signal(signal.SIGINT, lambda *_: stop.set())
     with contextlib.ExitStack() as opened:
         sources = {key: opened.enter_context(make_source(one.source).open()) for key, one in keys.items()}
-        print(f"{len(sources)} axes send to {settings.log.url}; Ctrl-C ends", flush=True)
+        if not as_json:
+            print(f"{len(sources)} axes send to {settings.log.url}; Ctrl-C ends", flush=True)
         sent = send_sources(settings, sources, stop)
-    print(f"the log has stored {sent} messages")
+    print(to_json({"messages": sent}) if as_json else f"the log has stored {sent} messages")
