@@ -41,8 +41,8 @@ Names by subject:
 - Simulation: BeltAxis, SimulatedAxis, Strokes
 - Examples: example_axis, example_responses, example_run
 - Errors: LivebodeError (a ValueError) and its kinds ArchiveError, BaselineError, ConfigError, DesignError, ExtraError,
-  FitError, GridError, LocationError, OutputError, RecordError, RecordingError, ServerError, SignalError,
-  SimulationError, SourceError, StateError, UsageError
+  FitError, FleetError, GridError, LocationError, OutputError, RecordError, RecordingError, ServerError,
+  SignalError, SimulationError, SourceError, StateError, UsageError
 
 Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the true value with probability
 1 − exp(−c²). Every public name loads its part of livebode when it is first used. These names are the public interface,
@@ -68,6 +68,7 @@ if TYPE_CHECKING:
         Event,
         ExtraError,
         FitError,
+        FleetError,
         GridError,
         Lines,
         LivebodeError,
@@ -143,6 +144,7 @@ _HOME = {
         "LivebodeError",
         "LocationError",
         "FitError",
+        "FleetError",
         "ExtraError",
         "DesignError",
         "ConfigError",
@@ -184,6 +186,7 @@ __all__ = [
     "Fit",
     "FitError",
     "Fitter",
+    "FleetError",
     "GridError",
     "Lines",
     "LivebodeError",

@@ -23,8 +23,8 @@ SOURCE = Path(__file__).parents[2] / "src/livebode"
         (
             r"(TemporaryDirectory|NamedTemporaryFile)\(",
             {
-                *("cli/validate_command.py", "dashboard/app.py", "export/universal.py", "report/pdf.py"),
-                *("archive/alone.py", "archive/tracking.py"),
+                *("cli/fleet/demo_command.py", "cli/validate_command.py", "dashboard/app.py", "export/universal.py"),
+                *("archive/alone.py", "archive/tracking.py", "report/pdf.py"),
             },
         ),
         (r"\bfsync\(", {"core/files.py", "doctor/disk.py"}),

@@ -35,6 +35,7 @@ SUMMARIES: Mapping[str, str] = {
     "view": "Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still "
     "recording.",
     "archive": "Track every recording of an archive on all cores or a cluster, and keep the results in one lake.",
+    "fleet": "Track the axes of a fleet from a log on several workers: every result once, also when a worker dies.",
     "doctor": "Check this computer, a configuration and whether its machine can be reached.",
     "schema": "Print the JSON Schema of axis.toml, experiment.toml or archive.toml: an editor uses it to complete "
     "and check the keys.",
@@ -49,6 +50,15 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "trend": "Find how a quantity changes over months, for each machine: slope, jumps and bends with bounds.",
         "compare": "Find the quantities that differ between two axes, or between two spans of one, with bounds.",
         "report": "Write the trends of all quantities and machines as one page, the worst machine first.",
+    },
+    "fleet": {
+        "run": "Start the workers of a fleet on this computer, and replace those that die, until Ctrl-C.",
+        "send": "Send the samples of live sources to the log, through a buffer on disk.",
+        "status": "Show partitions, axes, backlog and losses of a fleet.",
+        "check": "Compute all responses of a fleet again from its log, and compare the stored ones bit for bit.",
+        "replay": "Compute the responses of an axis again from the log, and write them as a table.",
+        "server": "Write the configuration of nats-server for a fleet.",
+        "demo": "Start a log, three workers and 20 simulated axes, kill a worker, and check that nothing is lost.",
     },
 }
 """The commands with subcommands, and these as above."""
