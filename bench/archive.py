@@ -36,7 +36,7 @@ from livebode.archive.clusters import Cluster, started
 from livebode.archive.committing import Committer
 from livebode.archive.distributing import Distribution
 from livebode.archive.grouping import RecordingGroups
-from livebode.archive.recordings import ArchivedRecording, Place, file_rows, find_places
+from livebode.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places
 from livebode.archive.results import Failed, Tracked
 from livebode.archive.settings import ArchiveSettings, ClusterSection
 from livebode.archive.tasks import hash_places, track_one, track_recordings
@@ -160,7 +160,7 @@ def known(folder: Path) -> None:
     archive.write_text('inputs = ["plant/*.csv"]\nrecipe = "recipe.toml"\nlake = "lake"\n')
     settings = ArchiveSettings.read(archive)
     lake, recipe = Lake(settings.lake), recipe_id(settings.axis())
-    contents: list[tuple[Place, str]] = [
+    contents: list[tuple[RecordingPlace, str]] = [
         (place, f"{number:064x}") for number, place in enumerate(find_places(settings.templates))
     ]
     lake.add_rows("files", file_rows(contents, {}))

@@ -10,7 +10,7 @@ from hypothesis import settings as run_with
 from hypothesis import strategies as st
 
 from livebode import ConfigError
-from livebode.archive.recordings import Place, find_places, levels_of
+from livebode.archive.recordings import RecordingPlace, find_places, levels_of
 from livebode.archive.settings import ArchiveSettings
 from livebode.archive.template import Template
 
@@ -90,7 +90,7 @@ def test_a_template_finds_the_names_in_its_own_paths(line: str, machine: str, fi
 
 
 def test_levels_that_the_path_does_not_name_are_of_the_recipe(tmp_path: Path) -> None:
-    place = Place(tmp_path / "a.csv", 1, "1", (("machine", "press 4"),))
+    place = RecordingPlace(tmp_path / "a.csv", 1, "1", (("machine", "press 4"),))
     assert levels_of(place, {"site": "Graz", "machine": "any"}) == {
         "site": "Graz", "line": None, "machine": "press 4", "axis": None,
     }  # fmt: skip

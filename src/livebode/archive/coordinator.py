@@ -17,7 +17,7 @@ from livebode.archive.contents import quarantine
 from livebode.archive.grouping import RecordingGroups
 from livebode.archive.recordings import (
     ArchivedRecording,
-    Place,
+    RecordingPlace,
     file_rows,
     find_places,
     known_contents,
@@ -151,11 +151,11 @@ class Coordinator:
                 self._outcome.stopped = True
         return self._outcome
 
-    def _contents(self, places: Sequence[Place], stack: ExitStack) -> list[tuple[Place, str]]:
+    def _contents(self, places: Sequence[RecordingPlace], stack: ExitStack) -> list[tuple[RecordingPlace, str]]:
         """The content at each place; what the lake does not know is hashed, and committed to `files`."""
         known = known_contents(self._lake)
         new = [place for place in places if place.known_as not in known]
-        waiting: list[tuple[Place, str]] = []
+        waiting: list[tuple[RecordingPlace, str]] = []
 
         def commit() -> None:
             if waiting:
@@ -233,6 +233,6 @@ def _again(result: Result) -> bool:
     return isinstance(result, Failed) and not result.by_content
 
 
-def _hash_alone(place: Place, scratch: Path | None = None) -> Hashed | Failed:  # noqa: ARG001
+def _hash_alone(place: RecordingPlace, scratch: Path | None = None) -> Hashed | Failed:  # noqa: ARG001
     """Hash once more: hashing ends no process, but a storage may fail for a moment."""
     return hash_places([place])[0]

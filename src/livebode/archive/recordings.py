@@ -16,7 +16,7 @@ from livebode.locations import Location, find, location
 
 
 @dataclass(frozen=True)
-class Place:
+class RecordingPlace:
     """A recording at one place.
 
     Attributes
@@ -47,7 +47,7 @@ class ArchivedRecording:
     """A content, and the place from which it is read."""
 
     content: str
-    place: Place
+    place: RecordingPlace
 
     @property
     def size_bytes(self) -> int:
@@ -55,7 +55,7 @@ class ArchivedRecording:
         return self.place.size_bytes
 
 
-def find_places(templates: Iterable[Template]) -> list[Place]:
+def find_places(templates: Iterable[Template]) -> list[RecordingPlace]:
     """The recordings that the inputs of an archive name, each place once, by name.
 
     Raises
@@ -65,13 +65,13 @@ def find_places(templates: Iterable[Template]) -> list[Place]:
     LocationError, ExtraError
         If a storage cannot be used.
     """
-    found: dict[str, Place] = {}
+    found: dict[str, RecordingPlace] = {}
     templates = list(templates)
     for template in templates:
         for one in find(template.pattern):
             url = one.url.absolute() if isinstance(one.url, Path) else one.url
             machine = tuple(template.machine(str(url)).items())
-            found.setdefault(str(url), Place(url, one.size_bytes or 0, one.version, machine))
+            found.setdefault(str(url), RecordingPlace(url, one.size_bytes or 0, one.version, machine))
     if not found:
         patterns = [template.text for template in templates]
         raise ArchiveError(
@@ -90,7 +90,7 @@ def known_contents(lake: Lake) -> dict[tuple[str, str], str]:
     return dict(zip(zip(url, version), content))
 
 
-def file_rows(contents: Iterable[tuple[Place, str]], machine: dict[str, str]) -> pa.Table:
+def file_rows(contents: Iterable[tuple[RecordingPlace, str]], machine: dict[str, str]) -> pa.Table:
     """Rows of the table `files`; `machine` has the levels for places that name none."""
     rows = [
         {"url": str(place.url), "size_bytes": place.size_bytes, "version": place.version, "content": content}
@@ -101,7 +101,7 @@ def file_rows(contents: Iterable[tuple[Place, str]], machine: dict[str, str]) ->
 
 
 def untracked(
-    contents: Iterable[tuple[Place, str]], recipe: str, skipped: set[tuple[str, ...]]
+    contents: Iterable[tuple[RecordingPlace, str]], recipe: str, skipped: set[tuple[str, ...]]
 ) -> list[ArchivedRecording]:
     """Each content once, at its first place, except those whose key is skipped; the longest first."""
     found: dict[str, ArchivedRecording] = {}
@@ -111,13 +111,13 @@ def untracked(
     return sorted(found.values(), key=lambda one: (-one.place.size_bytes, one.content))
 
 
-def levels_of(place: Place, machine: dict[str, str]) -> dict[str, str | None]:
+def levels_of(place: RecordingPlace, machine: dict[str, str]) -> dict[str, str | None]:
     """The levels of the machine of a place, with those of `machine` where the place names none."""
     own = machine | dict(place.machine)
     return {level: own.get(level) or None for level in LEVELS}
 
 
-def place_of(row: dict[str, str]) -> Place:
+def place_of(row: dict[str, str]) -> RecordingPlace:
     """The place in a row of the table `quarantine`."""
     machine = tuple((level, row[level]) for level in LEVELS if row[level])
-    return Place(location(row["url"]), 0, "", machine)
+    return RecordingPlace(location(row["url"]), 0, "", machine)

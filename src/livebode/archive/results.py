@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from livebode.archive.recordings import ArchivedRecording, Place
+from livebode.archive.recordings import ArchivedRecording, RecordingPlace
 from livebode.core import ArchiveError, LivebodeError
 from livebode.lake import DataFile
 from livebode.locations import with_originals
@@ -18,7 +18,7 @@ _LAKE = ("archive.lake-unusable", "archive.changed-meanwhile")
 class Hashed:
     """The content at a place."""
 
-    item: Place
+    item: RecordingPlace
     content: str
     seconds: float
 
@@ -38,7 +38,7 @@ class Tracked:
 class Failed:
     """A recording that cannot be read or tracked: the code of the error, and its sentence."""
 
-    item: Place | ArchivedRecording
+    item: RecordingPlace | ArchivedRecording
     code: str
     sentence: str
     seconds: float = 0.0
@@ -57,7 +57,7 @@ class Failed:
 Result = Hashed | Tracked | Failed
 
 
-def failed(item: Place | ArchivedRecording, error: Exception, seconds: float = 0.0) -> Failed:
+def failed(item: RecordingPlace | ArchivedRecording, error: Exception, seconds: float = 0.0) -> Failed:
     """The failure that an exception means."""
     if isinstance(error, MemoryError):
         error = ArchiveError(

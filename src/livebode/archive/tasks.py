@@ -6,14 +6,14 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from livebode.archive.recordings import ArchivedRecording, Place
+from livebode.archive.recordings import ArchivedRecording, RecordingPlace
 from livebode.archive.results import Failed, Hashed, Tracked, failed
 from livebode.archive.tracking import Job, track
 from livebode.locations import local_copy
 from livebode.records.content import content_sha256
 
 
-def hash_places(places: Sequence[Place], scratch: Path | None = None) -> list[Hashed | Failed]:  # noqa: ARG001
+def hash_places(places: Sequence[RecordingPlace], scratch: Path | None = None) -> list[Hashed | Failed]:  # noqa: ARG001
     """The content at each place."""
     return [_hashed(place) for place in places]
 
@@ -35,7 +35,7 @@ def track_one(job: Job, recording: ArchivedRecording, scratch: Path | None = Non
     return Tracked(recording, found.files, found.run, found.quantities, time.perf_counter() - started)
 
 
-def _hashed(place: Place) -> Hashed | Failed:
+def _hashed(place: RecordingPlace) -> Hashed | Failed:
     started = time.perf_counter()
     try:
         with local_copy(place.url) as path:

@@ -2,7 +2,7 @@
 
 from livebode.trending.assessment import LIMIT_PERCENT, Assessment, assess
 from livebode.trending.changes import SIGNIFICANT
-from livebode.trending.difference import Difference, differences
+from livebode.trending.difference import LevelDifference, differences
 from livebode.trending.fleet import FALSE_DISCOVERIES, LOGARITHMIC, Ranked, discoveries, months_to_limit, urgency
 from livebode.trending.quantity_history import History, Level, MachineHistory, Selection, histories, history
 from livebode.trending.trend import MONTH_S, RUNS_MIN, ChangePoint, Effect, NotAssessed, Trend, trend_of
@@ -16,10 +16,10 @@ __all__ = [
     "SIGNIFICANT",
     "Assessment",
     "ChangePoint",
-    "Difference",
     "Effect",
     "History",
     "Level",
+    "LevelDifference",
     "MachineHistory",
     "NotAssessed",
     "Ranked",

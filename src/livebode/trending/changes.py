@@ -23,7 +23,7 @@ _CLIP = 2.5  # of the scatter: a single outlier is no jump
 
 
 @dataclass(frozen=True)
-class Place:
+class Break:
     """A change: a jump at a time, or a bend, from which on the slope differs."""
 
     kind: ChangeKind
@@ -58,7 +58,7 @@ class Segmentation:
         Probability of a change like the most significant one in a machine that has none; 1 if too few rows.
     """
 
-    places: tuple[Place, ...]
+    places: tuple[Break, ...]
     terms: Floats
     coefficients: Floats
     fit: RobustFit
@@ -84,7 +84,7 @@ def segmentation(time: Floats, terms: Floats, value: Floats, sigma: Floats) -> S
     value, sigma
         As in `robust_fit`.
     """
-    places: list[Place] = []
+    places: list[Break] = []
     fit = without = robust_fit(terms, value, sigma)
     columns, first_p = terms, 1.0
     for _ in range(_CHANGES_MAX):
@@ -105,14 +105,14 @@ def segmentation(time: Floats, terms: Floats, value: Floats, sigma: Floats) -> S
         columns = np.column_stack([terms, *(place.term(time) for place in places)])
         fit = robust_fit(columns, value, sigma)
     # A bend at another time adds a step in the first order (Muggeo, Stat. Med. 22, 2003).
-    dates = [Place("jump", place.time).term(time) for place in places if place.kind == "bend"]
+    dates = [Break("jump", place.time).term(time) for place in places if place.kind == "bend"]
     wide = np.column_stack([columns, *dates])
     accuracy = robust_fit(wide, value, sigma) if dates else fit
     coefficients = np.pad(fit.coefficients, (0, len(dates)))
     return Segmentation(tuple(places), wide, coefficients, fit, accuracy, without, first_p)
 
 
-def _times(time: Floats, places: list[Place]) -> list[float]:
+def _times(time: Floats, places: list[Break]) -> list[float]:
     """Times at least eight rows from the ends and from other changes, at most 200."""
     rows = np.arange(_ROWS_MIN, len(time) - _ROWS_MIN + 1)
     for place in places:
@@ -120,7 +120,7 @@ def _times(time: Floats, places: list[Place]) -> list[float]:
     return list(np.unique(time[rows[:: max(1, -(-len(rows) // _TIMES_MAX))]]).tolist())
 
 
-def _best(times: list[float], time: Floats, columns: Floats, fit: RobustFit) -> list[Place]:
+def _best(times: list[float], time: Floats, columns: Floats, fit: RobustFit) -> list[Break]:
     """The jump and the bend that explain most of the clipped residuals, beyond what the terms explain."""
     if not times or fit.scatter == 0:
         return []
@@ -130,19 +130,19 @@ def _best(times: list[float], time: Floats, columns: Floats, fit: RobustFit) -> 
     left = left - q @ (q.T @ left)
     found = []
     for kind in _KINDS:
-        terms = np.column_stack([Place(kind, at).term(time) for at in times])
+        terms = np.column_stack([Break(kind, at).term(time) for at in times])
         terms = terms - q @ (q.T @ terms)
         size = np.linalg.norm(terms, axis=0)
         own = size > 1e-6 * size.max()
         gain = np.abs(terms.T @ left)
-        found.append(Place(kind, times[int(np.argmax(np.where(own, gain / np.where(own, size, 1.0), 0.0)))]))
+        found.append(Break(kind, times[int(np.argmax(np.where(own, gain / np.where(own, size, 1.0), 0.0)))]))
     return found
 
 
-_Tried = tuple[Place, Floats, RobustFit]
+_Tried = tuple[Break, Floats, RobustFit]
 
 
-def _tried(place: Place, time: Floats, columns: Floats, value: Floats, sigma: Floats) -> _Tried | None:
+def _tried(place: Break, time: Floats, columns: Floats, value: Floats, sigma: Floats) -> _Tried | None:
     wider = np.column_stack([columns, place.term(time)])
     return (place, wider, robust_fit(wider, value, sigma)) if rank_of(wider) == wider.shape[1] else None
 

@@ -19,7 +19,7 @@ _BOUND_95 = 1.959964
 
 
 @dataclass(frozen=True)
-class Difference:
+class LevelDifference:
     """Second minus first.
 
     Attributes
@@ -50,7 +50,9 @@ class Difference:
     runs: tuple[int, int]
 
 
-def differences(pairs: Sequence[tuple[History, MachineHistory, MachineHistory]]) -> tuple[list[Difference], list[str]]:
+def differences(
+    pairs: Sequence[tuple[History, MachineHistory, MachineHistory]],
+) -> tuple[list[LevelDifference], list[str]]:
     """The difference in each quantity, and the names of those with fewer than eight runs on a side.
 
     The levels are compared by the regression of `robust_fit`, with the covariates that both sides have. A trend within
@@ -61,7 +63,7 @@ def differences(pairs: Sequence[tuple[History, MachineHistory, MachineHistory]])
     known = [(history, one) for history, one in found if one is not None]
     significant = discoveries([one[4] for _, one in known])
     return [
-        Difference(history.model, history.name, history.unit, *one[:5], own, one[5])
+        LevelDifference(history.model, history.name, history.unit, *one[:5], own, one[5])
         for (history, one), own in zip(known, significant)
     ], few
 
