@@ -41,8 +41,8 @@ Names by subject:
 - Simulation: BeltAxis, SimulatedAxis, Strokes
 - Examples: example_axis, example_responses, example_run
 - Errors: LivebodeError (a ValueError) and its kinds BaselineError, ConfigError, DesignError, ExtraError, FitError,
-  GridError, OutputError, RecordError, RecordingError, ServerError, SignalError, SimulationError, SourceError,
-  StateError, UsageError
+  FleetError, GridError, OutputError, RecordError, RecordingError, ServerError, SignalError, SimulationError,
+  SourceError, StateError, UsageError
 
 Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the true value with probability
 1 − exp(−c²). Every public name loads its part of livebode when it is first used. These names are the public interface,
@@ -67,6 +67,7 @@ if TYPE_CHECKING:
         Event,
         ExtraError,
         FitError,
+        FleetError,
         GridError,
         Lines,
         LivebodeError,
@@ -141,6 +142,7 @@ _HOME = {
         "OutputError",
         "LivebodeError",
         "FitError",
+        "FleetError",
         "ExtraError",
         "DesignError",
         "ConfigError",
@@ -180,6 +182,7 @@ __all__ = [
     "Fit",
     "FitError",
     "Fitter",
+    "FleetError",
     "GridError",
     "Lines",
     "LivebodeError",

@@ -17,6 +17,7 @@ from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE
 from livebode.records.segments.journal import Journal
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
+from livebode.records.wide_responses import wide_schema
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/reference/formats.md").read_text("utf-8")
@@ -40,6 +41,14 @@ def test_the_columns_of_the_tables_are_those_that_are_written(name: str, written
     listed = [(names(row[0])[0], row[1]) for row in table(PAGE, name)]
     assert listed == [(field.name, str(field.type)) for field in written.schema]
     assert isinstance(written.schema, pa.Schema)
+
+
+def test_the_columns_of_the_wide_form_are_those_that_are_written() -> None:
+    kinds = {"int64": "int64", "double": "double", "float": "float", "bool": "bool"}
+    kinds |= {f"list of {kind}, one for each line": f"fixed_size_list<item: {kind}>[3]" for kind in ("bool", "float")}
+    rows = table(PAGE, "column", under="### Wide responses")
+    listed = {name: kinds[row[1]] for row in rows for name in names(row[0])}
+    assert listed == {field.name: str(field.type) for field in wide_schema(3)}
 
 
 def test_the_versions_are_those_that_are_written() -> None:

@@ -28,9 +28,10 @@ from livebode.runtime.fits import Fits
 from livebode.runtime.readiness import Readiness
 from livebode.runtime.run_counts import RunCounts
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
-from livebode.sources.live import LiveBlock
+from livebode.sources.live import Batch, LiveBlock, Sequencer
 from livebode.sources.live.kernel_drive import KernelDrive
 from livebode.sources.live.position import Origin
+from livebode.sources.live.source_events import SourceEvents
 from tests.support.axes import LINES as AXIS_LINES
 from tests.support.fitted import LINES as FITTED
 from tests.support.fitted import TRUTH, noisy
@@ -296,6 +297,27 @@ def readiness() -> Case:
     )
 
 
+def sequencer() -> Case:
+    """Batches that wait for one before them, then one that is far ahead: the next two of those are accepted."""
+    far = 10 * int(RATE_HZ)
+
+    def step(numbers: Sequence[int]) -> Callable[[Sequencer], object]:
+        return lambda stage: [
+            (block.start, block.gap, block.data) for number in numbers for block in stage.push(numbered_batch(number))
+        ]
+
+    def new(reorder: int = 2) -> Sequencer:
+        return Sequencer(SourceEvents(), reorder=reorder)
+
+    return Case(new, [step((100, 110, 130)), step((120, far)), step((far + 10,))], [lambda: new(3)])
+
+
+def numbered_batch(first: int) -> Batch:
+    """Ten samples from number `first` on, each of them its own number."""
+    data = np.arange(first, first + 10, dtype=float)[np.newaxis]
+    return Batch(first, data, (Channel("y"),), RATE_HZ, epoch=3, stamp_s=1e9 + first / RATE_HZ, arrived_s=1.0)
+
+
 def stream_position() -> Case:
     """It continues only where its own record ends, so a restored one is made from the snapshot."""
     origin = Origin(epoch=3, offset=100, mark={"name": "a.csv", "offset": 17})
@@ -312,6 +334,6 @@ CASES = {
     for case in (
         tracker, direct_tracker, successive_trackers, local_polynomial, welch_average, spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
-        run_counts, readiness, stream_position,
+        run_counts, readiness, sequencer, stream_position,
     )
 }  # fmt: skip

@@ -61,8 +61,8 @@ def compare_command(
     Runs with a schedule, such as a position, are compared by place and direction, and over all places. The first page
     of the files is as in `livebode report`; limits apply to AFTER.
     """
+    from livebode.configuration.recorded import recorded_report
     from livebode.reporting.compare_report import Comparison
-    from livebode.reporting.first_page import header_of
 
     found = Comparison.of(before, after, ignore_below=_share(ignore_below))
     files: list[Path] = []
@@ -74,7 +74,7 @@ def compare_command(
     if out is None and (template is not None or ask or appendix or language or any(options.values())):
         raise _needs_out()
     if out is not None:
-        first = header(header_of(found.found.runs[1].summary), template, ask, options)
+        first = header(recorded_report(found.found.runs[1].summary), template, ask, options)
         with in_language(language or first.language or "en"):
             document = found.document(datetime.now(UTC), header=first, appendix=appendix)
             files, remark = write_documents(document, out, force=force)

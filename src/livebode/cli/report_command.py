@@ -68,10 +68,10 @@ def report_command(
     --template, and from the options. An existing report in the run directory is replaced. The PDF needs the extra
     `pdf`. Without --check the exit code does not depend on the limits.
     """
+    from livebode.configuration.recorded import recorded_report
     from livebode.core.clock import moments_by
     from livebode.language import in_language
     from livebode.records import RunRecord, to_json
-    from livebode.reporting.first_page import header_of
     from livebode.reporting.report_data import read
     from livebode.reporting.run_report import report_of
 
@@ -80,7 +80,7 @@ def report_command(
         "machine": machine, "serial_number": serial_number, "operator": operator, "company": company,
         "customer": customer, "conditions": conditions, "logo": logo, "paper": paper,
     }  # fmt: skip
-    first = header(header_of(run.summary), template, ask, options)
+    first = header(recorded_report(run.summary), template, ask, options)
     if check and not first.limits:
         raise _no_limits()
     judged = None if on is None else _judged(directory, on)

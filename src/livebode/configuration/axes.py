@@ -104,7 +104,13 @@ def tables_of(data: Mapping[str, Any], origin: str) -> dict[str, dict[str, Any]]
             key="axes",
             names=twice[:2],
         ).at(origin)
-    return {name: merged(shared, axis) for name, axis in axes.items()}
+    return {name: _named(merged(shared, axis), name) for name, axis in axes.items()}
+
+
+def _named(axis: dict[str, Any], name: str) -> dict[str, Any]:
+    """With its name in [machine], if there is that section without one."""
+    machine = axis.get("machine")
+    return axis | {"machine": {"axis": name} | machine} if isinstance(machine, dict) else axis
 
 
 def merged(below: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:

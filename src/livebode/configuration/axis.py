@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.output_only import check_output_only
 from livebode.configuration.ready import ReadyCondition, ready_condition
 from livebode.configuration.report_section import ReportSection, report_error
@@ -488,6 +489,8 @@ class Axis(_Section):
         Address of the dashboard, and access to it.
     report
         The first page of the report, and the limits that the machine must meet.
+    machine
+        Which machine it is.
     """
 
     source: SourceSettings
@@ -502,6 +505,7 @@ class Axis(_Section):
     monitoring: MonitoringSection = MonitoringSection()
     serve: ServeSection = ServeSection()
     report: ReportSection | None = None
+    machine: MachineSection | None = None
 
     @classmethod
     def read(cls, path: Path) -> Axis:
@@ -611,10 +615,9 @@ def _first_of(error: ValidationError) -> ConfigError:
         return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
     secret = MAY_BE_SECRET & {str(part) for part in first["loc"]}
     value = "its value" if secret else shortened(first["input"])
+    why = first["msg"].removeprefix("Value error, ").lower()
     facts = {"key": place} | ({} if secret else {"value": value})
-    return ConfigError(
-        "value-invalid", f"{place} = {value} is not usable: {first['msg'].lower()}", "correct it", **facts
-    )
+    return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", "correct it", **facts)
 
 
 def nearest(loc: tuple[int | str, ...]) -> str:

@@ -7,10 +7,13 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from livebode.configuration.axis import FitSection, LoopSection
+from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.report_section import ReportSection
 from livebode.core import RecordError
 
-_SECTIONS: dict[str, type[BaseModel]] = {"fit": FitSection, "loop": LoopSection, "report": ReportSection}
+_SECTIONS: dict[str, type[BaseModel]] = {
+    "fit": FitSection, "loop": LoopSection, "report": ReportSection, "machine": MachineSection,
+}  # fmt: skip
 
 
 def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:
@@ -38,6 +41,18 @@ def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:
                 key=place,
             ) from None
     return found
+
+
+def recorded_report(summary: dict[str, Any]) -> ReportSection:
+    """The [report] with which a run was recorded; where it names no machine, with the path of [machine].
+
+    >>> recorded_report({"configuration": {"machine": {"line": "2", "machine": "press"}}}).machine
+    '2/press'
+    """
+    configuration = recorded_configuration(summary)
+    report = ReportSection.model_validate(configuration.get("report", {}))
+    path = MachineSection.model_validate(configuration.get("machine", {})).path
+    return report if report.machine else report.over({"machine": path})
 
 
 def _kept(values: dict[str, Any]) -> dict[str, Any]:

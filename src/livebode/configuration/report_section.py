@@ -83,7 +83,7 @@ class ReportSection(_Section):
     Parameters
     ----------
     machine
-        Name or type of the machine. Default: the name of the recording.
+        Name or type of the machine. Default: its path in [machine], or the name of the recording.
     serial_number
         Serial number of the machine.
     operator

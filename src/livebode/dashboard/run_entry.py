@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import pyarrow.parquet as pq
 
+from livebode.configuration.machine_section import LEVELS
 from livebode.core import LivebodeError
 from livebode.core.clock import RunClock
 from livebode.records.inside import open_read
@@ -23,7 +24,7 @@ from livebode.records.summary_shape import what_is_wrong
 
 RunState = Literal["finished", "recording", "stopped", "broken"]
 _GROWS_S = 10.0
-_SEARCHED = ("report", "signals", "source", "lines", "tracking", "monitoring")
+_SEARCHED = ("report", "machine", "signals", "source", "lines", "tracking", "monitoring")
 _WORDS_MAX, _QUANTITIES_MAX, _TEXT_MAX = 1000, 40, 500
 
 
@@ -38,7 +39,8 @@ class RunEntry:
     state
         "finished", "recording" (its files change), "stopped" before its end, "broken" (it cannot be read: `message`).
     machine, recording, signals
-        As configured: who it is, or the address of its source; the file; the channels. Empty if unknown.
+        As configured: its path in [machine], its name in [report], or the address of its source; the file; the
+        channels. Empty if unknown.
     begun, duration_s
         Seconds since 1970, and length; None if unknown.
     written
@@ -152,6 +154,8 @@ def _verdict(summary: Mapping[str, Any]) -> tuple[str, str, int]:
 
 def _machine(configuration: Mapping[str, Any]) -> str:
     """The machine that the run names, else the address that its data are from."""
+    if path := "/".join(_texts(configuration.get("machine") or {}, LEVELS)):
+        return path
     named = _texts(configuration.get("report") or {}, ("machine", "serial_number"))
     return " · ".join(named or _texts(configuration.get("source", {}), ("url",)))[:200]
 

@@ -159,15 +159,16 @@ class RunsPages:
             await page(scope, receive, send)
 
     def _compared(self, before: Path, after: Path, code: str) -> str:
+        from livebode.configuration.recorded import recorded_report
         from livebode.report.html import to_html
         from livebode.reporting.compare_report import Comparison
-        from livebode.reporting.first_page import header_of, trusted
+        from livebode.reporting.first_page import trusted
 
         key = code, *((path.name, (path / "run.json").stat().st_mtime_ns) for path in (before, after))
         if key not in self._comparisons:
             with in_language(code):
                 found = Comparison.of(before, after)
-                header = trusted(header_of(found.found.runs[1].summary), after)
+                header = trusted(recorded_report(found.found.runs[1].summary), after)
                 self._comparisons[key] = to_html(found.document(datetime.now(UTC), header=header))
             while len(self._comparisons) > _COMPARISONS_MAX:
                 self._comparisons.popitem(last=False)

@@ -15,7 +15,7 @@ import numpy as np
 from livebode.analysis.averaged import Averaged
 from livebode.analysis.changes import Changes, QuantityChange, changes, percent
 from livebode.analysis.difference import ALPHA, Compared, Difference, compare
-from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.recorded import recorded_configuration, recorded_report
 from livebode.configuration.report_section import ReportSection
 from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
 from livebode.language import marked, number, recognised, tr, trn
@@ -23,7 +23,6 @@ from livebode.records import RunRecord
 from livebode.records.grouped_events import event_counts
 from livebode.reporting import first_page
 from livebode.reporting.comparison_verdict import detectable, verdict
-from livebode.reporting.first_page import header_of
 from livebode.reporting.limits import limits
 from livebode.reporting.report_data import read, written
 from livebode.reporting.wording import BOUND_95, decibels, pairs, polar, signed, with_bound
@@ -103,7 +102,7 @@ class Comparison:
             Add the settings that differ.
         """
         one, other = self.found.runs
-        header = header_of(other.summary) if header is None else header
+        header = recorded_report(other.summary) if header is None else header
         accepted = read(other.path, header=header).accepted if header.limits else ()
         title = header.machine or tr("{before} and {after}", before=_name(one), after=_name(other))
         sections = [

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 from livebode.analysis.acceptance import Accepted
-from livebode.configuration.recorded import recorded_configuration
 from livebode.configuration.report_section import ReportSection
 from livebode.core.clock import date_and_time
 from livebode.core.document import Finding, Logo, Tone
@@ -19,11 +17,6 @@ from livebode.reporting.logo import read_logo
 
 _URGENT: tuple[Tone, ...] = ("fail", "alarm", "differs", "undecided", "pass", "check", "ok", "open")
 _MORE = 4  # findings below the verdict; all are on the next page
-
-
-def header_of(summary: dict[str, Any]) -> ReportSection:
-    """The [report] with which a run was recorded."""
-    return ReportSection.model_validate(recorded_configuration(summary).get("report", {}))
 
 
 def trusted(header: ReportSection, directory: Path) -> ReportSection:

@@ -15,7 +15,7 @@ from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import LoopReport, loop_report
 from livebode.analysis.parameter_track import MARGINS, Track, tracks
 from livebode.configuration.axis import FitSection, LoopSection
-from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.recorded import recorded_configuration, recorded_report
 from livebode.configuration.report_section import ReportSection
 from livebode.core import LivebodeError, Responses
 from livebode.core.clock import date_and_time
@@ -123,7 +123,7 @@ def read(directory: Path, judged: Judged | None = None, header: ReportSection | 
     loop, loop_words = _loop(configuration, of, fit)
     over = tracks(run, of.overview.sample, of.overview.time_s)
     event_summary = EventSummary.of(run.each_event_and_damage())
-    own = ReportSection.model_validate(configuration.get("report", {})) if header is None else header
+    own = recorded_report(run.summary) if header is None else header
     return ReportData(run, configuration, of, fit, fit_words, loop, loop_words, over, event_summary, judged, own)
 
 

@@ -51,7 +51,7 @@ class StreamPosition:
         if not self._state:
             return None
         place = decode(_STAGE, self._state)["left_at"]
-        return None if place is None else Position(**place | {"arrived": ClockReading(**place["arrived"])})
+        return None if place is None else Position.from_plain(place)
 
     def take(self, block: Block) -> None:
         """The next sample is the one after this block."""

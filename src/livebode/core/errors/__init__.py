@@ -10,6 +10,7 @@ from livebode.core.errors.damage import DamageWarning
 from livebode.core.errors.design import DesignError
 from livebode.core.errors.extra import ExtraError
 from livebode.core.errors.fit import FitError
+from livebode.core.errors.fleet import FleetError
 from livebode.core.errors.grid import GridError
 from livebode.core.errors.output import OutputError
 from livebode.core.errors.record import RecordError
@@ -28,6 +29,7 @@ __all__ = [
     "DesignError",
     "ExtraError",
     "FitError",
+    "FleetError",
     "GridError",
     "LivebodeError",
     "OutputError",

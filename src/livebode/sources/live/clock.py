@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from statistics import median
+from typing import Any
 
+from livebode.core.state import Stage, StatefulBase
 from livebode.sources.live.source_events import SourceEvents
 
 JUMP_S = 0.1
@@ -17,13 +19,15 @@ _INTERVALS = 15
 _INTERVALS_MIN = 4
 
 
-class ClockMonitor:
+class ClockMonitor(StatefulBase):
     """Compares stamps with sample numbers of batches in order. Sample numbers define time; stamps only check it.
 
     A single step in the stamps means that the clock was set (``clock-jump``). Successive intervals that disagree with
     the rate mean a wrong rate (``wrong-rate``): from 2 % immediately, from 0.1 % after ten seconds. An interval is
     judged when the next one is known.
     """
+
+    _stage = Stage("clock-monitor", 1)
 
     def __init__(self, source_events: SourceEvents, rate_hz: float) -> None:
         self._events, self._rate_hz = source_events, rate_hz
@@ -90,3 +94,23 @@ class ClockMonitor:
                 measured_hz=measured_hz,
             )
         self._wrong = wrong
+
+    def _state(self) -> dict[str, Any]:
+        return {
+            "rate_hz": self._rate_hz,
+            "wrong": self._wrong,
+            "last": self._last,
+            "ratios": list(self._ratios),
+            "odd": self._odd,
+            "drift_s": self._drift_s,
+            "length_s": self._length_s,
+            "offset_s": self.offset_s,
+        }
+
+    def _load(self, state: dict[str, Any]) -> None:
+        self._rate_hz, self._wrong = state["rate_hz"], state["wrong"]
+        last, odd = state["last"], state["odd"]
+        self._last = None if last is None else (last[0], last[1])
+        self._odd = None if odd is None else (odd[0], odd[1])
+        self._ratios = deque(state["ratios"], maxlen=_INTERVALS)
+        self._drift_s, self._length_s, self.offset_s = state["drift_s"], state["length_s"], state["offset_s"]

@@ -45,3 +45,8 @@ class Position:
     rate_hz: float
     arrived: ClockReading
     mark: Mark | None = None
+
+    @classmethod
+    def from_plain(cls, plain: Mapping[str, Any]) -> Position:
+        """Position from plain data, as `asdict` gives it."""
+        return cls(**{**plain, "arrived": ClockReading(**plain["arrived"])})

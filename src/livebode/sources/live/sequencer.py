@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+from typing import Any
+
+from livebode.core.state import Stage, StatefulBase
 from livebode.sources.live.batch import LiveBlock
+from livebode.sources.live.batch_state import batches_from_state, batches_to_state
 from livebode.sources.live.clock import ClockMonitor
 from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.position import Position
@@ -18,9 +23,10 @@ JUMP_S = 1.0
 CLOCK_S = 10.0
 """How much the pause of a sender without an epoch may be longer by its numbers than by this computer's clock."""
 _EPOCHS_REMEMBERED = 64
+_PLAIN = ("_epoch", "_next", "_highest", "_progress_s", "_gap", "_number", "_begun_at", "_paced", "lost")
 
 
-class Sequencer:
+class Sequencer(StatefulBase):
     """Puts batches in order by the numbers of their samples.
 
     Batches that arrive at most `reorder` batches late are sorted; samples that are then still missing are lost: the
@@ -30,6 +36,10 @@ class Sequencer:
 
     A batch that is out of place is accepted only when more of its kind follow, with none of the stream between them; a
     sender that was replaced is accepted again in the same way. This and `reorder` bound the memory.
+
+    A restored sequencer returns the Blocks that the first one would have returned. `arrived_s` and `now_s` must then be
+    of one clock on both sides: of the log for a stream that another computer continues, not `time.monotonic()`. Events
+    that were reported before the snapshot stay with their collector.
 
     Parameters
     ----------
@@ -45,6 +55,8 @@ class Sequencer:
         Batches of a new epoch that must arrive before it is accepted: 1 if only one sender is possible.
     """
 
+    _stage = Stage("sequencer", 1)
+
     def __init__(
         self,
         source_events: SourceEvents,
@@ -56,6 +68,7 @@ class Sequencer:
     ) -> None:
         self._events, self._reorder, self._wait_s = source_events, reorder, wait_s
         self._unconfirmed = UnconfirmedBatches(source_events, confirmed, reorder)
+        self._settings = f"reorder={reorder} wait_s={wait_s!r} rate_hz={rate_hz!r} confirmed={confirmed}"
         self._jump_s = JUMP_S if confirmed > 1 else FAR_AHEAD_S
         self.schema = StreamSchema(source_events, rate_hz)
         self.clock: ClockMonitor | None = None
@@ -282,3 +295,33 @@ class Sequencer:
             epoch=f"{epoch:#x}",
             **details,
         )
+
+    @property
+    def _identity(self) -> str:
+        return self._settings
+
+    def _state(self) -> dict[str, Any]:
+        return {name.lstrip("_"): getattr(self, name) for name in _PLAIN} | {
+            "left": list(self._left.items()),
+            "resumed": None if self._resumed is None else asdict(self._resumed),
+            "position": self._events.position,
+            "waiting": batches_to_state(list(self._waiting.values())),
+            "schema": self.schema,
+            "unconfirmed": self._unconfirmed,
+            "clock": self.clock,
+        }
+
+    def _load(self, state: dict[str, Any]) -> None:
+        for name in _PLAIN:
+            setattr(self, name, state[name.lstrip("_")])
+        self._left = dict(state["left"])
+        self._resumed = None if state["resumed"] is None else Position.from_plain(state["resumed"])
+        self._waiting = {batch.first_sample: batch for batch in batches_from_state(state["waiting"])}
+        self.schema.restore(state["schema"])
+        self._unconfirmed.restore(state["unconfirmed"])
+        self.clock = None
+        if state["clock"] is not None:
+            self.clock = ClockMonitor(self._events, self.schema.rate_hz or 1.0)
+            self.clock.restore(state["clock"])
+        sample, time_s = state["position"]
+        self._events.position = (sample, time_s)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
 from livebode.core import Channel, SpectraLayout
+from livebode.core.state import Stage, StatefulBase
+from livebode.sources.live.batch_state import channels_of, layout_of
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
 
 SAME_RATE = 1e-9
 
 
-class StreamSchema:
+class StreamSchema(StatefulBase):
     """Channels and rate of a stream. A batch with others is skipped, because its values have another meaning.
 
     Channels in another order, or with new ones among them, are sorted and used. Spectra must have the same layout. The
@@ -26,6 +29,8 @@ class StreamSchema:
     rate_hz
         Required rate, if it is known in advance.
     """
+
+    _stage = Stage("stream-schema", 1)
 
     def __init__(self, source_events: SourceEvents, rate_hz: float | None = None) -> None:
         self._events = source_events
@@ -98,6 +103,31 @@ class StreamSchema:
                 "layout-changed", "the sender's channels changed; the first ones are used, by name", channels=names
             )
         return [names.index(channel.name) for channel in self.channels]
+
+    def _state(self) -> dict[str, Any]:
+        return {
+            "channels": [asdict(channel) for channel in self.channels],
+            "rate_hz": self.rate_hz,
+            "spectra": None if self.spectra is None else asdict(self.spectra),
+            "seen": None if self._seen is None else _seen_to_plain(*self._seen),
+            "rows": self._rows,
+        }
+
+    def _load(self, state: dict[str, Any]) -> None:
+        self.channels, self.rate_hz = channels_of(state["channels"]), state["rate_hz"]
+        self.spectra = layout_of(state["spectra"])
+        self._seen = None if state["seen"] is None else _seen_of(state["seen"])
+        self._rows = state["rows"]
+
+
+def _seen_to_plain(seen: SpectraLayout | tuple[Channel, ...], rate_hz: float) -> dict[str, Any]:
+    if isinstance(seen, SpectraLayout):
+        return {"layout": asdict(seen), "rate_hz": rate_hz}
+    return {"layout": None, "channels": [asdict(channel) for channel in seen], "rate_hz": rate_hz}
+
+
+def _seen_of(plain: dict[str, Any]) -> tuple[SpectraLayout | tuple[Channel, ...], float]:
+    return layout_of(plain["layout"]) or channels_of(plain["channels"]), plain["rate_hz"]
 
 
 def _layout(batch: AnyBatch) -> SpectraLayout | None:

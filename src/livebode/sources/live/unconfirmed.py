@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from livebode.core.state import Stage, StatefulBase
+from livebode.sources.live.batch_state import batches_from_state, batches_to_state
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch
 
@@ -13,7 +17,7 @@ CONFIRMED_NEAR = 32
 """The same if numbers go back by less than a minute: a broker may repeat that many."""
 
 
-class UnconfirmedBatches:
+class UnconfirmedBatches(StatefulBase):
     """Batches that do not continue the stream, of one kind at a time; a batch of another kind replaces them.
 
     Parameters
@@ -25,6 +29,8 @@ class UnconfirmedBatches:
     reorder
         Number of batches that may be late: a replaced epoch needs more than this to be accepted again.
     """
+
+    _stage = Stage("unconfirmed-batches", 1)
 
     def __init__(self, source_events: SourceEvents, confirmed: int, reorder: int) -> None:
         self._events, self._confirmed = source_events, confirmed
@@ -71,3 +77,9 @@ class UnconfirmedBatches:
             return []
         accepted, self._batches = self._batches, []
         return accepted
+
+    def _state(self) -> dict[str, Any]:
+        return {"batches": batches_to_state(self._batches)}
+
+    def _load(self, state: dict[str, Any]) -> None:
+        self._batches = batches_from_state(state["batches"])

@@ -1,0 +1,92 @@
+"""Bytes of a stored response: long as the run directory has it, and wide as an archive and a fleet have it.
+
+`python -m bench.response_sizes`: a simulated belt axis that moves, with 1, 7, 21 and 101 lines in a window of 400 at
+4 kHz and a response every 20 samples. All quantities, and value, sigma and coherence alone, which are what a Bode plot
+needs. The last columns are processor times of one response.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from livebode.core import Lines, Responses
+from livebode.estimation import Settings, Tracker
+from livebode.excitation import multisine
+from livebode.records import RESPONSES, as_batch
+from livebode.records.table_file import ColumnTable, TableFile
+from livebode.records.wide_responses import from_wide, to_wide, wide_options
+from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
+
+RATE_HZ, WINDOW, HOP, SECONDS = 4000.0, 400, 20, 60.0
+COUNTS = 1, 7, 21, 101
+AMPLITUDE_N_M, NOISE_RAD_PER_S = 0.3, 0.05
+LEFT_OUT = {"weight_re", "weight_im", "input_coherence", "distortion"}
+TARGET_WIDE, TARGET_LONG, TARGET_LINES = 85, 236, 7
+
+
+def tracked(count: int) -> Responses:
+    """Responses of the axis at this number of lines, from 20 Hz on."""
+    lines = Lines(tuple(range(2, 2 + count)), WINDOW, RATE_HZ)
+    axis = BeltAxis(
+        excitation_n_m=multisine(lines, AMPLITUDE_N_M * (7 / count) ** 0.5),
+        sensor=Sensor(noise_rad_per_s=NOISE_RAD_PER_S), motion=Strokes(), run_in_s=0.5, seconds=SECONDS,
+    )  # fmt: skip
+    block, _ = SimulatedAxis(axis).run()
+    settings = Settings(lines=lines, excitation="w", input="u", output="velocity", schedule="x", hop=HOP)
+    return Tracker(settings).process(block)
+
+
+def long_bytes(responses: Responses, path: Path, left_out: set[str]) -> int:
+    """Of the file that the run directory would have, without some columns."""
+    batch = as_batch(responses)
+    batch = batch.select([name for name in batch.schema.names if name not in left_out])
+    repeating = tuple(name for name in RESPONSES.repeating if name not in left_out)
+    file = TableFile(path, ColumnTable(batch.schema, repeating))
+    file.write(batch)
+    file.close()
+    return path.stat().st_size
+
+
+def wide_bytes(table: pa.Table, path: Path, left_out: set[str]) -> int:
+    kept = table.drop_columns(list(left_out))
+    pq.write_table(kept, path, **wide_options(kept.schema))
+    return path.stat().st_size
+
+
+def found_of(responses: Responses) -> dict[str, object]:
+    lines = responses.lines
+    grid = {"bins": lines.bins, "quiet_bins": lines.quiet, "window": lines.window, "rate_hz": lines.rate_hz}
+    return grid | {"quantity": responses.quantity, "unit": responses.unit}
+
+
+def main() -> None:
+    print("bytes of      all quantities             value, sigma, coherence    lossless    processor, µs")
+    print("a response    long    wide  long/wide      long    wide  long/wide      wide    write    read")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "responses.parquet"
+        for count in COUNTS:
+            responses = tracked(count)
+            wide_bytes(to_wide(responses), path, set())
+            from_wide(pq.read_table(path), found_of(responses))  # both once before they are measured
+            rows, row = len(responses), f"{count:4d} lines"
+            for left_out in (set[str](), LEFT_OUT):
+                long = long_bytes(responses, path, left_out) / rows
+                wide = wide_bytes(to_wide(responses), path, left_out) / rows
+                row += f"{long:8.0f} {wide:7.0f} {long / wide:9.2f}   "
+            lossless = wide_bytes(to_wide(responses, lossless=True), path, set()) / rows
+            began = time.process_time()
+            wide_bytes(to_wide(responses), path, set())
+            written = time.process_time()
+            from_wide(pq.read_table(path), found_of(responses))
+            read = time.process_time()
+            print(f"{row}{lossless:7.0f} {1e6 * (written - began) / rows:8.1f} {1e6 * (read - written) / rows:7.1f}")
+    print(f"target at {TARGET_LINES} lines: {TARGET_WIDE} B against {TARGET_LONG} B, {TARGET_LONG / TARGET_WIDE:.2f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,32 @@
+"""A fleet that cannot be run or checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from livebode.core.errors.base import LivebodeError
+
+
+class FleetError(LivebodeError):
+    """A fleet, its log or one of its axes cannot be used.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> livebode.FleetError.codes["log-unreachable"]
+    'The server of the log cannot be reached, or rejects the connection.'
+    """
+
+    area: ClassVar[str] = "fleet"
+    codes: ClassVar[Mapping[str, str]] = {
+        "axis-duplicated": "Two axes of the fleet have the same site, line, machine and axis.",
+        "axis-unknown": "The fleet has no axis of this path.",
+        "axis-unnamed": "An axis of the fleet has no [machine] section, so its place in the log is not defined.",
+        "buffer-unusable": "The disk buffer of an edge cannot be read or written.",
+        "log-incomplete": "The log no longer has its beginning, so the results cannot be computed again.",
+        "log-unreachable": "The server of the log cannot be reached, or rejects the connection.",
+        "not-exactly-once": "Stored responses are missing, doubled or different from one uninterrupted computation.",
+        "server-ended": "The server of the log ended at its start.",
+        "server-missing": "The program nats-server is not installed.",
+    }

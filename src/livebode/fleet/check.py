@@ -1,0 +1,193 @@
+"""`livebode fleet check`: stored responses compared, bit for bit, with one uninterrupted computation from the log."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from hashlib import blake2b
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from livebode.arrow import to_numpy
+from livebode.configuration.axis import Axis
+from livebode.core.errors import FleetError
+from livebode.fleet.axis_stream import AxisStream
+from livebode.fleet.log import Log
+from livebode.fleet.reader import stored_messages
+from livebode.fleet.result_message import SCHEMA, ResultMessage, response_rows
+from livebode.fleet.subjects import LOG, LOG_STREAM, RESULT_STREAM, RESULTS, axis_path, key_of
+
+_DIGEST_BYTES = 16
+_NAMES = SCHEMA.names[3:]
+Run = tuple[str, int]
+"""Key of an axis, and number of the first message of the run."""
+
+
+@dataclass
+class AxisVerdict:
+    """Responses of an axis: expected ones, and stored ones that differ from them.
+
+    Attributes
+    ----------
+    responses
+        Computed again, from the messages whose results must be stored.
+    missing, doubled, different
+        Of these, not stored, stored more than once, stored with other bits.
+    unexpected
+        Stored, but not computed again.
+    other_recipe
+        Stored with another configuration than today's, so not compared.
+    """
+
+    responses: int = 0
+    missing: int = 0
+    doubled: int = 0
+    different: int = 0
+    unexpected: int = 0
+    other_recipe: int = 0
+
+    @property
+    def exact(self) -> bool:
+        return not (self.missing or self.doubled or self.different or self.unexpected)
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """Verdicts by the path of the axis, and the claims of partitions: one at the start, one for each takeover."""
+
+    axes: Mapping[str, AxisVerdict]
+    claims: int
+    messages: int
+
+    @property
+    def exact(self) -> bool:
+        return all(axis.exact for axis in self.axes.values())
+
+    @property
+    def total(self) -> AxisVerdict:
+        """The sum over all axes."""
+        sums: Counter[str] = Counter()
+        for axis in self.axes.values():
+            sums.update(asdict(axis))
+        return AxisVerdict(**sums)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        axes = {path: asdict(axis) for path, axis in self.axes.items()}
+        return {"exact": self.exact, "claims": self.claims, "messages": self.messages, "axes": axes}
+
+
+class _Stored:
+    """Digests of the stored responses, and for each partition the message up to which they are complete."""
+
+    def __init__(self) -> None:
+        self.responses: dict[Run, list[tuple[int, bytes]]] = {}
+        self.recipes: dict[Run, str] = {}
+        self.through: dict[str, int] = {}
+        self.claims = 0
+
+    def add(self, partition: str, message: ResultMessage) -> None:
+        self.through[partition] = message.through
+        self.claims += message.claim
+        for key, run, number, digest in _digests(message.rows):
+            self.responses.setdefault((key, run), []).append((number, digest))
+            self.recipes[key, run] = message.recipes[key]
+
+
+async def check_results(log: Log, axes: Mapping[str, Axis]) -> CheckResult:
+    """Compute all responses again from the log, in one process and without interruption, and compare the stored ones.
+
+    A fleet may run meanwhile: what is not stored yet is not expected.
+
+    Raises
+    ------
+    FleetError
+        If the log no longer has its beginning.
+    """
+    stored = _Stored()
+    extent = await log.extent(RESULT_STREAM)
+    async for message in stored_messages(log, RESULT_STREAM, f"{RESULTS}.*", extent.last, extent.first):
+        stored.add(message.subject.split(".")[1], ResultMessage.from_bytes(message.data))
+    extent = await log.extent(LOG_STREAM)
+    if extent.first > 1:
+        raise FleetError(
+            "log-incomplete",
+            f"the log begins at message {extent.first}: older ones are deleted",
+            "check a fleet whose log still has its beginning; see size_gb and age_days in [log]",
+            first=extent.first,
+        )
+    again = _Again(axes, stored)
+    async for message in stored_messages(log, LOG_STREAM, f"{LOG}.>", extent.last):
+        again.process(message.subject, message.data, message.number, message.stored_s)
+    return CheckResult(again.verdicts(), stored.claims, extent.last)
+
+
+class _Again:
+    """The uninterrupted computation: a stream for each run of each axis."""
+
+    def __init__(self, axes: Mapping[str, Axis], stored: _Stored) -> None:
+        self._axes, self._stored = axes, stored
+        self._runs: dict[str, list[int]] = {}
+        for key, run in stored.responses:
+            self._runs.setdefault(key, []).append(run)
+        self._streams: dict[str, AxisStream] = {}
+        self._expected: dict[Run, dict[int, bytes]] = {}
+
+    def process(self, subject: str, data: bytes, number: int, stored_s: float) -> None:
+        key, partition = key_of(subject), subject.split(".")[1]
+        if key not in self._axes or number > self._stored.through.get(partition, 0):
+            return
+        if key not in self._streams or number in self._runs.get(key, ()):
+            self._streams[key] = AxisStream(self._axes[key], number)
+        stream = self._streams[key]
+        output = stream.process(data, number, stored_s)
+        if output.responses is not None:
+            rows = pa.Table.from_batches([response_rows(key, stream.run, output.number, output.responses)])
+            for _, run, response, digest in _digests(rows):
+                self._expected.setdefault((key, run), {})[response] = digest
+
+    def verdicts(self) -> dict[str, AxisVerdict]:
+        found: dict[str, AxisVerdict] = {axis_path(key): AxisVerdict() for key in sorted(self._axes)}
+        for key, run in sorted(self._expected.keys() | self._stored.responses.keys()):
+            verdict = found.setdefault(axis_path(key), AxisVerdict())
+            stored, expected = self._stored.responses.get((key, run), []), self._expected.get((key, run), {})
+            stream = self._streams.get(key)
+            if stored and (stream is None or self._stored.recipes[key, run] != stream.recipe):
+                verdict.other_recipe += len(stored)
+            else:
+                _compare(verdict, expected, stored)
+        return found
+
+
+def _compare(verdict: AxisVerdict, expected: Mapping[int, bytes], stored: list[tuple[int, bytes]]) -> None:
+    times = Counter(number for number, _ in stored)
+    verdict.responses += len(expected)
+    verdict.missing += len(expected.keys() - times.keys())
+    verdict.doubled += sum(times.values()) - len(times)
+    verdict.unexpected += len(times.keys() - expected.keys())
+    verdict.different += sum(number in expected and expected[number] != digest for number, digest in stored)
+
+
+def _digests(rows: pa.Table) -> Iterator[tuple[str, int, int, bytes]]:
+    """Axis, run, number and digest of each response in a table, from all bits of all of its rows."""
+    for part in rows.to_batches():
+        numbers, runs = to_numpy(part["number"]), to_numpy(part["run"])
+        keys = part["axis"].to_pylist()
+        table = np.hstack([_bytes(to_numpy(part[name])) for name in _NAMES])
+        begins = [0, *(np.flatnonzero((np.diff(numbers) != 0) | (np.diff(runs) != 0) | _differs(keys)) + 1)]
+        for first, stop in zip(begins, [*begins[1:], len(numbers)]):
+            if stop > first:
+                digest = blake2b(table[first:stop].tobytes(), digest_size=_DIGEST_BYTES).digest()
+                yield keys[first], int(runs[first]), int(numbers[first]), digest
+
+
+def _differs(keys: list[str]) -> np.ndarray:
+    return np.array([one != other for one, other in pairwise(keys)], dtype=bool)
+
+
+def _bytes(column: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(column).view(np.uint8).reshape(len(column), -1)

@@ -1,0 +1,141 @@
+"""Edge: the batches of a live source, through a buffer on disk, into the log."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+import time
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from livebode.fleet.edge_buffer import EdgeBuffer
+from livebode.fleet.log import Log
+from livebode.fleet.message import message_id, read_message, write_message
+from livebode.fleet.settings import FleetSettings, LogSection
+from livebode.fleet.subjects import EDGE
+from livebode.sources.live import Batch, LiveBlock, LiveSource, SpectraBatch
+from livebode.sources.live.spectra_batch import AnyBatch, LiveSpectra
+
+_IDLE_S = 0.05
+_REST_S = 1.0
+_logger = logging.getLogger(__name__)
+
+
+class Edge:
+    """Sends the messages of a buffer to the log, in order, each until the log has stored it.
+
+    Parameters
+    ----------
+    key
+        Of the axis.
+    buffer
+        To which the batches are appended.
+    """
+
+    def __init__(self, key: str, buffer: EdgeBuffer) -> None:
+        self._key, self._buffer = key, buffer
+        self._dropped = buffer.dropped
+        self.sent = 0
+        """Messages that the log has stored."""
+
+    def take(self, batch: AnyBatch) -> None:
+        """Append a batch to the buffer; may be called from any thread."""
+        self._buffer.append(write_message(batch))
+        if self._buffer.dropped > self._dropped:
+            lost, self._dropped = self._buffer.dropped - self._dropped, self._buffer.dropped
+            _logger.warning("the buffer is full: the oldest %d messages were deleted", lost)
+
+    async def send(self, log: Log, taking: threading.Thread) -> None:
+        """Send until the thread that fills the buffer has ended, and the buffer is empty."""
+        while True:
+            over = not taking.is_alive()
+            message = self._buffer.first()
+            if message is not None:
+                identity = message_id(self._key, read_message(message, 0.0))
+                await log.append(f"{EDGE}.{self._key}", message, identity)
+                self._buffer.remove(message)
+                self.sent += 1
+            elif over:
+                return
+            else:
+                await asyncio.sleep(_IDLE_S)
+
+
+def sender_batches(source: LiveSource) -> Iterator[AnyBatch]:
+    """The batches of an open source, with the numbers and epochs of its sender.
+
+    A sender without epochs gets one from this computer's clock whenever it restarts, so that the log does not take
+    its new numbers for repeats.
+    """
+    epochs: dict[int, int] = {}
+    for block in source.blocks():
+        assert isinstance(block, LiveBlock)
+        assert block.origin is not None
+        offset, epoch = block.origin.offset, block.origin.epoch
+        if not epoch:
+            if offset not in epochs:
+                epochs = {offset: time.time_ns()}
+            epoch = epochs[offset]
+        first = block.start + offset
+        if isinstance(block, LiveSpectra):
+            values = np.array([block[channel.name] for channel in block.layout.values]).reshape(-1, len(block.state))
+            yield SpectraBatch(first, block.sums, values, block.state, block.layout, block.rate_hz, epoch)
+        else:
+            yield Batch(first, block.data, block.channels, block.rate_hz, epoch)
+
+
+def send_sources(settings: FleetSettings, sources: Mapping[str, LiveSource], stop: threading.Event) -> int:
+    """Send the batches of open sources until they end, or until `stop` is set and a second has passed.
+
+    What the log has not stored by then remains in the buffer, and is sent at the next start. Returns the number of
+    messages that were stored.
+
+    Parameters
+    ----------
+    settings
+        Of the fleet.
+    sources
+        By the key of their axis.
+
+    Raises
+    ------
+    FleetError
+        If the log cannot be reached at the start, or a buffer cannot be used.
+    """
+    bytes_max = round(settings.edge.buffer_gb * 1e9 / max(1, len(sources)))
+    buffers = {key: EdgeBuffer(settings.edge.buffer / key, bytes_max) for key in sources}
+    edges = {key: Edge(key, buffer) for key, buffer in buffers.items()}
+    threads = [
+        threading.Thread(target=_take_all, args=(source, edges[key]), name=f"livebode send {key}")
+        for key, source in sources.items()
+    ]
+    try:
+        for thread in threads:
+            thread.start()
+        asyncio.run(_send_all(settings.log, list(zip(edges.values(), threads)), stop))
+    finally:
+        for source in sources.values():
+            source.stop()
+        for thread in threads:
+            thread.join()
+        for buffer in buffers.values():
+            buffer.close()
+    return sum(edge.sent for edge in edges.values())
+
+
+def _take_all(source: LiveSource, edge: Edge) -> None:
+    for batch in sender_batches(source):
+        edge.take(batch)
+
+
+async def _send_all(settings: LogSection, edges: list[tuple[Edge, threading.Thread]], stop: threading.Event) -> None:
+    async with Log(settings, "livebode send") as log:
+        await log.create_streams()
+        sending = asyncio.gather(*(edge.send(log, thread) for edge, thread in edges))
+        while not sending.done() and not stop.is_set():
+            await asyncio.sleep(_IDLE_S)
+        await asyncio.wait([sending], timeout=_REST_S)
+        sending.cancel()
+        await asyncio.gather(sending, return_exceptions=True)

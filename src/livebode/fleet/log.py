@@ -1,0 +1,254 @@
+"""Log: the connection to NATS JetStream. Everything that is stored, is stored here."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+import uuid
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from livebode.core.errors import FleetError
+from livebode.core.installing import not_installed
+from livebode.fleet import subjects
+from livebode.fleet.settings import LogSection
+
+_logger = logging.getLogger(__name__)
+_EXPECTED, _WRITE = "Nats-Expected-Last-Subject-Sequence", "Livebode-Write"
+_WRONG_LAST_SEQUENCE = 10071
+_REQUEST_S, _CONNECT_S, _RETRY_S, _RETRY_S_MAX = 2.0, 2.0, 0.1, 1.0
+_DUPLICATES_S = 120.0
+T = TypeVar("T")
+
+
+class ClaimLostError(Exception):
+    """Another owner has claimed the partition: its last message is not the one that this owner expects."""
+
+
+@dataclass(frozen=True)
+class StoredMessage:
+    """A message of a stream: its number there, its data, and when the server received it, seconds since 1970."""
+
+    subject: str
+    number: int
+    data: bytes
+    write: str
+    stored_s: float
+
+
+@dataclass(frozen=True)
+class StreamExtent:
+    """Numbers of the first and the last message of a stream, its size, and its messages by subject."""
+
+    first: int
+    last: int
+    size_bytes: int
+    subjects: Mapping[str, int]
+
+
+class Log:
+    """A connection to the server of the log. Each request is repeated until the server answers.
+
+    Use it as an asynchronous context manager.
+
+    Parameters
+    ----------
+    settings
+        Address and limits.
+    name
+        Of this connection, as the server lists it.
+    """
+
+    def __init__(self, settings: LogSection, name: str) -> None:
+        self.settings, self._name = settings, name
+        self.trouble = ""
+        """Why the server does not answer at the moment; empty while it does."""
+
+    async def __aenter__(self) -> Log:
+        """Connect.
+
+        Raises
+        ------
+        FleetError
+            If the server cannot be reached within some seconds.
+        ExtraError
+            If nats-py is not installed.
+        """
+        try:
+            import nats
+        except ImportError:
+            raise not_installed(
+                "the log of a fleet needs nats-py, which is not installed", "nats-py", "fleet"
+            ) from None
+        self._nats = nats
+        try:
+            self._connection = await nats.connect(
+                self.settings.url.split(","),
+                name=self._name,
+                connect_timeout=_CONNECT_S,
+                max_reconnect_attempts=-1,
+                reconnect_time_wait=0.2,
+                ping_interval=2,
+                max_outstanding_pings=2,
+                error_cb=self._note,
+                allow_reconnect=True,
+            )
+        except (TimeoutError, OSError, nats.errors.Error) as error:
+            raise FleetError(
+                "log-unreachable",
+                f"the log at {self.settings.url} cannot be reached ({error or type(error).__name__})",
+                "check that nats-server runs there, and the url in [log]",
+                url=self.settings.url,
+            ) from None
+        self.errors: type[Exception] = nats.errors.Error
+        self._js = self._connection.jetstream(timeout=_REQUEST_S)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        with contextlib.suppress(self._nats.errors.Error, asyncio.TimeoutError):
+            await self._connection.close()
+
+    async def create_streams(self) -> None:
+        """Create the streams of a fleet where they are missing."""
+        from nats.js import api
+
+        each = self.settings.replicas
+        common: dict[str, Any] = {"storage": api.StorageType.FILE, "num_replicas": each}
+        newest: dict[str, Any] = {"max_msgs_per_subject": 1, **common}
+        streams = [
+            api.StreamConfig(
+                name=subjects.LOG_STREAM,
+                subjects=[f"{subjects.LOG}.>"],
+                max_bytes=round(self.settings.size_gb * 1e9),
+                max_age=self.settings.age_days * 86400,
+                duplicate_window=_DUPLICATES_S,
+                **common,
+            ),
+            api.StreamConfig(
+                name=subjects.RESULT_STREAM,
+                subjects=[f"{subjects.RESULTS}.*"],
+                max_bytes=round(self.settings.results_gb * 1e9),
+                **common,
+            ),
+            api.StreamConfig(name=subjects.STATE_STREAM, subjects=[f"{subjects.STATES}.>"], **newest),
+            api.StreamConfig(name=subjects.STATUS_STREAM, subjects=[f"{subjects.STATUS}.*"], **newest),
+        ]
+        for stream in streams:
+            await self._create(stream)
+
+    async def _create(self, stream: Any) -> None:
+        from nats.js.errors import NotFoundError
+
+        async def create() -> None:
+            try:
+                await self._js.stream_info(stream.name)
+            except NotFoundError:
+                await self._js.add_stream(stream)
+
+        await self._repeated(create)
+
+    async def append(self, subject: str, data: bytes, identity: str | None = None) -> int:
+        """Store a message, and return its number; one with the `identity` of a recent one is stored only once."""
+        headers = {"Nats-Msg-Id": identity} if identity else None
+        ack = await self._repeated(lambda: self._js.publish(subject, data, headers=headers, timeout=_REQUEST_S))
+        return int(ack.seq)
+
+    async def append_after(self, stream: str, subject: str, data: bytes, after: int) -> int:
+        """Store a message if `after` is still the number of the last one of its subject; returns its number.
+
+        This is the fence: of two processes that both own a partition, one is refused. A write whose outcome is not
+        known, because the server did not answer, is looked up, and repeated only if it did not arrive.
+
+        Raises
+        ------
+        ClaimLostError
+            If another process has stored a message there.
+        """
+        write = uuid.uuid4().hex
+        headers = {_EXPECTED: str(after), _WRITE: write}
+        pause_s = _RETRY_S
+        while True:
+            try:
+                return int((await self._js.publish(subject, data, headers=headers, timeout=_REQUEST_S)).seq)
+            except (TimeoutError, self._nats.errors.Error) as error:
+                if getattr(error, "err_code", None) != _WRONG_LAST_SEQUENCE:
+                    self._report(error)
+                    await asyncio.sleep(pause_s)
+                    pause_s = min(2 * pause_s, _RETRY_S_MAX)
+            last = await self.last(stream, subject)
+            if last is not None and last.write == write:
+                return last.number
+            if (0 if last is None else last.number) != after:
+                raise ClaimLostError(subject)
+
+    async def last(self, stream: str, subject: str) -> StoredMessage | None:
+        """The newest message of a subject."""
+        from nats.js.errors import NotFoundError
+
+        async def get() -> StoredMessage | None:
+            try:
+                return _stored(await self._js.get_last_msg(stream, subject))
+            except NotFoundError:
+                return None
+
+        return await self._repeated(get)
+
+    async def following(self, stream: str, subject: str, number: int) -> int | None:
+        """Number of the first message of a subject that is at least `number`."""
+        from nats.js.errors import NotFoundError
+
+        async def get() -> int | None:
+            try:
+                return (await self._js.get_msg(stream, number, subject=subject, next=True)).seq
+            except NotFoundError:
+                return None
+
+        return await self._repeated(get)
+
+    async def extent(self, stream: str, subject: str = ">") -> StreamExtent:
+        """First and last number, size, and the subjects that match."""
+        state = (await self._repeated(lambda: self._js.stream_info(stream, subjects_filter=subject))).state
+        return StreamExtent(state.first_seq, state.last_seq, state.bytes, state.subjects or {})
+
+    async def subscription(self, stream: str, subject: str, first: int, inactive_s: float) -> Any:
+        """A consumer of a subject from a number on, without acknowledgements, in the memory of the server."""
+        from nats.js import api
+
+        config = api.ConsumerConfig(
+            ack_policy=api.AckPolicy.NONE,
+            deliver_policy=api.DeliverPolicy.BY_START_SEQUENCE,
+            opt_start_seq=max(1, first),
+            inactive_threshold=inactive_s,
+            mem_storage=True,
+        )
+        return await self._js.pull_subscribe(subject, stream=stream, config=config)
+
+    async def _repeated(self, request: Callable[[], Awaitable[T]]) -> T:
+        pause_s = _RETRY_S
+        while True:
+            try:
+                result = await request()
+            except (TimeoutError, self._nats.errors.Error) as error:
+                self._report(error)
+            else:
+                self.trouble = ""
+                return result
+            await asyncio.sleep(pause_s)
+            pause_s = min(2 * pause_s, _RETRY_S_MAX)
+
+    async def _note(self, error: Exception) -> None:
+        self._report(error)
+
+    def _report(self, error: Exception) -> None:
+        if not self.trouble:
+            _logger.warning("the log does not answer (%s); retrying", error or type(error).__name__)
+        self.trouble = str(error) or type(error).__name__
+
+
+def _stored(raw: Any) -> StoredMessage:
+    headers = raw.headers or {}
+    stored_s = raw.time.timestamp() if raw.time is not None else time.time()
+    return StoredMessage(raw.subject, raw.seq, raw.data or b"", headers.get(_WRITE, ""), stored_s)

@@ -1,0 +1,53 @@
+"""Messages of the log: a batch of a machine with its layout, complete in itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from livebode.sources.live import (
+    FrameDecoder,
+    SpectraBatch,
+    encode_layout,
+    encode_samples,
+    encode_spectra,
+    encode_spectra_layout,
+)
+from livebode.sources.live.framing import damaged_frame, read_header
+from livebode.sources.live.spectra_batch import AnyBatch
+
+
+def write_message(batch: AnyBatch) -> bytes:
+    """The batch as a frame of its layout and a frame of its samples or spectra; float32 where that is exact."""
+    if isinstance(batch, SpectraBatch):
+        double = not (_exact(batch.sums, np.complex64) and _exact(batch.values, np.float32))
+        layout = encode_spectra_layout(batch.layout, batch.rate_hz, epoch=batch.epoch)
+        return layout + encode_spectra(batch, double=double)
+    layout = encode_layout(batch.channels, batch.rate_hz, epoch=batch.epoch)
+    return layout + encode_samples(batch, double=not _exact(batch.data, np.float32))
+
+
+def read_message(message: bytes, arrived_s: float) -> AnyBatch:
+    """The batch in a message.
+
+    Raises
+    ------
+    SourceError
+        If it is not a layout and a frame of samples or spectra, or damaged.
+    """
+    decoder = FrameDecoder()
+    layout = read_header(message).length
+    decoder.decode(message[:layout])
+    batch = decoder.decode(message[layout:], arrived_s)
+    if batch is None:
+        raise damaged_frame("a message has no samples, or not the layout of its samples")
+    return batch
+
+
+def message_id(key: str, batch: AnyBatch) -> str:
+    """The name by which the log detects a repeated message: axis, epoch and the sender's number of the first sample."""
+    return f"{key}:{batch.epoch}:{batch.first_sample}"
+
+
+def _exact(values: np.ndarray, kind: type) -> bool:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.array_equal(values.astype(kind), values, equal_nan=True))

@@ -1,0 +1,248 @@
+"""PartitionOwner: the endless task of a partition. It reads the log, tracks the axes, and stores results, then states.
+
+The order of the writes is what makes results exactly-once; docs/explanation/fleet.md gives the reason for each step.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import os
+import socket
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from livebode.configuration.axis import Axis
+from livebode.core import StateError
+from livebode.fleet.axis_stream import AxisStream
+from livebode.fleet.log import ClaimLostError, Log, StoredMessage
+from livebode.fleet.reader import Reader
+from livebode.fleet.result_message import PendingResults, ResultMessage
+from livebode.fleet.subjects import (
+    LOG,
+    LOG_STREAM,
+    RESULT_STREAM,
+    RESULTS,
+    STATE_STREAM,
+    STATES,
+    STATUS,
+    axis_path,
+    key_of,
+)
+
+RESULTS_S = 0.5
+"""Time between two messages of results."""
+STATUS_S = 1.0
+STATE_S_MIN = 2.0
+"""Least time between two states of an axis."""
+STATE_SHARE = 0.08
+"""Most bytes of states, as a share of the bytes of the machines' data."""
+_PENDING_BYTES_MAX = 1 << 20
+_READ_S = 0.1
+
+_logger = logging.getLogger(__name__)
+
+
+class PartitionOwner:
+    """Owns a partition until it is stopped, or until another process claims it.
+
+    Parameters
+    ----------
+    log
+        A connection of its own.
+    number
+        Of the partition.
+    axes
+        Configurations by key; those of other partitions have no effect.
+    owner
+        Name of this process in the results and in the status.
+    """
+
+    def __init__(self, log: Log, number: int, axes: Mapping[str, Axis], owner: str = "") -> None:
+        self._log, self._number, self._axes = log, number, axes
+        self._owner = owner or f"{socket.gethostname()}:{os.getpid()}"
+        self._streams: dict[str, AxisStream] = {}
+        self._unknown: dict[str, int] = {}
+        self._pending = PendingResults()
+        self._result = 0
+        self._through = 0
+        self._stored = _StoredStates()
+        self._due_s = self._status_due_s = 0.0
+        self._since_s = time.time()
+        self._newest_s = 0.0
+
+    async def run(self, stop: asyncio.Event) -> bool:
+        """Own the partition; returns whether it was stopped (True) or another process has claimed it (False)."""
+        try:
+            await self._own(stop)
+        except ClaimLostError:
+            _logger.warning("partition %d was claimed by another process; this one stops", self._number)
+            return False
+        return True
+
+    async def _own(self, stop: asyncio.Event) -> None:
+        await self._claim()
+        reader = Reader(self._log, LOG_STREAM, f"{LOG}.{self._number}.>", await self._restore())
+        try:
+            while not stop.is_set():
+                messages = await reader.read(_READ_S)
+                # Never in the loop of the connection, which must answer the server's pings in time.
+                await asyncio.to_thread(self._process, messages)
+                await self._store(reader.pending)
+            await self._store_results()
+            await self._store_states(all_of_them=True)
+        finally:
+            await reader.close()
+
+    async def _claim(self) -> None:
+        """Write a claim after the newest result: whoever expects to write there now is refused from here on."""
+        while True:
+            last = await self._log.last(RESULT_STREAM, self._subject)
+            self._result = 0 if last is None else last.number
+            self._through = 0 if last is None else ResultMessage.from_bytes(last.data).through
+            claim = ResultMessage(self._through, self._owner, claim=True)
+            try:
+                self._result = await self._append(claim)
+            except ClaimLostError:
+                continue  # the former owner has stored results meanwhile
+            return
+
+    async def _restore(self) -> int:
+        """Restore every axis that the log has; returns the number of the first message that one of them needs."""
+        extent = await self._log.extent(LOG_STREAM, f"{LOG}.{self._number}.>")
+        subjects = sorted(extent.subjects)
+        needed = await asyncio.gather(*(self._restore_axis(subject) for subject in subjects))
+        # A state is stored after the results of all messages of the partition before it.
+        self._through = max([self._through, *(stream.position for stream in self._streams.values())])
+        # An axis may begin while the others are looked up: nothing after the extent is skipped.
+        return min([extent.last + 1, *(first for first in needed if first is not None)])
+
+    async def _restore_axis(self, subject: str) -> int | None:
+        """Restore an axis; returns the number of the next message that it needs, if there is one already."""
+        key = key_of(subject)
+        state = await self._log.last(STATE_STREAM, self._state_subject(key))
+        if state is None or key not in self._axes:
+            return await self._log.following(LOG_STREAM, subject, 1)
+        stream = AxisStream(self._axes[key], 0)
+        try:
+            stream.restore(state.data)
+        except StateError as error:
+            return await self._begin_again(subject, error)
+        self._streams[key] = stream
+        self._stored.restored(key, len(state.data))
+        return await self._log.following(LOG_STREAM, subject, stream.position + 1)
+
+    async def _begin_again(self, subject: str, error: StateError) -> int | None:
+        """An axis whose state cannot be restored begins a new run after what is stored, and a person is told why."""
+        first = await self._log.following(LOG_STREAM, subject, self._through + 1)
+        key = key_of(subject)
+        if first is not None:
+            self._streams[key] = AxisStream(self._axes[key], first)
+            message = f"the state of {axis_path(key)} cannot be restored, so its tracking begins again: {error}"
+            _logger.warning("%s", message)
+            about = {"run": first, "kind": "state-rejected", "sample": 0, "time_s": 0.0, "message": message}
+            self._pending.add_event(key, about | {"details": {}})
+        return first
+
+    def _process(self, messages: list[StoredMessage]) -> None:
+        for message in messages:
+            self._newest_s = message.stored_s
+            key = key_of(message.subject)
+            stream = self._stream(key, message.number)
+            if stream is None or message.number <= stream.position:
+                continue
+            output = stream.process(message.data, message.number, message.stored_s)
+            self._stored.took(key, len(message.data))
+            if message.number > self._through:  # else it is stored already
+                self._pending.add(key, stream, output)
+
+    def _stream(self, key: str, number: int) -> AxisStream | None:
+        found = self._streams.get(key)
+        if found is None and key in self._axes:
+            found = self._streams[key] = AxisStream(self._axes[key], number)
+        if found is None:
+            if key not in self._unknown:
+                _logger.warning("the fleet has no axis %s, whose data arrive", axis_path(key))
+            self._unknown[key] = self._unknown.get(key, 0) + 1
+        return found
+
+    async def _store(self, waiting: int) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._due_s or self._pending.nbytes > _PENDING_BYTES_MAX:
+            self._due_s = now_s + RESULTS_S
+            await self._store_results()
+            await self._store_states()
+        if now_s >= self._status_due_s:
+            self._status_due_s = now_s + STATUS_S
+            await self._publish_status(waiting)
+
+    async def _store_results(self) -> None:
+        if self._pending:
+            through = max(self._through, *(stream.position for stream in self._streams.values()))
+            self._result = await self._append(self._pending.message(through, self._owner))
+            self._through, self._pending = through, PendingResults()
+
+    async def _store_states(self, *, all_of_them: bool = False) -> None:
+        """Store states that are due. Nothing is pending, so the results that they depend on are stored."""
+        for key, stream in self._streams.items():
+            if all_of_them or self._stored.due(key):
+                state = await asyncio.to_thread(stream.snapshot)
+                await self._log.append(self._state_subject(key), state)
+                self._stored.stored(key, len(state))
+
+    async def _append(self, message: ResultMessage) -> int:
+        return await self._log.append_after(RESULT_STREAM, self._subject, message.to_bytes(), self._result)
+
+    @property
+    def _subject(self) -> str:
+        return f"{RESULTS}.{self._number}"
+
+    def _state_subject(self, key: str) -> str:
+        return f"{STATES}.{self._number}.{key}"
+
+    async def _publish_status(self, waiting: int) -> None:
+        about = {
+            "partition": self._number,
+            "owner": self._owner,
+            "since_s": self._since_s,
+            "at_s": time.time(),
+            "through": self._through,
+            "waiting": waiting,
+            "lag_s": max(0.0, time.time() - self._newest_s) if waiting else 0.0,
+            "unknown": self._unknown,
+            "axes": {key: _axis_status(stream) for key, stream in self._streams.items()},
+        }
+        await self._log.append(f"{STATUS}.{self._number}", json.dumps(about).encode())
+
+
+class _StoredStates:
+    """When the state of each axis is stored again: when its data since then are many times as large.
+
+    A takeover computes again what came since the last state, so a large state costs a longer takeover instead of more
+    bytes.
+    """
+
+    def __init__(self) -> None:
+        self._since: dict[str, int] = {}
+        self._sizes: dict[str, int] = {}
+        self._stored_s: dict[str, float] = {}
+
+    def took(self, key: str, size_bytes: int) -> None:
+        self._since[key] = self._since.get(key, 0) + size_bytes
+
+    def restored(self, key: str, size_bytes: int) -> None:
+        self._sizes[key] = size_bytes
+
+    def stored(self, key: str, size_bytes: int) -> None:
+        self._sizes[key], self._since[key], self._stored_s[key] = size_bytes, 0, time.monotonic()
+
+    def due(self, key: str) -> bool:
+        since = self._since.get(key, 0)
+        rested = time.monotonic() - self._stored_s.get(key, -STATE_S_MIN) >= STATE_S_MIN
+        return since > 0 and rested and STATE_SHARE * since >= self._sizes.get(key, 0)
+
+
+def _axis_status(stream: AxisStream) -> dict[str, Any]:
+    return {"responses": stream.responses, "lost": stream.lost, "failure": stream.failure, "log_s": stream.log_s}

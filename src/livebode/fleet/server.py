@@ -1,0 +1,107 @@
+"""A nats-server of our own on loopback: for the demonstration, the tests and the fault campaign."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+from livebode.core.errors import FleetError
+from livebode.fleet.server_config import server_configuration
+
+_START_S, _STEP_S = 10.0, 0.02
+
+
+class LogServer:
+    """A nats-server on a free port of loopback, with its store in a directory; a context manager.
+
+    Parameters
+    ----------
+    directory
+        Where configuration, store and log of the server are.
+    partitions
+        Of the fleet.
+    file_bytes_max
+        Most bytes of all streams.
+
+    Raises
+    ------
+    FleetError
+        At the start, if nats-server is not installed or ends at once.
+    """
+
+    def __init__(self, directory: Path, partitions: int, file_bytes_max: int = 4 << 30) -> None:
+        self._directory, self._port = directory, _free_port()
+        self._process: subprocess.Popen[bytes] | None = None
+        directory.mkdir(parents=True, exist_ok=True)
+        self._configuration = directory / "nats.conf"
+        self._configuration.write_text(
+            server_configuration(
+                directory / "store",
+                partitions=partitions,
+                port=self._port,
+                host="127.0.0.1",
+                file_bytes_max=file_bytes_max,
+            )
+        )
+
+    @property
+    def url(self) -> str:
+        return f"nats://127.0.0.1:{self._port}"
+
+    def start(self) -> None:
+        """Start it and wait until it listens."""
+        program = shutil.which("nats-server")
+        if program is None:
+            raise FleetError(
+                "server-missing",
+                "nats-server is not installed on this computer",
+                "install it: on Debian with `apt-get install nats-server`",
+            )
+        with (self._directory / "nats.log").open("ab") as log:
+            self._process = subprocess.Popen([program, "-c", str(self._configuration)], stdout=log, stderr=log)
+        until = time.monotonic() + _START_S
+        while not self._listens():
+            if self._process.poll() is not None or time.monotonic() > until:
+                self.kill()
+                raise FleetError(
+                    "server-ended",
+                    f"nats-server did not start; its log is {self._directory / 'nats.log'}",
+                    "read its last lines",
+                    path=str(self._directory / "nats.log"),
+                )
+            time.sleep(_STEP_S)
+
+    def kill(self) -> None:
+        """End it at once, as a fault of its computer does; its store remains."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+    def __enter__(self) -> LogServer:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process is not None:
+            self._process.terminate()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(5)
+        self.kill()
+
+    def _listens(self) -> bool:
+        try:
+            socket.create_connection(("127.0.0.1", self._port), 0.2).close()
+        except OSError:
+            return False
+        return True
+
+
+def _free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])

@@ -1,0 +1,162 @@
+"""fleet.toml: the axes of a fleet, its log, and how it is divided."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from glob import glob
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from livebode.configuration.axes import ConfigurationFile
+from livebode.configuration.axis import Axis
+from livebode.configuration.toml_file import one_line, read_table
+from livebode.core import ConfigError
+from livebode.core.errors import FleetError
+from livebode.fleet.subjects import axis_key
+
+PARTITIONS_MAX = 1024
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class LogSection(_Section):
+    """[log]: the server of the log, and how much it retains.
+
+    Parameters
+    ----------
+    url
+        Address of nats-server; several of a cluster are joined by commas.
+    size_gb
+        Most data of the machines in the log, in GB; the oldest are deleted then. It must be well below the disk.
+    results_gb
+        Most data of results in the log, in GB; the oldest are deleted then.
+    age_days
+        Longest time that data of the machines are in the log.
+    replicas
+        Copies of the log in a cluster of servers: 3 survive the loss of one.
+    """
+
+    url: str = "nats://127.0.0.1:4222"
+    size_gb: Positive = 50.0
+    results_gb: Positive = 10.0
+    age_days: Positive = 7.0
+    replicas: Annotated[int, Field(ge=1, le=5)] = 1
+
+
+class EdgeSection(_Section):
+    """[edge]: what `livebode fleet send` retains while the log cannot be reached.
+
+    Parameters
+    ----------
+    buffer
+        Directory of the buffer, relative to this file.
+    buffer_gb
+        Most data in it; the oldest are deleted then, and counted.
+    """
+
+    buffer: Annotated[Path, Field(strict=False)] = Path("edge-buffer")
+    buffer_gb: Positive = 2.0
+
+
+class FleetSettings(_Section):
+    """A fleet.
+
+    Parameters
+    ----------
+    axes
+        Files of axes, relative to this file, or patterns such as "axes/*.toml". Each axis has a [machine] section.
+    partitions
+        Number of parts that workers share. It must not change while the log has data.
+    workers
+        Number of processes that `livebode fleet run` starts.
+    """
+
+    axes: Annotated[list[str], Field(min_length=1)]
+    partitions: Annotated[int, Field(ge=1, le=PARTITIONS_MAX)] = 16
+    workers: Annotated[int, Field(ge=1, le=256)] = 2
+    log: LogSection = LogSection()
+    edge: EdgeSection = EdgeSection()
+
+    @classmethod
+    def read(cls, path: Path) -> FleetSettings:
+        """The settings of a file, with paths from its folder.
+
+        Raises
+        ------
+        ConfigError
+            If it cannot be read, or a key or value is invalid; the message gives both.
+        """
+        return cls.of(read_table(path), str(path)).beside(path.parent)
+
+    @classmethod
+    def of(cls, data: dict[str, Any], origin: str) -> FleetSettings:
+        """The settings in plain data; `origin` names it in messages."""
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise _first_of(error).at(origin) from None
+
+    def beside(self, folder: Path) -> FleetSettings:
+        """The same with relative paths from `folder`."""
+        edge = self.edge.model_copy(update={"buffer": folder / self.edge.buffer})
+        return self.model_copy(update={"axes": [str(folder / pattern) for pattern in self.axes], "edge": edge})
+
+    def read_axes(self) -> dict[str, Axis]:
+        """The axes by their key in the log.
+
+        Raises
+        ------
+        ConfigError
+            If a file cannot be read, or no file has a name like a pattern.
+        FleetError
+            If an axis has no [machine] section, or two have the same.
+        """
+        found: dict[str, Axis] = {}
+        for pattern in self.axes:
+            paths = sorted(glob(pattern))
+            if not paths:
+                raise ConfigError("file-unreadable", f"there is no file {pattern}", "check the name", path=pattern)
+            for path in paths:
+                _add(found, ConfigurationFile(Path(path), {}).read(), path)
+        return found
+
+
+def machine_key(axis: Axis, origin: str) -> str:
+    """The key of an axis in the log; FleetError if it has no [machine] section."""
+    if not axis.machine.path:
+        raise FleetError(
+            "axis-unnamed",
+            "the axis has no [machine] section",
+            "add [machine] with site, line, machine or axis",
+            key="machine",
+        ).at(origin)
+    return axis_key(axis.machine)
+
+
+def _add(found: dict[str, Axis], axes: Mapping[str, Axis], path: str) -> None:
+    for name, axis in axes.items():
+        origin = f"{path}, axis {name}" if name else path
+        key = machine_key(axis, origin)
+        if key in found:
+            raise FleetError(
+                "axis-duplicated",
+                f"another axis of the fleet is {axis.machine.path!r} too",
+                "rename one of them in [machine]",
+                axis=axis.machine.path,
+            ).at(origin)
+        found[key] = axis
+
+
+def _first_of(error: ValidationError) -> ConfigError:
+    first = error.errors(include_url=False)[0]
+    place = one_line(".".join(str(part) for part in first["loc"]))
+    if first["type"] == "extra_forbidden":
+        return ConfigError("key-unknown", f"there is no setting {place!r}", "remove it", key=place)
+    if first["type"] == "missing":
+        return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
+    return ConfigError("value-invalid", f"{place} is not usable: {first['msg'].lower()}", "correct it", key=place)

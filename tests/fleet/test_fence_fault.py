@@ -1,0 +1,86 @@
+"""A frozen owner that wakes up after another one took its partitions over: with the fence nothing is doubled."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from multiprocessing.context import ForkServerProcess
+from pathlib import Path
+
+import pytest
+
+from livebode.configuration.axis import Axis
+from livebode.fleet.check import CheckResult
+from livebode.fleet.partition import PartitionOwner
+from livebode.fleet.server import LogServer
+from livebode.fleet.settings import LogSection
+from tests.support.fleet_runs import (
+    PARTITIONS,
+    UnfencedOwner,
+    checked,
+    fleet_axes,
+    log_section,
+    sent,
+    start_owner,
+    stored_responses,
+)
+
+RESPONSES = 2  # of a batch, at a hop of half its samples
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[LogServer]:
+    with LogServer(tmp_path, PARTITIONS) as one:
+        yield one
+
+
+def test_without_the_fence_a_frozen_owner_doubles_responses_and_the_check_says_so(server: LogServer) -> None:
+    result = _frozen(server, UnfencedOwner)
+    assert result.total.doubled > 0
+    assert not result.exact
+
+
+def test_with_the_fence_a_frozen_owner_doubles_nothing(server: LogServer) -> None:
+    result = _frozen(server, PartitionOwner)
+    assert result.exact
+    assert result.total.responses > 0
+    assert result.claims == 2 * PARTITIONS
+
+
+def _frozen(server: LogServer, kind: type[PartitionOwner]) -> CheckResult:
+    """Freeze an owner, let another one take over, thaw the first, and let both see more data."""
+    settings, axes = log_section(server.url), fleet_axes(4)
+    sent(settings, axes, 20)
+    with _owner(settings, axes, kind) as first:
+        _until(lambda: stored_responses(settings), at_least=1)
+        os.kill(first.pid or 0, signal.SIGSTOP)
+        sent(settings, axes, 20, 20)
+        with _owner(settings, axes, kind):
+            before = _until(lambda: stored_responses(settings), at_least=4 * 30 * RESPONSES)
+            os.kill(first.pid or 0, signal.SIGCONT)
+            sent(settings, axes, 20, 40)
+            _until(lambda: stored_responses(settings), at_least=before + 4 * 20 * RESPONSES)
+            if kind is UnfencedOwner:
+                _until(lambda: checked(settings, axes).total.doubled, at_least=1)
+    return checked(settings, axes)
+
+
+@contextlib.contextmanager
+def _owner(settings: LogSection, axes: dict[str, Axis], kind: type[PartitionOwner]) -> Iterator[ForkServerProcess]:
+    process = start_owner(settings, axes, kind)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.join()
+
+
+def _until(count: Callable[[], int], *, at_least: int) -> int:
+    until = time.monotonic() + 30
+    while (found := count()) < at_least:
+        assert time.monotonic() < until, f"{found} instead of {at_least}"
+        time.sleep(0.2)
+    return found
