@@ -17,7 +17,7 @@ from typing import Any, cast
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from livebode.cli.commands import SUMMARIES, command
+from livebode.cli.commands import GROUPS, SUMMARIES, command, subcommand
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.first_page import ABOUT, OPTIONS
 from livebode.cli.log_options import File, Level, LogOptions, with_log
@@ -59,40 +59,49 @@ class _Command(TyperCommand):
 
 
 class _Commands(Mapping[str, TyperCommand]):
-    """The commands by name; the module of one is loaded when it is used."""
+    """The commands by name, or those of a group; the module of one is loaded when it is used."""
 
-    def __getitem__(self, name: str) -> TyperCommand:
-        if name not in SUMMARIES:
+    def __init__(self, group: str | None) -> None:
+        self._group = group
+        self._summaries = GROUPS[group] if group else SUMMARIES
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._summaries:
             raise KeyError(name)
+        if self._group is None and name in GROUPS:
+            return _Group(name=name, group=name, help=SUMMARIES[name], context_settings=_HELP, no_args_is_help=True)
+        function = subcommand(self._group, name) if self._group else command(name)
         alone = typer.Typer(add_completion=False)
-        alone.command(name, cls=_Command, context_settings=_HELP)(with_log(command(name)))
+        alone.command(name, cls=_Command, context_settings=_HELP)(with_log(function))
         return cast("TyperCommand", typer.main.get_command(alone))
 
     def __iter__(self) -> Iterator[str]:
-        return iter(SUMMARIES)
+        return iter(self._summaries)
 
     def __len__(self) -> int:
-        return len(SUMMARIES)
+        return len(self._summaries)
 
 
 class _Group(TyperGroup):
-    """The group of commands, with help in colour."""
+    """A group of commands, with help in colour: the program, or a command with subcommands."""
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, group: str | None = None, **options: Any) -> None:
         super().__init__(**options)
-        self.commands = _Commands()  # type: ignore[assignment]
+        self._summaries = GROUPS[group] if group else SUMMARIES
+        self.commands = _Commands(group)  # type: ignore[assignment]
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
         """The names in the order of the help."""
-        return list(SUMMARIES)
+        return list(self._summaries)
 
     def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:  # noqa: ARG002
         """A command as a list of commands shows it; its options are not needed for that, nor is its module."""
-        return TyperCommand(name=cmd_name, help=SUMMARIES[cmd_name]) if cmd_name in SUMMARIES else None
+        found = self._summaries.get(cmd_name)
+        return TyperCommand(name=cmd_name, help=found) if found else None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the arguments begin with, to be run or completed."""
-        if f"--{args[0]}" in _OPTIONS and args[0] not in SUMMARIES:
+        if f"--{args[0]}" in _OPTIONS and args[0] not in self._summaries:
             ctx.fail(f"No such command {args[0]!r}. Did you mean 'livebode --{args[0]}'?")
         name, listed, rest = super().resolve_command(ctx, args)
         return name, listed and self.commands[listed.name or ""], rest

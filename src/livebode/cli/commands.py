@@ -34,10 +34,25 @@ SUMMARIES: Mapping[str, str] = {
     "compare": "Find the lines, parameters and margins that differ between two runs, with amounts and bounds.",
     "view": "Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still "
     "recording.",
+    "fleet": "Watch the axes of many machines together.",
     "doctor": "Check this computer, a configuration and whether its machine can be reached.",
     "schema": "Print the JSON Schema of axis.toml or experiment.toml: an editor uses it to complete and check the "
     "keys.",
 }
+
+
+GROUPS: Mapping[str, Mapping[str, str]] = {
+    "fleet": {
+        "view": "Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.",
+    },
+}
+"""The commands with subcommands, and these as above."""
+
+
+def subcommand(group: str, name: str) -> Callable[..., Any]:
+    """The function of a subcommand, from its module `GROUP/NAME_command`."""
+    function: Callable[..., Any] = getattr(import_module(f"livebode.cli.{group}.{name}_command"), f"{name}_command")
+    return function
 
 
 def command(name: str) -> Callable[..., Any]:

@@ -1,0 +1,1 @@
+"""`livebode fleet`: the axes of many machines together."""
