@@ -21,7 +21,8 @@ LOOKS = (
 )  # fmt: skip
 """How a tile looks, by its number: 4 bits. Lost: its partition has no worker."""
 OPEN, OK, CHECK, ALARM, RETURNED, ACKNOWLEDGED, SHELVED, NOT_READY_LOOK, SILENT_LOOK, BEHIND_LOOK, LOST = range(11)
-_SEVERITY = np.array([1, 0, 6, 10, 7, 5, 2, 3, 8, 4, 9], float)
+_SEVERITY = np.array([1, 0, 6, 10, 7, 5, 2, 3, 9, 8, 4], float)
+# A worker that is lost would fill the list of the worst axes with all of its axes; it is in the list of workers.
 LOST_S = 5.0
 """A partition whose status is older than this has no worker."""
 WORST, ALARMS_MAX, PARTITIONS_MAX = 50, 300, 100
