@@ -90,11 +90,11 @@ function facts(row) {
   /** @type {[string, string][]} */
   const found = [];
   if (row.parameter) {
-    const change =
-      row.change_percent === null
-        ? ""
-        : tr(", {percent} % from the baseline", { percent: signed(row.change_percent, 1) });
-    found.push([recognised(row.parameter), value(row) + (row.value === null ? "" : change)]);
+    const text =
+      row.value === null || row.change_percent === null
+        ? value(row)
+        : tr("{value}, {percent} % from the baseline", { value: value(row), percent: signed(row.change_percent, 1) });
+    found.push([recognised(row.parameter), text]);
   }
   if (row.kind && row.state !== "normal")
     found.push([tr("Alarm"), [kindWords(row.kind), since(row.raised_s), ...persons(row)].filter(Boolean).join(" · ")]);
