@@ -32,8 +32,8 @@ class FleetAct:
     ----------
     act, path
         What, and the axis.
-    raised
-        How often the alarm had been raised: as many are acknowledged.
+    raised, raised_s
+        How often the alarm had been raised, and when last, by the clock of its worker: those are acknowledged.
     by, words
         Person, and comment or reason.
     until_s, at_s
@@ -43,6 +43,7 @@ class FleetAct:
     act: Act
     path: str
     raised: int
+    raised_s: int
     by: str = ""
     words: str = ""
     until_s: float = 0.0
@@ -69,8 +70,7 @@ class FleetAct:
         return (
             self.act in get_args(Act)
             and all(isinstance(text, str) and len(text) <= most and text.isprintable() for text, most in texts)
-            and type(self.raised) is int
-            and 0 <= self.raised < _COUNT_MAX
+            and all(type(n) is int and 0 <= n < _COUNT_MAX for n in (self.raised, self.raised_s))
             and all(isinstance(t, int | float) and not isinstance(t, bool) and isfinite(t) for t in times)
             and 0 <= self.until_s <= self.at_s + 60 * MINUTES_MAX + 1
         )
@@ -82,6 +82,7 @@ class FleetAlarms:
     def __init__(self) -> None:
         self.version = 0
         self._seen = np.zeros(0, np.uint32)
+        self._seen_s = np.zeros(0, np.uint32)
         self._until_s = np.zeros(0)
         self._shelves: dict[int, AlarmShelf] = {}
         self._acknowledged: dict[int, FleetAct] = {}
@@ -91,7 +92,7 @@ class FleetAlarms:
         self._grow(row + 1)
         self.version += 1
         if act.act == "acknowledge":
-            self._seen[row] = max(self._seen[row], act.raised)
+            self._seen[row], self._seen_s[row] = act.raised, act.raised_s
             self._acknowledged[row] = act
         elif act.act == "shelve":
             self._until_s[row] = act.until_s
@@ -104,11 +105,9 @@ class FleetAlarms:
         """Number in `CONDITIONS` of each row, shape (rows,)."""
         self._grow(len(status))
         raised, active = status["raised"], (status["flags"] & ACTIVE) > 0
-        seen = self._seen[: len(status)]
-        # An axis that begins again counts from zero: its next alarm must not pass for an acknowledged one.
-        np.minimum(seen, raised, out=seen)
         of_response = np.array([kind in ALARMS and ALARMS[kind].of_response for kind in kinds])[status["kind"]]
-        new = seen < raised
+        # An axis that begins again counts from zero: its next alarm must not pass for an acknowledged one.
+        new = (self._seen[: len(status)] < raised) | ((self._seen_s[: len(status)] < status["raised_s"]) & (raised > 0))
         found = np.where(new, np.where(active, UNACKNOWLEDGED, RETURNED), np.where(active, ACKNOWLEDGED, NORMAL))
         found[active & of_response & ((status["flags"] & NOT_READY) > 0)] = SUPPRESSED
         found[(found != NORMAL) & (self._until_s[: len(status)] > now_s)] = SHELVED
@@ -124,4 +123,5 @@ class FleetAlarms:
         if rows > len(self._seen):
             more = max(1024, rows, 2 * len(self._seen)) - len(self._seen)
             self._seen = np.concatenate([self._seen, np.zeros(more, np.uint32)])
+            self._seen_s = np.concatenate([self._seen_s, np.zeros(more, np.uint32)])
             self._until_s = np.concatenate([self._until_s, np.zeros(more)])

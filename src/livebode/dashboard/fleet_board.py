@@ -184,11 +184,13 @@ class FleetBoard:
         if layout != str(self.layout) or not (raised.isascii() and raised.isdigit() and len(raised) < 11):
             raise ServerError("event-unknown", "the axes of the fleet have changed", "try again", event=asked.event)
         row = int(self.axes.order[asked.axis])
-        count = min(int(raised), int(self.axes.status["raised"][row]))
+        status = self.axes.status[row]
+        count = min(int(raised), int(status["raised"]))
         if count == 0:
             raise ServerError("no-alarm", "this axis has no alarm", "reload the page", event=asked.event)
         until_s = round(now_s + 60 * asked.minutes, 3) if act == "shelve" else 0.0
-        return FleetAct(act, self.axes.names[row].path, count, asked.by, asked.words, until_s, round(now_s, 3))
+        path, raised_s = self.axes.names[row].path, int(status["raised_s"])
+        return FleetAct(act, path, count, raised_s, asked.by, asked.words, until_s, round(now_s, 3))
 
     @property
     def _shown(self) -> Array:
