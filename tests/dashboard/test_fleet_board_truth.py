@@ -60,8 +60,8 @@ def ask(board: FleetBoard, act: str, raised: int = 1, now_s: float = NOW, **word
 
 def test_a_simulated_fleet_looks_as_it_is() -> None:
     fleet = DemoFleet(3000)
-    feed, board = DemoFeed(fleet), FleetBoard()
-    began_s = feed._began_s
+    began_s = NOW
+    feed, board = DemoFeed(fleet, began_s=began_s), FleetBoard()
     tables = {names.partition: encode_names(names, NOW) for names in fleet.names()}
     messages = [message for message, _ in tables.values()]
     random.Random(1).shuffle(messages)

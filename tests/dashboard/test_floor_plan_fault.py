@@ -61,7 +61,7 @@ def test_a_drawing_keeps_its_shapes_and_colours() -> None:
     ids=lambda text: f"{text[47:75]} {len(text)}",
 )
 def test_a_hostile_drawing_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="^its? "):
+    with pytest.raises(ValueError, match=r"^its? "):
         sanitised(text)
 
 

@@ -38,7 +38,7 @@ class FleetBoard:
 
     def __init__(self) -> None:
         self.axes, self.alarms = FleetAxes(), FleetAlarms()
-        self._acts: OrderedDict[str, FleetAct] = OrderedDict()  # of axes that have not been named yet
+        self._acts: OrderedDict[tuple[str, bool], FleetAct] = OrderedDict()  # of axes that have not been named yet
         self._rows_done = 0
         self._looks = np.zeros(0, np.uint8)
         self._conditions = np.zeros(0, np.uint8)
@@ -57,8 +57,9 @@ class FleetBoard:
         """Take messages of partitions that arrived until `now_s`, seconds since 1970."""
         self.axes.take(messages, now_s)
         for row in range(self._rows_done, len(self.axes)):
-            if (act := self._acts.pop(self.axes.names[row].path, None)) is not None:
-                self.alarms.apply(act, row)
+            for acknowledges in (True, False):
+                if (act := self._acts.pop((self.axes.names[row].path, acknowledges), None)) is not None:
+                    self.alarms.apply(act, row)
         self._rows_done = len(self.axes)
 
     def take_act(self, data: bytes) -> None:
@@ -69,7 +70,7 @@ class FleetBoard:
         elif (row := self.axes.row(act.path)) is not None:
             self.alarms.apply(act, row)
         else:
-            self._acts[act.path] = act
+            self._acts[act.path, act.act == "acknowledge"] = act
             if len(self._acts) > _ACTS_MAX:
                 self._acts.popitem(last=False)
 

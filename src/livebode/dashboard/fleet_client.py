@@ -17,7 +17,7 @@ from livebode.dashboard.fleet_view import FleetView
 from livebode.dashboard.queries import plain
 
 ListName = Literal["worst", "alarms", "workers", "gaps"]
-LISTS_EVERY_S = 1.0
+LISTS_EVERY_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def watched(text: str) -> Watched:
 
 
 class FleetClient(BrowserSocket):
-    """Sends changes of the tiles some times a second, and lists once a second."""
+    """Sends changes of the tiles some times a second, and lists twice a second."""
 
     def __init__(self, view: FleetView, socket: WebSocket, role: Role) -> None:
         super().__init__(socket)

@@ -135,13 +135,15 @@ class DemoFeed:
         The truth.
     silent
         Partitions whose worker has died, from the start.
+    began_s
+        When the simulation started, seconds since 1970; now by default.
     """
 
-    def __init__(self, fleet: DemoFleet, silent: Iterable[int] = ()) -> None:
+    def __init__(self, fleet: DemoFleet, silent: Iterable[int] = (), began_s: float | None = None) -> None:
         self.fleet, self.name, self.trouble = fleet, "demo", ""
         self._silent = set(silent)
         self._hear_act: Hear = lambda _: None
-        self._began_s = time.time()
+        self.began_s = time.time() if began_s is None else began_s
 
     async def run(self, hear: Hear, hear_act: Hear) -> None:
         """Send until it is cancelled."""
@@ -157,7 +159,7 @@ class DemoFeed:
 
     def messages(self, tables: dict[int, int], now_s: float) -> list[bytes]:
         """The status of each partition at this moment."""
-        status = self.fleet.status(now_s - self._began_s, now_s)
+        status = self.fleet.status(now_s - self.began_s, now_s)
         found = []
         for partition, table in tables.items():
             axes = status[self.fleet.part(partition)]

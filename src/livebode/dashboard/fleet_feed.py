@@ -78,7 +78,7 @@ class NatsFeed:
             ) from None
         self._errors = nats.errors.Error
         try:
-            self._connection = await nats.connect(
+            connecting = nats.connect(
                 self._url.split(","),
                 name="livebode fleet view",
                 connect_timeout=_CONNECT_S,
@@ -87,12 +87,14 @@ class NatsFeed:
                 error_cb=self._note,
                 disconnected_cb=self._lost,
                 reconnected_cb=self._back,
-                **{"allow_reconnect": True} | self._options,
+                **self._options,
             )
+            # Without a limit of its own it would try for ever, as it does after the connection is lost.
+            self._connection = await asyncio.wait_for(connecting, _CONNECT_S)
         except (TimeoutError, OSError, nats.errors.Error) as error:
             raise FleetError(
                 "log-unreachable",
-                f"the log at {self._url} cannot be reached ({error or type(error).__name__})",
+                f"the log at {self._url} cannot be reached ({self.trouble or error or type(error).__name__})",
                 "check that nats-server runs there, and the url in [log]",
                 url=self._url,
             ) from None

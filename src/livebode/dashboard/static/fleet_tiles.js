@@ -70,6 +70,7 @@ export class Tiles {
     this.levels = levels;
     const place = Array.prototype.indexOf.call(shown, axis);
     this.at = Math.max(0, place);
+    this.named();
     this.resize();
   }
 
@@ -275,13 +276,22 @@ export class Tiles {
     if (box.y - HEAD < host.scrollTop) host.scrollTop = box.y - HEAD - 4;
     else if (box.y + this.size.height > host.scrollTop + host.clientHeight - 8)
       host.scrollTop = box.y + this.size.height - host.clientHeight + 8;
+    this.named();
+  }
+
+  // What a screen reader reads as the chosen one of the list.
+  named() {
     const axis = this.shown[this.at];
+    if (axis === undefined) {
+      this.option.textContent = tr("No axis matches.");
+      return;
+    }
     this.option.id = `tile-${axis}`;
     this.option.textContent = `${this.paths[axis]}: ${LOOKS[this.looks[axis]].words}`;
     this.option.setAttribute("aria-selected", "true");
     this.option.setAttribute("aria-setsize", String(this.shown.length));
     this.option.setAttribute("aria-posinset", String(this.at + 1));
-    host.setAttribute("aria-activedescendant", this.option.id);
+    this.host.setAttribute("aria-activedescendant", this.option.id);
   }
 }
 
