@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
+from collections.abc import Iterator
 from typing import Any
 
 import typer
@@ -21,7 +22,13 @@ prints them in machine-readable form.
 def page() -> str:
     """The page in Markdown."""
     commands: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
-    return "\n".join([HEAD, *(_section(name, command) for name, command in commands.items())])
+    return "\n".join([HEAD, *(text for name, command in commands.items() for text in _sections(name, command))])
+
+
+def _sections(name: str, command: Any) -> Iterator[str]:
+    yield _section(name, command)
+    for inner, one in getattr(command, "commands", {}).items():
+        yield _section(f"{name} {inner}", one)
 
 
 def _section(name: str, command: Any) -> str:
@@ -29,8 +36,8 @@ def _section(name: str, command: Any) -> str:
     usage = " ".join(command.collect_usage_pieces(context))
     records = [parameter.get_help_record(context) for parameter in command.params]
     rows = [f"| `{_cell(names)}` | {_cell(text)} |" for names, text in filter(None, records)]
-    table = "\n".join(["| argument or option | meaning |", "|---|---|", *rows])
-    return f"## livebode {name}\n\n    livebode {name} {usage}\n\n{_paragraphs(command.help)}\n\n{table}\n"
+    table = "\n".join(["", "| argument or option | meaning |", "|---|---|", *rows, ""]) if rows else ""
+    return f"## livebode {name}\n\n    livebode {name} {usage}\n\n{_paragraphs(command.help)}\n{table}"
 
 
 def _paragraphs(text: str) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def view_command(
     fleet: Annotated[
-        Path | None, typer.Argument(metavar="[FLEET.toml]", help="The fleet: its \\[log] says where the log is.")
+        Path | None, typer.Argument(metavar="FLEET.toml", help="The fleet: its \\[log] says where the log is.")
     ] = None,
     demo: Annotated[
         int | None, typer.Option(metavar="AXES", min=1, max=200_000, help="Show a simulated fleet of so many axes.")
@@ -53,6 +53,8 @@ def view_command(
             "give either FLEET.toml or --demo AXES",
             "`livebode fleet view --demo 10000` shows a simulated fleet",
         )
+    if trends and not trends.startswith(("https://", "http://", "/")):
+        raise UsageError("unreadable", f"{trends!r} is not an address", "begin it with https://", argument="trends")
     dashboard = dashboard_of(ServeSection() if axis is None else serve_section(axis), port)
     from livebode.dashboard.fleet_view import FleetView
     from livebode.dashboard.floor_plan import floor_plan

@@ -10,6 +10,8 @@ import { signed } from "./words.js";
 /** @import { Acts } from "./fleet_acts.js" */
 /** @import { AxisRow, FleetFeed } from "./fleet_feed.js" */
 
+const ALARMS = ["alarm", "returned", "acknowledged", "shelved"];
+
 export class AxisDialog {
   dialog = $("axis", HTMLDialogElement);
   shown = "";
@@ -51,8 +53,10 @@ export class AxisDialog {
   take(row) {
     if (!row || !this.dialog.open || this.feed.paths[row.axis] !== this.path) return;
     const { sign, words, key } = LOOKS[row.look];
-    $("axis-state").replaceChildren(element("span", { class: `look look-${key}` }, `${sign} ${words}`));
-    if (row.state !== "normal") $("axis-state").append(" ", chip(row));
+    const look = element("span", { class: `look look-${key}` }, `${sign} ${words}`);
+    const alarm = row.state === "normal" ? [] : [chip(row)];
+    // The state of an alarm says the same in more words.
+    $("axis-state").replaceChildren(...(alarm.length && ALARMS.includes(key) ? alarm : [look, " ", ...alarm]));
     $("axis-facts").replaceChildren(
       ...facts(row).flatMap(([name, text]) => [element("dt", {}, name), element("dd", {}, text)]),
     );
