@@ -26,7 +26,7 @@ from livebode.dashboard.fleet_demo import DemoFleet
 from livebode.dashboard.fleet_feed import Hear
 from livebode.dashboard.fleet_frames import tiles_frame
 from livebode.dashboard.fleet_view import TICK_S, FleetView
-from livebode.fleet.status import ACTIVE, AxisName, PartitionNames, encode_names, encode_status
+from livebode.fleet.status_message import ACTIVE, AxisName, PartitionNames, encode_names, encode_status
 
 _FRAMES = """async (seconds) => {
   const { tiles } = window.livebode, end = performance.now() + 1000 * seconds;

@@ -17,7 +17,12 @@ from livebode.core import ConfigError, LivebodeError, OutputError, UsageError
 from tests.support.command import livebode
 from tests.support.reports import measured, write_run
 
-COMMANDS = {name: command for name, command in typer.main.get_command(app).commands.items() if name != "view"}
+COMMANDS = {
+    f"{name} {inner}" if inner else name: one
+    for name, command in typer.main.get_command(app).commands.items()
+    for inner, one in getattr(command, "commands", {"": command}).items()
+    if name != "view"
+}
 LIVEBODE = str(Path(sys.executable).with_name("livebode"))
 
 
@@ -54,7 +59,7 @@ def test_an_internal_error_is_an_object_with_its_traceback_and_ends_with_1(monke
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_json_and_reports_a_wrong_option_so(command: str) -> None:
-    error = error_of(livebode(command, "--json", "--nonsense"))
+    error = error_of(livebode(*command.split(), "--json", "--nonsense"))
     assert error["code"] == "usage.options"
     assert error["message"].startswith("No such option: --nonsense")
     assert "--json" in {option for parameter in COMMANDS[command].params for option in parameter.opts}

@@ -18,7 +18,7 @@ from livebode.dashboard.fleet_alarms import CONDITIONS, FleetAct, FleetAlarms
 from livebode.dashboard.fleet_board import LOOKS, LOST_S, FleetBoard
 from livebode.dashboard.fleet_demo import DemoFeed, DemoFleet
 from livebode.dashboard.fleet_frames import tiles_frame
-from livebode.fleet.status import (
+from livebode.fleet.status_message import (
     ACTIVE,
     AXIS_STATUS,
     AxisName,

@@ -18,7 +18,7 @@ from livebode.dashboard.fleet_board import LOOKS
 from livebode.dashboard.fleet_feed import NatsFeed
 from livebode.dashboard.fleet_view import FleetView
 from livebode.fleet.server import LogServer
-from livebode.fleet.status import ACTIVE, AXIS_STATUS, AxisName, PartitionNames, encode_names, encode_status
+from livebode.fleet.status_message import ACTIVE, AXIS_STATUS, AxisName, PartitionNames, encode_names, encode_status
 
 
 class Worker:
@@ -45,8 +45,8 @@ class Worker:
         await connection.subscribe("names.ask.0", cb=answer)
         try:
             while True:
-                await connection.publish("status.0", encode_status(0, table, status, time.time()))
-                await connection.publish("status.0", b"{}")  # a stranger's
+                await connection.publish("view.0", encode_status(0, table, status, time.time()))
+                await connection.publish("view.0", b"{}")  # a stranger's
                 await asyncio.sleep(0.1)
         finally:
             await connection.close()

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page
 
 from livebode.dashboard.fleet_board import LOOKS
 from livebode.dashboard.floor_plan import sanitised
-from tests.dashboard.test_accessibility_contract import SIZES, violations, with_axe
+from tests.support.axe import SIZES, violations, with_axe
 from tests.support.browser import Tab
 from tests.support.fleet_pages import DrivenFeed, expected_looks, fleet_page
 from tests.support.languages import pseudo, untranslated

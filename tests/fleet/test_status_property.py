@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.fleet.status import (
+from livebode.fleet.status_message import (
     AXES_MAX,
     AXIS_STATUS,
     AxisName,

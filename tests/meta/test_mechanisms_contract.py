@@ -19,7 +19,13 @@ SOURCE = Path(__file__).parents[2] / "src/livebode"
         # Data that is sent from a file, or read back at once, has no place.
         (
             r"(TemporaryDirectory|NamedTemporaryFile)\(",
-            {"cli/validate_command.py", "dashboard/app.py", "export/universal.py", "report/pdf.py"},
+            {
+                "cli/fleet/demo_command.py",
+                "cli/validate_command.py",
+                "dashboard/app.py",
+                "export/universal.py",
+                "report/pdf.py",
+            },
         ),
         (r"\bfsync\(", {"core/files.py", "doctor/disk.py"}),
         # A record that is paused at its end raises without an error of the system.

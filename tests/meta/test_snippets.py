@@ -50,6 +50,8 @@ def test_commands_of_a_page_and_their_options_exist(page: Path) -> None:
             continue
         words = [word.partition("=")[0] for word in step.words[1:]]
         command = next((group.commands[word] for word in words if word in group.commands), group)
+        inner = getattr(command, "commands", {})
+        command = next((inner[word] for word in words if word in inner), command)
         known = {name for options in (group, command) for parameter in options.params for name in parameter.opts}
         assert command is not group or words == ["--help"], step.text
         assert {word for word in words if re.match("--?[a-z]", word)} <= known, step.text

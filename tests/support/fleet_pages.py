@@ -15,7 +15,7 @@ from livebode.dashboard.fleet_board import LOOKS
 from livebode.dashboard.fleet_demo import DemoFleet
 from livebode.dashboard.fleet_feed import Hear
 from livebode.dashboard.fleet_view import FleetView
-from livebode.fleet.status import ACTIVE, BEHIND, NOT_READY, SILENT, STATES, encode_names, encode_status
+from livebode.fleet.status_message import ACTIVE, BEHIND, NOT_READY, SILENT, STATES, encode_names, encode_status
 
 
 class DrivenFeed:

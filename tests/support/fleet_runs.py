@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import time
+from collections.abc import Mapping
 from multiprocessing.context import ForkServerProcess
 from typing import Any
 
@@ -14,12 +14,13 @@ import numpy as np
 from livebode.configuration.axis import Axis
 from livebode.core import Channel
 from livebode.fleet.check import CheckResult, check_results
-from livebode.fleet.log import ClaimLostError, Log
+from livebode.fleet.log import ClaimLostError, FleetLog
 from livebode.fleet.message import message_id, write_message
 from livebode.fleet.partition import PartitionOwner
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.settings import LogSection, machine_key
+from livebode.fleet.status_message import status_of
 from livebode.fleet.subjects import EDGE, RESULT_STREAM, RESULTS
 from livebode.fleet.worker import own_partitions
 from livebode.sources.live import Batch
@@ -64,7 +65,7 @@ def batch(axis: int, first: int, epoch: int = EPOCH) -> Batch:
     return Batch(first, np.vstack([w, u, y]).astype("f4").astype("f8"), CHANNELS, RATE_HZ, epoch)
 
 
-async def send(log: Log, axes: Mapping[str, Axis], firsts: range) -> None:
+async def send(log: FleetLog, axes: Mapping[str, Axis], firsts: range) -> None:
     """Publish the batches that begin at these numbers, for all axes."""
     for first in firsts:
         for number, key in enumerate(axes):
@@ -76,7 +77,7 @@ def sent(settings: LogSection, axes: Mapping[str, Axis], batches: int, first: in
     """The same from a program without a loop: `batches` of them from batch number `first` on."""
 
     async def publish() -> None:
-        async with Log(settings, "test") as log:
+        async with FleetLog(settings, "test") as log:
             await log.create_streams()
             await send(log, axes, range(first * SAMPLES, (first + batches) * SAMPLES, SAMPLES))
 
@@ -110,24 +111,35 @@ def _own(settings: LogSection, axes: Mapping[str, Axis], kind: type[PartitionOwn
     own_partitions(settings, axes, range(PARTITIONS), threading.Event(), kind)
 
 
-@contextmanager
-def owner_here(settings: LogSection, axes: Mapping[str, Axis]) -> Iterator[None]:
-    """An owner of all partitions in a thread, that is stopped in order at the end."""
+def owned_until_current(settings: LogSection, axes: Mapping[str, Axis]) -> None:
+    """Own all partitions in a thread until everything in the log is processed, and stop in order."""
     stop = threading.Event()
     thread = threading.Thread(target=own_partitions, args=(settings, axes, range(PARTITIONS), stop))
     thread.start()
     try:
-        yield
+        asyncio.run(_until_current(settings))
     finally:
         stop.set()
         thread.join()
+
+
+async def _until_current(settings: LogSection) -> None:
+    """Wait until every partition reports that it has waited for nothing since now."""
+    async with FleetLog(settings, "test") as log:
+        began_s = time.time()
+        for number in range(PARTITIONS):
+            while True:
+                about = await status_of(log, number)
+                if about is not None and about["at_s"] > began_s and not about["waiting"]:
+                    break
+                await asyncio.sleep(0.05)
 
 
 def stored_responses(settings: LogSection) -> int:
     """How many responses are stored, doubled ones included."""
 
     async def count() -> int:
-        async with Log(settings, "count") as log:
+        async with FleetLog(settings, "count") as log:
             last = (await log.extent(RESULT_STREAM)).last
             return sum(
                 [
@@ -141,7 +153,7 @@ def stored_responses(settings: LogSection) -> int:
 
 def checked(settings: LogSection, axes: Mapping[str, Axis]) -> CheckResult:
     async def check() -> CheckResult:
-        async with Log(settings, "check") as log:
+        async with FleetLog(settings, "check") as log:
             return await check_results(log, axes)
 
     return asyncio.run(check())

@@ -19,6 +19,8 @@ from livebode.estimation.uneven_tracker import UnevenTracker
 from livebode.excitation import multisine
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.fitting.drift import DriftTest
+from livebode.fleet.axis_stream import AxisStream
+from livebode.fleet.message import write_message
 from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_table, places, signals_of
 from livebode.motion import MotionCorrection
 from livebode.preparation.checks import ChannelCheck
@@ -35,6 +37,8 @@ from livebode.sources.live.source_events import SourceEvents
 from tests.support.axes import LINES as AXIS_LINES
 from tests.support.fitted import LINES as FITTED
 from tests.support.fitted import TRUTH, noisy
+from tests.support.fleet_runs import batch as numbered_message
+from tests.support.fleet_runs import fleet_axes
 from tests.support.monitored import ideal, recorded
 from tests.support.stateful import Case
 
@@ -318,6 +322,26 @@ def numbered_batch(first: int) -> Batch:
     return Batch(first, data, (Channel("y"),), RATE_HZ, epoch=3, stamp_s=1e9 + first / RATE_HZ, arrived_s=1.0)
 
 
+def axis_stream() -> Case:
+    """Messages of the log, one of them damaged, and samples that are missing."""
+    ((_, axis),) = fleet_axes(1).items()
+    other = axis.model_copy(update={"tracking": axis.tracking.model_copy(update={"hop": 50})})
+
+    def step(numbers: range) -> Callable[[AxisStream], object]:
+        return lambda stage: [taken(stage, number) for number in numbers]
+
+    def taken(stage: AxisStream, number: int) -> object:
+        message = b"damaged" if number == 12 else write_message(numbered_message(0, 50 * (number + (number > 20))))
+        output = stage.process(message, number, 1e9 + 0.05 * number)
+        return output.number, [] if output.responses is None else [output.responses.value, output.responses.sample]
+
+    return Case(
+        lambda: AxisStream(axis, 1),
+        [step(range(1, 11)), step(range(11, 25)), step(range(25, 40))],
+        [lambda: AxisStream(other, 1)],
+    )
+
+
 def stream_position() -> Case:
     """It continues only where its own record ends, so a restored one is made from the snapshot."""
     origin = Origin(epoch=3, offset=100, mark={"name": "a.csv", "offset": 17})
@@ -334,6 +358,6 @@ CASES = {
     for case in (
         tracker, direct_tracker, successive_trackers, local_polynomial, welch_average, spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
-        run_counts, readiness, sequencer, stream_position,
+        run_counts, readiness, sequencer, axis_stream, stream_position,
     )
 }  # fmt: skip

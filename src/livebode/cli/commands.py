@@ -34,16 +34,22 @@ SUMMARIES: Mapping[str, str] = {
     "compare": "Find the lines, parameters and margins that differ between two runs, with amounts and bounds.",
     "view": "Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still "
     "recording.",
-    "fleet": "Watch the axes of many machines together.",
+    "fleet": "Track the axes of a fleet from a log on several workers: every result once, also when a worker dies.",
     "doctor": "Check this computer, a configuration and whether its machine can be reached.",
     "schema": "Print the JSON Schema of axis.toml or experiment.toml: an editor uses it to complete and check the "
     "keys.",
 }
 
-
 GROUPS: Mapping[str, Mapping[str, str]] = {
     "fleet": {
+        "run": "Start the workers of a fleet on this computer, and replace those that die, until Ctrl-C.",
+        "send": "Send the samples of live sources to the log, through a buffer on disk.",
+        "status": "Show partitions, axes, backlog and losses of a fleet.",
         "view": "Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.",
+        "check": "Compute all responses of a fleet again from its log, and compare the stored ones bit for bit.",
+        "replay": "Compute the responses of an axis again from the log, and write them as a table.",
+        "server": "Write the configuration of nats-server for a fleet.",
+        "demo": "Start a log, three workers and 20 simulated axes, kill a worker, and check that nothing is lost.",
     },
 }
 """The commands with subcommands, and these as above."""

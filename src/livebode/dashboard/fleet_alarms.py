@@ -12,7 +12,7 @@ import numpy as np
 from livebode.dashboard.alarm import AlarmShelf, AlarmState
 from livebode.dashboard.alarm_kinds import ALARMS
 from livebode.dashboard.alarm_requests import MINUTES_MAX, NAME_MAX, TEXT_MAX, Act
-from livebode.fleet.status import ACTIVE, NOT_READY
+from livebode.fleet.status_message import ACTIVE, NOT_READY
 
 CONDITIONS: tuple[AlarmState, ...] = (
     "normal", "unacknowledged", "returned", "acknowledged", "suppressed", "shelved",

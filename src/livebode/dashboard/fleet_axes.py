@@ -10,7 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from livebode.fleet.status import AXIS_STATUS, AxisName, PartitionNames, PartitionStatus, StatusError, decode, usable
+from livebode.fleet.status_message import (
+    AXIS_STATUS,
+    AxisName,
+    PartitionNames,
+    PartitionStatus,
+    StatusError,
+    decode,
+    usable,
+)
 
 AXES_MAX = 200_000
 """Axes of one page; names of more are dropped and counted."""

@@ -14,7 +14,7 @@ from livebode.dashboard import fleet_alarms as alarms
 from livebode.dashboard.alarm_requests import Act, AlarmRequest
 from livebode.dashboard.fleet_alarms import CONDITIONS, FleetAct, FleetAlarms
 from livebode.dashboard.fleet_axes import NOWHERE, FleetAxes
-from livebode.fleet.status import BEHIND, NOT_READY, PRIORITIES, SILENT
+from livebode.fleet.status_message import BEHIND, NOT_READY, PRIORITIES, SILENT
 
 LOOKS = (
     "open", "ok", "check", "alarm", "returned", "acknowledged", "shelved", "not ready", "silent", "behind", "lost",

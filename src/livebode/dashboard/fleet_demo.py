@@ -13,7 +13,7 @@ import numpy as np
 
 from livebode.dashboard.fleet_alarms import FleetAct
 from livebode.dashboard.fleet_feed import Hear
-from livebode.fleet.status import (
+from livebode.fleet.status_message import (
     ACTIVE,
     AXIS_STATUS,
     BEHIND,

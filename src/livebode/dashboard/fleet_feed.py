@@ -12,8 +12,8 @@ from livebode.core.installing import not_installed
 from livebode.dashboard.fleet_alarms import FleetAct
 from livebode.fleet.subjects import axis_token
 
-STATUS_SUBJECT, NAMES_SUBJECT, ASK_SUBJECT, ACT_SUBJECT = "status", "names", "names.ask", "act"
-"""Subjects: status.PARTITION and names.PARTITION from the owner of a partition, names.ask.PARTITION to it, and
+STATUS_SUBJECT, NAMES_SUBJECT, ASK_SUBJECT, ACT_SUBJECT = "view", "names", "names.ask", "act"
+"""Subjects: view.PARTITION and names.PARTITION from the owner of a partition, names.ask.PARTITION to it, and
 act.KIND.AXIS, of which the stream ACTS retains the newest."""
 _ACTS_STREAM = "ACTS"
 _CONNECT_S = 3.0

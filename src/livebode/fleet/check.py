@@ -16,7 +16,7 @@ from livebode.arrow import to_numpy
 from livebode.configuration.axis import Axis
 from livebode.core.errors import FleetError
 from livebode.fleet.axis_stream import AxisStream
-from livebode.fleet.log import Log
+from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import SCHEMA, ResultMessage, response_rows
 from livebode.fleet.subjects import LOG, LOG_STREAM, RESULT_STREAM, RESULTS, axis_path, key_of
@@ -28,7 +28,7 @@ Run = tuple[str, int]
 
 
 @dataclass
-class AxisVerdict:
+class AxisCheck:
     """Responses of an axis: expected ones, and stored ones that differ from them.
 
     Attributes
@@ -59,7 +59,7 @@ class AxisVerdict:
 class CheckResult:
     """Verdicts by the path of the axis, and the claims of partitions: one at the start, one for each takeover."""
 
-    axes: Mapping[str, AxisVerdict]
+    axes: Mapping[str, AxisCheck]
     claims: int
     messages: int
 
@@ -68,12 +68,12 @@ class CheckResult:
         return all(axis.exact for axis in self.axes.values())
 
     @property
-    def total(self) -> AxisVerdict:
+    def total(self) -> AxisCheck:
         """The sum over all axes."""
         sums: Counter[str] = Counter()
         for axis in self.axes.values():
             sums.update(asdict(axis))
-        return AxisVerdict(**sums)
+        return AxisCheck(**sums)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -98,7 +98,7 @@ class _Stored:
             self.recipes[key, run] = message.recipes[key]
 
 
-async def check_results(log: Log, axes: Mapping[str, Axis]) -> CheckResult:
+async def check_results(log: FleetLog, axes: Mapping[str, Axis]) -> CheckResult:
     """Compute all responses again from the log, in one process and without interruption, and compare the stored ones.
 
     A fleet may run meanwhile: what is not stored yet is not expected.
@@ -150,10 +150,10 @@ class _Again:
             for _, run, response, digest in _digests(rows):
                 self._expected.setdefault((key, run), {})[response] = digest
 
-    def verdicts(self) -> dict[str, AxisVerdict]:
-        found: dict[str, AxisVerdict] = {axis_path(key): AxisVerdict() for key in sorted(self._axes)}
+    def verdicts(self) -> dict[str, AxisCheck]:
+        found: dict[str, AxisCheck] = {axis_path(key): AxisCheck() for key in sorted(self._axes)}
         for key, run in sorted(self._expected.keys() | self._stored.responses.keys()):
-            verdict = found.setdefault(axis_path(key), AxisVerdict())
+            verdict = found.setdefault(axis_path(key), AxisCheck())
             stored, expected = self._stored.responses.get((key, run), []), self._expected.get((key, run), {})
             stream = self._streams.get(key)
             if stored and (stream is None or self._stored.recipes[key, run] != stream.recipe):
@@ -163,7 +163,7 @@ class _Again:
         return found
 
 
-def _compare(verdict: AxisVerdict, expected: Mapping[int, bytes], stored: list[tuple[int, bytes]]) -> None:
+def _compare(verdict: AxisCheck, expected: Mapping[int, bytes], stored: list[tuple[int, bytes]]) -> None:
     times = Counter(number for number, _ in stored)
     verdict.responses += len(expected)
     verdict.missing += len(expected.keys() - times.keys())

@@ -1,4 +1,4 @@
-"""Coordinator: Dask's scheduler and workers, and which worker owns which partition."""
+"""FleetCoordinator: Dask's scheduler and workers, and which worker owns which partition."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class _Place:
     task: Any
 
 
-class Coordinator:
+class FleetCoordinator:
     """Starts workers on this computer and gives each partition to one of them; a context manager.
 
     Every partition is one endless task. If its worker dies or its task ends, another worker gets it; a worker that

@@ -7,11 +7,12 @@ import logging
 import threading
 import time
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
 from livebode.fleet.edge_buffer import EdgeBuffer
-from livebode.fleet.log import Log
+from livebode.fleet.log import FleetLog
 from livebode.fleet.message import message_id, read_message, write_message
 from livebode.fleet.settings import FleetSettings, LogSection
 from livebode.fleet.subjects import EDGE
@@ -47,10 +48,10 @@ class Edge:
             lost, self._dropped = self._buffer.dropped - self._dropped, self._buffer.dropped
             _logger.warning("the buffer is full: the oldest %d messages were deleted", lost)
 
-    async def send(self, log: Log, taking: threading.Thread) -> None:
+    async def send(self, log: FleetLog, taking: Future[None]) -> None:
         """Send until the thread that fills the buffer has ended, and the buffer is empty."""
         while True:
-            over = not taking.is_alive()
+            over = taking.done()
             message = self._buffer.first()
             if message is not None:
                 identity = message_id(self._key, read_message(message, 0.0))
@@ -103,25 +104,23 @@ def send_sources(settings: FleetSettings, sources: Mapping[str, LiveSource], sto
     ------
     FleetError
         If the log cannot be reached at the start, or a buffer cannot be used.
+    SourceError
+        If a source fails.
     """
     bytes_max = round(settings.edge.buffer_gb * 1e9 / max(1, len(sources)))
     buffers = {key: EdgeBuffer(settings.edge.buffer / key, bytes_max) for key in sources}
     edges = {key: Edge(key, buffer) for key, buffer in buffers.items()}
-    threads = [
-        threading.Thread(target=_take_all, args=(source, edges[key]), name=f"livebode send {key}")
-        for key, source in sources.items()
-    ]
-    try:
-        for thread in threads:
-            thread.start()
-        asyncio.run(_send_all(settings.log, list(zip(edges.values(), threads)), stop))
-    finally:
-        for source in sources.values():
-            source.stop()
-        for thread in threads:
-            thread.join()
-        for buffer in buffers.values():
-            buffer.close()
+    with ThreadPoolExecutor(max(1, len(sources)), "livebode source") as threads:
+        taking = [threads.submit(_take_all, source, edges[key]) for key, source in sources.items()]
+        try:
+            asyncio.run(send_edges(settings.log, list(zip(edges.values(), taking)), stop))
+        finally:
+            for source in sources.values():
+                source.stop()
+    for buffer in buffers.values():
+        buffer.close()
+    for one in taking:
+        one.result()
     return sum(edge.sent for edge in edges.values())
 
 
@@ -130,10 +129,11 @@ def _take_all(source: LiveSource, edge: Edge) -> None:
         edge.take(batch)
 
 
-async def _send_all(settings: LogSection, edges: list[tuple[Edge, threading.Thread]], stop: threading.Event) -> None:
-    async with Log(settings, "livebode send") as log:
+async def send_edges(settings: LogSection, edges: list[tuple[Edge, Future[None]]], stop: threading.Event) -> None:
+    """Send the messages of each edge until the thread that fills it has ended, or a second after `stop`."""
+    async with FleetLog(settings, "livebode send") as log:
         await log.create_streams()
-        sending = asyncio.gather(*(edge.send(log, thread) for edge, thread in edges))
+        sending = asyncio.gather(*(edge.send(log, taking) for edge, taking in edges))
         while not sending.done() and not stop.is_set():
             await asyncio.sleep(_IDLE_S)
         await asyncio.wait([sending], timeout=_REST_S)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import struct
 import threading
@@ -13,6 +14,7 @@ from pathlib import Path
 from livebode.core.errors import FleetError
 
 FILE_BYTES = 1 << 20
+_logger = logging.getLogger(__name__)
 _HEAD = struct.Struct("<II")
 _SUFFIX = ".buffer"
 
@@ -38,7 +40,9 @@ class EdgeBuffer:
     directory
         Created if it is missing; of this buffer alone.
     bytes_max
-        Most bytes on disk.
+        Most bytes on disk, at least two files.
+    file_bytes
+        Size of a file.
 
     Raises
     ------
@@ -46,8 +50,9 @@ class EdgeBuffer:
         If the directory or a file in it cannot be read or written.
     """
 
-    def __init__(self, directory: Path, bytes_max: int) -> None:
-        self._directory, self._bytes_max = directory, max(bytes_max, 2 * FILE_BYTES)
+    def __init__(self, directory: Path, bytes_max: int, file_bytes: int = FILE_BYTES) -> None:
+        self._directory, self._file_bytes = directory, file_bytes
+        self._bytes_max = max(bytes_max, 2 * file_bytes)
         self._lock = threading.Lock()
         self._files: deque[_File] = deque()
         self._taken: deque[bytes] = deque()
@@ -59,7 +64,11 @@ class EdgeBuffer:
         try:
             directory.mkdir(parents=True, exist_ok=True)
             for path in sorted(directory.glob(f"*{_SUFFIX}")):
-                self._files.append(_File(path, len(self._read(path)), path.stat().st_size))
+                size_bytes, found = path.stat().st_size, self._read(path)
+                self._files.append(_File(path, len(found), size_bytes))
+                if sum(map(len, found)) + _HEAD.size * len(found) != size_bytes:
+                    self.damaged += 1
+                    _logger.warning("%s has an incomplete end, as after a power cut; its message is lost", path)
             self._begin_file()
         except OSError as error:
             raise _unusable(directory, error) from None
@@ -80,7 +89,7 @@ class EdgeBuffer:
         record = _HEAD.pack(len(message), zlib.crc32(message)) + message
         with self._lock:
             try:
-                if self._files[-1].size_bytes + len(record) > FILE_BYTES and self._files[-1].count:
+                if self._files[-1].size_bytes + len(record) > self._file_bytes and self._files[-1].count:
                     self._begin_file()
                 while sum(file.size_bytes for file in self._files) > self._bytes_max and len(self._files) > 1:
                     self._drop()
@@ -101,16 +110,20 @@ class EdgeBuffer:
             return self._taken[0] if self._taken else None
 
     def remove(self, message: bytes) -> None:
-        """Remove the oldest message, which is stored; nothing if it was dropped meanwhile."""
+        """Remove the oldest message, which is stored; one that was dropped meanwhile is not counted as dropped."""
         with self._lock:
             if not self._taken or self._taken[0] is not message:
+                self.dropped -= 1
                 return
             self._taken.popleft()
             self._files[0].count -= 1
-            if not self._files[0].count:
-                if len(self._files) == 1:
-                    self._begin_file()
+            if self._files[0].count:
+                return
+            if len(self._files) > 1:
                 self._files.popleft().path.unlink(missing_ok=True)
+            else:
+                os.ftruncate(self._write, 0)
+                self._files[0].size_bytes = 0
 
     def close(self) -> None:
         """Close the file; what it contains remains."""
@@ -142,7 +155,6 @@ class EdgeBuffer:
                 break
             found.append(message)
             at += _HEAD.size + length
-        self.damaged += at != len(data)
         return found
 
 

@@ -1,4 +1,4 @@
-"""Log: the connection to NATS JetStream. Everything that is stored, is stored here."""
+"""FleetLog: the connection to NATS JetStream. Everything that is stored, is stored here."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from livebode.fleet.settings import LogSection
 _logger = logging.getLogger(__name__)
 _EXPECTED, _WRITE = "Nats-Expected-Last-Subject-Sequence", "Livebode-Write"
 _WRONG_LAST_SEQUENCE = 10071
-_REQUEST_S, _CONNECT_S, _RETRY_S, _RETRY_S_MAX = 2.0, 2.0, 0.1, 1.0
+_REQUEST_S, _CONNECT_S, _START_S, _RETRY_S, _RETRY_S_MAX = 2.0, 2.0, 4.0, 0.1, 1.0
 _DUPLICATES_S = 120.0
 T = TypeVar("T")
 
@@ -49,7 +49,7 @@ class StreamExtent:
     subjects: Mapping[str, int]
 
 
-class Log:
+class FleetLog:
     """A connection to the server of the log. Each request is repeated until the server answers.
 
     Use it as an asynchronous context manager.
@@ -67,7 +67,7 @@ class Log:
         self.trouble = ""
         """Why the server does not answer at the moment; empty while it does."""
 
-    async def __aenter__(self) -> Log:
+    async def __aenter__(self) -> FleetLog:
         """Connect.
 
         Raises
@@ -85,7 +85,7 @@ class Log:
             ) from None
         self._nats = nats
         try:
-            self._connection = await nats.connect(
+            connecting = nats.connect(
                 self.settings.url.split(","),
                 name=self._name,
                 connect_timeout=_CONNECT_S,
@@ -96,6 +96,7 @@ class Log:
                 error_cb=self._note,
                 allow_reconnect=True,
             )
+            self._connection = await asyncio.wait_for(connecting, _START_S)
         except (TimeoutError, OSError, nats.errors.Error) as error:
             raise FleetError(
                 "log-unreachable",

@@ -17,7 +17,7 @@ from typing import Any
 from livebode.configuration.axis import Axis
 from livebode.core import StateError
 from livebode.fleet.axis_stream import AxisStream
-from livebode.fleet.log import ClaimLostError, Log, StoredMessage
+from livebode.fleet.log import ClaimLostError, FleetLog, StoredMessage
 from livebode.fleet.reader import Reader
 from livebode.fleet.result_message import PendingResults, ResultMessage
 from livebode.fleet.subjects import (
@@ -60,7 +60,7 @@ class PartitionOwner:
         Name of this process in the results and in the status.
     """
 
-    def __init__(self, log: Log, number: int, axes: Mapping[str, Axis], owner: str = "") -> None:
+    def __init__(self, log: FleetLog, number: int, axes: Mapping[str, Axis], owner: str = "") -> None:
         self._log, self._number, self._axes = log, number, axes
         self._owner = owner or f"{socket.gethostname()}:{os.getpid()}"
         self._streams: dict[str, AxisStream] = {}

@@ -9,7 +9,7 @@ import time
 from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Any
 
-from livebode.fleet.log import Log, StoredMessage
+from livebode.fleet.log import FleetLog, StoredMessage
 
 if TYPE_CHECKING:
     from nats.aio.msg import Msg
@@ -38,7 +38,7 @@ class Reader:
         Number in the stream of the first message, or of one before it.
     """
 
-    def __init__(self, log: Log, stream: str, subject: str, first: int) -> None:
+    def __init__(self, log: FleetLog, stream: str, subject: str, first: int) -> None:
         self._log, self._stream, self._subject = log, stream, subject
         self.next = first
         """Number after the last message that was returned."""
@@ -70,6 +70,7 @@ class Reader:
     async def _subscribe(self) -> None:
         self._subscription = await self._log.subscription(self._stream, self._subject, self.next, _INACTIVE_S)
         self._delivered, self._heard_s = 0, time.monotonic()
+        self.pending = (await self._subscription.consumer_info()).num_pending
 
     async def _checked(self, found: list[Msg]) -> list[StoredMessage]:
         messages = []
@@ -101,13 +102,13 @@ class Reader:
 
 
 async def stored_messages(
-    log: Log, stream: str, subject: str, through: int, first: int = 1
+    log: FleetLog, stream: str, subject: str, through: int, first: int = 1
 ) -> AsyncIterator[StoredMessage]:
     """The messages of a subject from number `first` to `through`, which are in the stream already."""
     last = await log.last(stream, subject)
     reader = Reader(log, stream, subject, first)
     try:
-        while reader.next <= min(through, 0 if last is None else last.number):
+        while last is not None and reader.next <= min(through, last.number):
             for message in await reader.read(_READ_S):
                 if message.number <= through:
                     yield message

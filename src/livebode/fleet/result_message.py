@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from livebode.arrow import from_numpy, text
+from livebode.arrow import from_numpy
 from livebode.core import Responses
 from livebode.fleet.axis_stream import AxisStream, Output
 from livebode.records.response_table import SCHEMA as RESPONSE_SCHEMA
@@ -20,6 +20,8 @@ SCHEMA = pa.schema([("axis", pa.string()), ("run", pa.int64()), ("number", pa.in
 """Columns: key of the axis, number in the log of the first message of its run, number of the response within that run,
 and those of responses.parquet."""
 _META = b"livebode"
+_BYTES = 130
+"""Of a response at a line, in memory."""
 
 
 @dataclass(frozen=True)
@@ -69,21 +71,20 @@ class PendingResults:
     """Outputs that are not stored yet."""
 
     def __init__(self) -> None:
-        self._batches: list[pa.RecordBatch] = []
+        self._responses: dict[tuple[str, int], list[tuple[int, Responses]]] = {}
         self._events: list[dict[str, Any]] = []
         self._recipes: dict[str, str] = {}
         self.nbytes = 0
 
     def __bool__(self) -> bool:
-        return bool(self._batches or self._events)
+        return bool(self._responses or self._events)
 
     def add(self, key: str, stream: AxisStream, output: Output) -> None:
         """Append the output of a message of this axis."""
         self._events += [{"axis": key, "run": stream.run, **asdict(event)} for event in output.events]
         if output.responses is not None:
-            batch = response_rows(key, stream.run, output.number, output.responses)
-            self._batches.append(batch)
-            self.nbytes += batch.nbytes
+            self._responses.setdefault((key, stream.run), []).append((output.number, output.responses))
+            self.nbytes += output.responses.value.size * _BYTES
         if output.responses is not None or output.events:
             self._recipes[key] = stream.recipe
 
@@ -93,15 +94,23 @@ class PendingResults:
 
     def message(self, through: int, owner: str) -> ResultMessage:
         """All of them as one message."""
-        rows = pa.Table.from_batches(self._batches, SCHEMA)
+        batches = [
+            response_rows(key, run, outputs[0][0], Responses.join([responses for _, responses in outputs]))
+            for (key, run), outputs in self._responses.items()
+        ]
+        rows = pa.Table.from_batches(batches, SCHEMA)
         return ResultMessage(through, owner, rows=rows, events=self._events, recipes=self._recipes)
 
 
 def response_rows(key: str, run: int, number: int, responses: Responses) -> pa.RecordBatch:
     """The responses as rows of `SCHEMA`, those of an axis's run that begin with this number."""
     batch = as_batch(responses)
-    lines = len(responses.lines)
-    numbers = np.repeat(np.arange(number, number + len(responses)), lines)
-    names = text([key], np.zeros_like(numbers))
-    runs = from_numpy(np.full_like(numbers, run))
-    return pa.RecordBatch.from_arrays([names, runs, from_numpy(numbers), *batch.columns], schema=SCHEMA)
+    numbers = np.repeat(np.arange(number, number + len(responses)), len(responses.lines))
+    columns = [_repeated(key, len(numbers)), from_numpy(np.full_like(numbers, run)), from_numpy(numbers)]
+    return pa.RecordBatch.from_arrays([*columns, *batch.columns], schema=SCHEMA)
+
+
+def _repeated(word: str, times: int) -> pa.Array[Any]:
+    letters = word.encode()
+    ends = np.arange(times + 1, dtype=np.int32) * len(letters)
+    return pa.Array.from_buffers(pa.string(), times, [None, pa.py_buffer(ends), pa.py_buffer(letters * times)])

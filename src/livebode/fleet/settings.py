@@ -128,7 +128,7 @@ class FleetSettings(_Section):
 
 def machine_key(axis: Axis, origin: str) -> str:
     """The key of an axis in the log; FleetError if it has no [machine] section."""
-    if not axis.machine.path:
+    if axis.machine is None or not axis.machine.path:
         raise FleetError(
             "axis-unnamed",
             "the axis has no [machine] section",
@@ -143,6 +143,7 @@ def _add(found: dict[str, Axis], axes: Mapping[str, Axis], path: str) -> None:
         origin = f"{path}, axis {name}" if name else path
         key = machine_key(axis, origin)
         if key in found:
+            assert axis.machine is not None
             raise FleetError(
                 "axis-duplicated",
                 f"another axis of the fleet is {axis.machine.path!r} too",

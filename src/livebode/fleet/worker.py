@@ -7,7 +7,7 @@ import threading
 from collections.abc import Iterable, Mapping
 
 from livebode.configuration.axis import Axis
-from livebode.fleet.log import Log
+from livebode.fleet.log import FleetLog
 from livebode.fleet.partition import PartitionOwner
 from livebode.fleet.settings import LogSection
 
@@ -33,7 +33,7 @@ async def _own(
     stopped = asyncio.Event()
 
     async def own(number: int) -> bool:
-        async with Log(settings, f"livebode partition {number}") as log:
+        async with FleetLog(settings, f"livebode partition {number}") as log:
             return await kind(log, number, axes).run(stopped)
 
     watching = asyncio.create_task(_watch(stop, stopped))

@@ -1,1 +1,1 @@
-"""`livebode fleet`: the axes of many machines together."""
+"""The subcommands of `livebode fleet`."""

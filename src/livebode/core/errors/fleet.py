@@ -26,6 +26,7 @@ class FleetError(LivebodeError):
         "buffer-unusable": "The disk buffer of an edge cannot be read or written.",
         "log-incomplete": "The log no longer has its beginning, so the results cannot be computed again.",
         "log-unreachable": "The server of the log cannot be reached, or rejects the connection.",
+        "no-data": "The log has no data of this axis in the time that was asked for.",
         "not-exactly-once": "Stored responses are missing, doubled or different from one uninterrupted computation.",
         "server-ended": "The server of the log ended at its start.",
         "server-missing": "The program nats-server is not installed.",

@@ -1,0 +1,34 @@
+"""`livebode fleet check`: the proof that every response is stored exactly once."""
+
+from __future__ import annotations
+
+import asyncio
+
+from livebode.cli.fleet.options import Fleet
+from livebode.cli.options import Json
+
+
+def check_command(fleet: Fleet, as_json: Json = False) -> None:
+    """Compute all responses of a fleet again from its log, and compare the stored ones bit for bit.
+
+    The fleet may run meanwhile. Exit code 2 if a response is missing, doubled or different.
+    """
+    from livebode.cli.fleet.verdict import require_exact, verdict
+    from livebode.fleet.check import CheckResult, check_results
+    from livebode.fleet.log import FleetLog
+    from livebode.fleet.settings import FleetSettings
+    from livebode.records import to_json
+
+    settings = FleetSettings.read(fleet)
+    axes = settings.read_axes()
+
+    async def check() -> CheckResult:
+        async with FleetLog(settings.log, "livebode check") as log:
+            return await check_results(log, axes)
+
+    result = asyncio.run(check())
+    if as_json:
+        print(to_json(result.as_dict()))
+    require_exact(result)
+    if not as_json:
+        print(verdict(result))

@@ -1,0 +1,49 @@
+"""`livebode fleet replay`: an axis computed again from the log."""
+
+from __future__ import annotations
+
+import asyncio
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from livebode.cli.fleet.options import Fleet
+from livebode.cli.options import Json
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+def replay_command(
+    fleet: Fleet,
+    axis: Annotated[str, typer.Argument(metavar="AXIS", help="Path of the axis: site/line/machine/axis.")],
+    from_: Annotated[
+        datetime | None, typer.Option("--from", metavar="TIME", help="Beginning, in local time. Default: of the log.")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Parquet file to write.")] = Path("replay.parquet"),
+    as_json: Json = False,
+) -> None:
+    """Compute the responses of an axis again from the log, and write them as a table."""
+    from livebode.core import nearest_name
+    from livebode.core.errors import FleetError
+    from livebode.fleet.log import FleetLog
+    from livebode.fleet.replay import replayed, write_replayed
+    from livebode.fleet.settings import FleetSettings
+    from livebode.fleet.subjects import axis_path
+    from livebode.records import to_json
+
+    settings = FleetSettings.read(fleet)
+    axes = settings.read_axes()
+    keys = {axis_path(key): key for key in axes}
+    if axis not in keys:
+        raise FleetError("axis-unknown", f"the fleet has no axis {axis!r}", nearest_name(axis, sorted(keys)), axis=axis)
+
+    async def replay() -> pa.Table:
+        async with FleetLog(settings.log, "livebode replay") as log:
+            return await replayed(log, keys[axis], axes[keys[axis]], 0.0 if from_ is None else from_.timestamp())
+
+    table = asyncio.run(replay())
+    write_replayed(table, out)
+    print(to_json({"file": str(out), "rows": table.num_rows}) if as_json else f"{out}: {table.num_rows:,} rows")

@@ -1,0 +1,40 @@
+"""`livebode fleet run`: the coordinator and the workers of a fleet on this computer."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+from livebode.cli.fleet.options import Fleet
+from livebode.cli.options import Json
+
+_STEP_S = 0.25
+
+
+def run_command(fleet: Fleet, as_json: Json = False) -> None:
+    """Start the workers of a fleet on this computer, and replace those that die, until Ctrl-C.
+
+    Nothing has to be ended in order: what is not stored yet is computed again from the log at the next start.
+    """
+    from livebode.fleet.coordinator import FleetCoordinator
+    from livebode.fleet.log import FleetLog
+    from livebode.fleet.settings import FleetSettings
+
+    settings = FleetSettings.read(fleet)
+    axes = settings.read_axes()
+
+    async def create_streams() -> None:
+        async with FleetLog(settings.log, "livebode run") as log:
+            await log.create_streams()
+
+    asyncio.run(create_streams())
+    with FleetCoordinator(settings, axes) as coordinator:
+        if not as_json:
+            print(f"{settings.workers} workers share {settings.partitions} partitions of {len(axes)} axes; Ctrl-C ends")
+        try:
+            while True:
+                coordinator.step()
+                time.sleep(_STEP_S)
+        except KeyboardInterrupt:
+            if not as_json:
+                print("stopped; the log has everything that is not processed yet")

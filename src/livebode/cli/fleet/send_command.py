@@ -1,0 +1,42 @@
+"""`livebode fleet send`: live sources into the log."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from livebode.cli.fleet.options import Fleet
+from livebode.cli.options import Json
+
+
+def send_command(
+    axis: Annotated[Path, typer.Argument(metavar="AXIS.TOML", help="Axes with a live source and a [machine] section.")],
+    fleet: Fleet,
+    as_json: Json = False,
+) -> None:
+    """Send the samples of live sources to the log, through a buffer on disk, until they end or Ctrl-C.
+
+    While the log cannot be reached, the buffer grows up to its limit; then its oldest messages are deleted and counted.
+    """
+    from livebode.configuration.axes import ConfigurationFile
+    from livebode.fleet.edge import send_sources
+    from livebode.fleet.settings import FleetSettings, machine_key
+    from livebode.records import to_json
+    from livebode.sources.live import make_source
+
+    settings = FleetSettings.read(fleet)
+    axes = ConfigurationFile(axis, {}).read()
+    keys = {machine_key(one, f"{axis}, axis {name}" if name else str(axis)): one for name, one in axes.items()}
+    stop = threading.Event()
+    signal.signal(signal.SIGINT, lambda *_: stop.set())
+    with contextlib.ExitStack() as opened:
+        sources = {key: opened.enter_context(make_source(one.source).open()) for key, one in keys.items()}
+        if not as_json:
+            print(f"{len(sources)} axes send to {settings.log.url}; Ctrl-C ends", flush=True)
+        sent = send_sources(settings, sources, stop)
+    print(to_json({"messages": sent}) if as_json else f"the log has stored {sent} messages")

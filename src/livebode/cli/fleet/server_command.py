@@ -1,0 +1,31 @@
+"""`livebode fleet server`: the configuration of nats-server."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from livebode.cli.fleet.options import Fleet
+from livebode.cli.options import Json
+
+
+def server_command(
+    fleet: Fleet,
+    store: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the log.")] = Path("log"),
+    host: Annotated[str, typer.Option(help="Address at which the server listens.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port at which the server listens.")] = 4222,
+    as_json: Json = False,
+) -> None:
+    """Print the configuration of nats-server for a fleet: store, limits, and the mapping of axes to partitions."""
+    from livebode.fleet.server_config import server_configuration
+    from livebode.fleet.settings import FleetSettings
+    from livebode.records import to_json
+
+    settings = FleetSettings.read(fleet)
+    limit = round((settings.log.size_gb + settings.log.results_gb) * 1.1e9)
+    text = server_configuration(
+        store.absolute(), partitions=settings.partitions, port=port, host=host, file_bytes_max=limit
+    )
+    print(to_json({"configuration": text}) + "\n" if as_json else text, end="")
