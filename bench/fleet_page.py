@@ -14,7 +14,6 @@ import argparse
 import asyncio
 import os
 import time
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -79,9 +78,6 @@ class Plant:
             for message in self.messages(150 + now_s - began_s, now_s):
                 hear(message)
             await asyncio.sleep(max(0.0, 1.0 - (time.time() - now_s)))
-
-    async def ask(self, _: Iterable[int]) -> None:
-        """All names were sent."""
 
     async def publish(self, _: FleetAct) -> None:
         """Nobody acts."""

@@ -204,12 +204,6 @@ def test_a_stranger_harms_nobody_else() -> None:
     assert board.axes.dropped == 4
 
 
-def test_names_are_asked_for_once_in_some_seconds() -> None:
-    board = FleetBoard()
-    board.take([encode_status(4, 77, one_alarm(), NOW)], NOW)
-    assert (board.axes.nameless(NOW), board.axes.nameless(NOW + 1), board.axes.nameless(NOW + 9)) == ([4], [], [4])
-
-
 @settings(max_examples=50, deadline=None)
 @given(st.integers(1, 400), st.integers(0, 400), st.integers(0, 99))
 def test_a_page_that_takes_frames_shows_what_the_board_has(axes: int, changes: int, seed: int) -> None:

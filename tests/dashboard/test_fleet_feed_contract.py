@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
+import threading
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -12,21 +14,25 @@ from typing import Any
 import numpy as np
 import pytest
 
+from livebode.configuration.axis import Axis
 from livebode.core.errors import FleetError
 from livebode.dashboard.alarm_requests import AlarmRequest
 from livebode.dashboard.fleet_board import LOOKS
 from livebode.dashboard.fleet_feed import NatsFeed
 from livebode.dashboard.fleet_view import FleetView
+from livebode.fleet.log import FleetLog
 from livebode.fleet.server import LogServer
+from livebode.fleet.settings import LogSection
 from livebode.fleet.status_message import ACTIVE, AXIS_STATUS, AxisName, PartitionNames, encode_names, encode_status
+from livebode.fleet.worker import own_partitions
+from tests.support.fleet_runs import PARTITIONS, SAMPLES, fleet_axes, log_section, send, sent
 
 
 class Worker:
-    """The owner of a partition: a status ten times a second, its names when it is asked."""
+    """The owner of a partition: a status ten times a second, its names each second."""
 
     def __init__(self, url: str) -> None:
         self._url = url
-        self.asked = 0
 
     async def run(self) -> None:
         import nats
@@ -37,14 +43,10 @@ class Worker:
         status = np.zeros(2, AXIS_STATUS)
         status["axis"], status["state"] = [0, 1], 1
         status[1]["raised"], status[1]["flags"], status[1]["raised_s"] = 1, ACTIVE, 50
-
-        async def answer(_: Any) -> None:
-            self.asked += 1
-            await connection.publish("names.0", names)
-
-        await connection.subscribe("names.ask.0", cb=answer)
         try:
-            while True:
+            for beat in itertools.count():
+                if beat % 10 == 5:
+                    await connection.publish("names.0", names)
                 await connection.publish("view.0", encode_status(0, table, status, time.time()))
                 await connection.publish("view.0", b"{}")  # a stranger's
                 await asyncio.sleep(0.1)
@@ -90,12 +92,38 @@ async def use(url: str) -> None:
             await later.act("unshelve", AlarmRequest(1, f"{later.board.layout}:1", "Bo"))
             await looks(later, "ok", "acknowledged")
         assert one.board.axes.dropped > 0
-        assert worker.asked <= 4, "names are asked for, not sent each second"
 
 
 def test_pages_of_one_fleet_show_the_same_acts(tmp_path: Path) -> None:
     with LogServer(tmp_path, 4) as server:
         asyncio.run(use(server.url))
+
+
+def test_the_owners_of_partitions_report_to_the_page(tmp_path: Path) -> None:
+    """A real fleet: what was sent is tracked; an axis that loses samples has an alarm that is over."""
+    with LogServer(tmp_path, PARTITIONS) as server:
+        log, axes, stop = log_section(server.url), fleet_axes(3), threading.Event()
+        sent(log, axes, 8)
+        owners = threading.Thread(target=own_partitions, args=(log, axes, range(PARTITIONS), stop))
+        owners.start()
+        try:
+            asyncio.run(follow(server.url, log, axes))
+        finally:
+            stop.set()
+            owners.join()
+
+
+async def follow(url: str, section: LogSection, axes: dict[str, Axis]) -> None:
+    view = opened(url)
+    async with running(view), FleetLog(section, "test") as log:
+        await looks(view, *["silent"] * 3)
+        assert view.board.paths == [f"ulm/press {n}/x" for n in range(3)]
+        first = 12 * SAMPLES  # four batches are missing
+        await send(log, dict(list(axes.items())[:1]), range(first, first + 4 * SAMPLES, SAMPLES))
+        await looks(view, "returned", "silent", "silent")
+        assert view.board.gaps()["lost"] == 4 * SAMPLES
+        assert view.board.workers(time.time())["silent_count"] == 0
+        assert view.board.axes.dropped == 0
 
 
 def test_a_log_that_is_not_there_is_reported(tmp_path: Path) -> None:

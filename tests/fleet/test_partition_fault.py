@@ -17,7 +17,7 @@ from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import LogSection
-from livebode.fleet.status_message import fleet_status
+from livebode.fleet.status import fleet_status
 from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS, STATE_STREAM, axis_path
 from tests.support.fleet_runs import (
     PARTITIONS,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -39,9 +39,6 @@ class DrivenFeed:
             while self._acts:
                 hear_act(self._acts.pop(0))
             await asyncio.sleep(0.1)
-
-    async def ask(self, partitions: Iterable[int]) -> None:
-        """All names were sent at the start."""
 
     async def publish(self, act: FleetAct) -> None:
         self._acts.append(act.to_bytes())

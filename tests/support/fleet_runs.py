@@ -20,7 +20,7 @@ from livebode.fleet.partition import PartitionOwner
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.settings import LogSection, machine_key
-from livebode.fleet.status_message import status_of
+from livebode.fleet.status import status_of
 from livebode.fleet.subjects import EDGE, RESULT_STREAM, RESULTS
 from livebode.fleet.worker import own_partitions
 from livebode.sources.live import Batch

@@ -17,13 +17,13 @@ from livebode.fleet.status_message import (
     PartitionStatus,
     StatusError,
     decode,
+    names_table,
     usable,
 )
 
 AXES_MAX = 200_000
 """Axes of one page; names of more are dropped and counted."""
 KINDS_MAX = 255
-ASK_EVERY_S = 5.0
 NOWHERE = -1
 """Partition of an axis that its partition no longer has."""
 _DIGITS = re.compile(r"([0-9]{1,15})")
@@ -47,7 +47,6 @@ class Partition:
     rows: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     kinds: Array = field(default_factory=lambda: np.zeros(KINDS_MAX + 1, np.uint8))
     heard_s: float = float("nan")
-    asked_s: float = float("-inf")
     waiting: int = 0
     lag_s: float = 0.0
 
@@ -108,6 +107,8 @@ class FleetAxes:
         """Take the newest status of each partition from messages; those that are not valid are counted."""
         newest: dict[int, PartitionStatus] = {}
         for message in messages:
+            if self._repeated(message):
+                continue
             try:
                 found = decode(message)
             except StatusError:
@@ -121,15 +122,14 @@ class FleetAxes:
         if known:
             self._store(known, now_s)
 
-    def nameless(self, now_s: float) -> list[int]:
-        """Partitions whose names must be asked for, each at most once in some seconds."""
-        asked = [n for n, p in self.partitions.items() if p.names is None and now_s - p.asked_s >= ASK_EVERY_S]
-        for number in asked:
-            self.partitions[number].asked_s = now_s
-        return asked
+    def _repeated(self, message: bytes) -> bool:
+        """Whether a message has the names that are known: they come every few seconds, and cost more than a status."""
+        partition, table = names_table(message)
+        known = self.partitions.get(partition)
+        return known is not None and known.names is not None and known.names.table == table
 
     def _known(self, status: PartitionStatus) -> bool:
-        """Whether the names of a status are known; else they will be asked for."""
+        """Whether the names of a status are known; else they come within some seconds."""
         partition = self.partitions.setdefault(status.partition, Partition())
         if partition.names is not None and partition.names.table != status.table:
             partition.names = None

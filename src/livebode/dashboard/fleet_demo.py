@@ -168,9 +168,6 @@ class DemoFeed:
                 found.append(encode_status(partition, table, axes, now_s, waiting=int(40 * lag_s), lag_s=lag_s))
         return found
 
-    async def ask(self, partitions: Iterable[int]) -> None:
-        """Its names have been sent."""
-
     async def publish(self, act: FleetAct) -> None:
         """Send it back."""
         self._hear_act(act.to_bytes())

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from livebode.core.errors import FleetError
 from livebode.core.installing import not_installed
 from livebode.dashboard.fleet_alarms import FleetAct
+from livebode.fleet.page_status import NAMES, VIEW
 from livebode.fleet.subjects import axis_token
 
-STATUS_SUBJECT, NAMES_SUBJECT, ASK_SUBJECT, ACT_SUBJECT = "view", "names", "names.ask", "act"
-"""Subjects: view.PARTITION and names.PARTITION from the owner of a partition, names.ask.PARTITION to it, and
-act.KIND.AXIS, of which the stream ACTS retains the newest."""
+ACT_SUBJECT = "act"
+"""Subjects act.KIND.AXIS, of which the stream ACTS retains the newest."""
 _ACTS_STREAM = "ACTS"
 _CONNECT_S = 3.0
 Hear = Callable[[bytes], None]
@@ -36,9 +36,6 @@ class StatusFeed(Protocol):
 
     async def run(self, hear: Hear, hear_act: Hear) -> None:
         """Pass each status message to `hear` and each act to `hear_act`, those from before first."""
-
-    async def ask(self, partitions: Iterable[int]) -> None:
-        """Ask the owners of partitions for their names."""
 
     async def publish(self, act: FleetAct) -> None:
         """Store an act and send it to all pages of the fleet, to this one too; FleetError if that is impossible."""
@@ -127,18 +124,12 @@ class NatsFeed:
             await js.subscribe(f"{ACT_SUBJECT}.>", cb=act, ordered_consumer=True)
         except self._errors as error:
             self.trouble = f"acknowledgements cannot be read: {error}"
-        for subject in (STATUS_SUBJECT, NAMES_SUBJECT):
+        for subject in (VIEW, NAMES):
             await self._connection.subscribe(f"{subject}.*", cb=status)
         try:
             await asyncio.Event().wait()
         finally:
             await self.close()
-
-    async def ask(self, partitions: Iterable[int]) -> None:
-        """Ask the owners of partitions for their names."""
-        for partition in partitions:
-            with contextlib.suppress(self._errors):
-                await self._connection.publish(f"{ASK_SUBJECT}.{partition}", b"")
 
     async def publish(self, act: FleetAct) -> None:
         """Store an act in the log."""

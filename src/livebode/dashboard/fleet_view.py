@@ -47,7 +47,7 @@ class FleetView:
         following = asyncio.create_task(self._follow())
         try:
             while not following.done():
-                await self._tick()
+                self._tick()
                 await asyncio.wait([following], timeout=TICK_S if self.browsers else IDLE_S)
             following.result()
         finally:
@@ -65,13 +65,11 @@ class FleetView:
                 self.feed.trouble = str(error)
             await asyncio.sleep(RETRY_S)
 
-    async def _tick(self) -> None:
+    def _tick(self) -> None:
         now_s, board = time.time(), self.board
         messages = [self._messages.popleft() for _ in range(len(self._messages))]
         board.take(messages, now_s)
         while self._acts:
             board.take_act(self._acts.popleft())
-        if asked := board.axes.nameless(now_s):
-            await self.feed.ask(asked)
         board.refresh(now_s)
         self.pulse.beat()

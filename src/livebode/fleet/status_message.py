@@ -18,7 +18,8 @@ A message has a header, a body and the CRC-32 of both. All numbers are little en
 | end | u32 | CRC-32 of everything before |
 
 The body of a status has 52 bytes for each axis, `AXIS_STATUS`, ordered by the axis's number. The body of names is
-compressed JSON (zlib), `PartitionNames`. Names are sent when they change and when a page asks for them.
+compressed JSON (zlib), `PartitionNames`. Names are sent when they change, and every few seconds for pages that
+opened later.
 """
 
 from __future__ import annotations
@@ -140,6 +141,14 @@ def encode_names(names: PartitionNames, at_s: float) -> tuple[bytes, int]:
     body = zlib.compress(text.encode())
     table = zlib.crc32(body)
     return _packed(_NAMES, names.partition, table, len(rows), at_s, 0, 0.0, body), table
+
+
+def names_table(message: bytes) -> tuple[int, int]:
+    """Partition and table of a message of names, from its unchecked header; (-1, 0) of any other."""
+    if len(message) < _HEADER.size or message[:4] != _MAGIC or message[5] != _NAMES:
+        return -1, 0
+    _, _, _, partition, table, *_ = _HEADER.unpack_from(message)
+    return partition, table
 
 
 def decode(message: bytes) -> PartitionStatus | PartitionNames:
