@@ -21,7 +21,7 @@ COMMANDS = {
     f"{name} {inner}" if inner else name: one
     for name, command in typer.main.get_command(app).commands.items()
     for inner, one in getattr(command, "commands", {"": command}).items()
-    if name != "view"
+    if "view" not in (name, inner)  # a page has no result
 }
 LIVEBODE = str(Path(sys.executable).with_name("livebode"))
 

@@ -119,7 +119,9 @@ async def follow(url: str, section: LogSection, axes: dict[str, Axis]) -> None:
         await looks(view, *["silent"] * 3)
         assert view.board.paths == [f"ulm/press {n}/x" for n in range(3)]
         first = 12 * SAMPLES  # four batches are missing
-        await send(log, dict(list(axes.items())[:1]), range(first, first + 4 * SAMPLES, SAMPLES))
+        await send(
+            log, dict(list(axes.items())[:1]), range(first, first + 40 * SAMPLES, SAMPLES)
+        )  # the sequencer waits for late ones
         await looks(view, "returned", "silent", "silent")
         assert view.board.gaps()["lost"] == 4 * SAMPLES
         assert view.board.workers(time.time())["silent_count"] == 0
