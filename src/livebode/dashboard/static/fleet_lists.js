@@ -242,11 +242,11 @@ function silentRow({ partition, axes, age_s: ageS }) {
 /** @param {Worker} worker */
 function workerRow({ worker, partitions, axes, waiting, lag_s: lagS }) {
   const { sign, key } = LOOKS[lagS > 2 ? 9 : 1];
-  const state = `${sign} ${tr("lag {time}", { time: span(lagS) })}`;
+  const lag = tr("lag {time}", { time: span(lagS) });
   const text = [
     tr("{count} messages wait", { count: thousands(waiting) }),
     trn("{n} partition", "{n} partitions", partitions),
     tr("{count} axes", { count: thousands(axes) }),
   ].join(" · ");
-  return plainRow(worker || tr("unknown worker"), key, state, text);
+  return plainRow(worker || tr("unknown worker"), key, `${sign} ${lag}`, text);
 }
