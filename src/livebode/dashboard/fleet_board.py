@@ -121,8 +121,13 @@ class FleetBoard:
         status = self.axes.status[some]
         order = np.lexsort((-status["raised_s"].astype(float), -status["priority"].astype(int), rank))
         rows = [self._plain(int(row)) | self.alarms.plain(int(row), now_s) for row in some[order[:ALARMS_MAX]]]
-        waits = np.isin(conditions, (alarms.UNACKNOWLEDGED, alarms.RETURNED))
-        return {"rows": rows, "count": len(some), "open": int(np.count_nonzero(waits))}
+        return {"rows": rows, "count": len(some)}
+
+    @property
+    def open_count(self) -> int:
+        """Number of alarms that are not acknowledged."""
+        found = self._conditions
+        return int(np.count_nonzero((found == alarms.UNACKNOWLEDGED) | (found == alarms.RETURNED)))
 
     def gaps(self) -> dict[str, Any]:
         """The 50 axes that lost most samples, and the sums of the fleet."""

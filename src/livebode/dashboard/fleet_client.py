@@ -80,12 +80,11 @@ class FleetClient(BrowserSocket):
         board, now_s = self._view.board, time.time()
         name = self._watched.list
         found: dict[str, Any] = {"trouble": self._view.feed.trouble, "layout": board.layout}
-        alarms = board.open_alarms(now_s)
-        found["open"] = alarms["open"]
+        found["open"] = board.open_count
         if name == "worst":
             found["worst"] = board.worst()
         elif name == "alarms":
-            found["alarms"] = alarms
+            found["alarms"] = board.open_alarms(now_s)
         elif name == "gaps":
             found["gaps"] = board.gaps()
         else:

@@ -30,7 +30,7 @@ import { below } from "./link.js";
 /** @typedef {{worker: string, partitions: number, axes: number, waiting: number, lag_s: number, age_s: number}} Worker */
 /** @typedef {{partition: number, axes: number, age_s: number | null}} Silent */
 /** @typedef {{rows: Worker[], count: number, partitions: number, silent: Silent[], silent_count: number, waiting: number, dropped: number}} Workers */
-/** @typedef {{rows: AxisRow[], count: number, open: number}} Alarms */
+/** @typedef {{rows: AxisRow[], count: number}} Alarms */
 /** @typedef {{rows: AxisRow[], axes: number, gaps: number, lost: number}} Gaps */
 /** @typedef {{name: string, role: string, layout: number, axes: number, plan: boolean, trends: string}} Fleet */
 /**
