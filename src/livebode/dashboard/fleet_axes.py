@@ -27,6 +27,7 @@ KINDS_MAX = 255
 NOWHERE = -1
 """Partition of an axis that its partition no longer has."""
 _DIGITS = re.compile(r"([0-9]{1,15})")
+_BYTES = np.dtype((np.void, AXIS_STATUS.itemsize))
 Array = np.ndarray[Any, Any]
 
 
@@ -149,12 +150,14 @@ class FleetAxes:
         for message, partition, bad in zip(messages, partitions, wrong):
             if not bad:
                 partition.heard_s, partition.waiting, partition.lag_s = now_s, message.waiting, message.lag_s
-        use = ~wrong[of]
-        axes, of = axes[use], of[use]
+        if wrong.any():
+            use = ~wrong[of]
+            axes, of = axes[use], of[use]
         starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
         rows = np.concatenate([partition.rows for partition in partitions])[starts[of] + axes["axis"]]
         axes["kind"] = np.stack([partition.kinds for partition in partitions])[of, axes["kind"]]
-        self._status[rows] = axes
+        # As bytes: NumPy would copy a record field by field.
+        self._status.view(_BYTES)[rows] = axes.view(_BYTES)
 
     def _name(self, names: PartitionNames) -> None:
         partition = self.partitions.setdefault(names.partition, Partition())
