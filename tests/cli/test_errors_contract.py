@@ -21,7 +21,7 @@ COMMANDS = {
     " ".join([name, *inner]): one
     for name, command in typer.main.get_command(app).commands.items()
     for inner, one in [([word], one) for word, one in getattr(command, "commands", {}).items()] or [([], command)]
-    if name != "view"
+    if "view" not in (name, *inner)  # a page has no result
 }
 LIVEBODE = str(Path(sys.executable).with_name("livebode"))
 
