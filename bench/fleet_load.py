@@ -1,9 +1,10 @@
-"""Thousands of drives that send spectra, on this computer: messages sent, stored and lost, lag, and cores of each process.
+"""Thousands of drives that send spectra, on this computer: messages sent, stored, lost, lag, cores of each process.
 
     python -m bench.fleet_load [--axes 2000] [--seconds 20] [--owners 2]
 
-Each axis sends a spectrum of 6 lines and three channels twice a second to a nats-server on loopback; owners in processes
-of their own track them. Cores are processor times over the time of sending.
+Each axis sends a spectrum of 6 lines and three channels twice a second to a nats-server on loopback; owners in
+processes of their own track them. Cores are processor times over the time of sending: as many are needed
+so that nothing waits.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def report(costs: PathCosts, owners: int, seconds: float) -> str:
             f"messages sent {costs.messages:,}, stored {costs.messages - costs.lost:,}, lost {costs.lost}",
             f"messages whose result is stored {len(costs.lags_s):,}; responses {costs.responses:,}",
             f"lag from spectrum to stored result: p50 {p50_s:.2f} s, p99 {p99_s:.2f} s",
-            *(f"{name:<14}{used:6.2f} cores" for name, used in cores.items()),
+            *(f"{name:<14}{used:6.2f} cores needed" for name, used in cores.items()),
             f"owners waited for a processor in {1 - 1 / costs.dilation:.0%} of the time in which they had work",
         ]
     )

@@ -7,7 +7,7 @@ Each kind of message in turn: samples in blocks of 500 and 100 ms (4 kHz, three 
 [motion], and spectra of a drive at 2/s. Costs are processor times, in milliseconds per second and axis, which other
 programs on the computer change little. The lag is from a message's newest sample until its result is stored. The last
 column is the share of time that an owner with work waited for a processor: above some per cent the lag is not the
-fleet's, but the computer's. States are counted without the first one of each axis.
+fleet's, but the computer's. The share of states follows from their size and from the rule when one is stored.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ import psutil
 from bench.fleet_generator import Generated, generate
 from bench.fleet_loads import MOTION, SAMPLES_100, SAMPLES_500, SPECTRA, AxisLoad
 from livebode.fleet.log import FleetLog
+from livebode.fleet.partition import STATE_S_MIN, STATE_SHARE
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
@@ -80,7 +81,6 @@ class PathCosts:
     dilation: float
     input_bytes: int
     result_bytes: int
-    state_bytes: int
     state_size: float
     lags_s: np.ndarray
     silence_s: float = 0.0
@@ -92,9 +92,20 @@ class PathCosts:
         return self.owner_s / self.axis_seconds
 
     @property
+    def state_share(self) -> float:
+        """Bytes of states per byte of data."""
+        bytes_per_s = self.input_bytes / self.axis_seconds
+        return self.state_size / state_every_s(self.state_size, bytes_per_s) / bytes_per_s
+
+    @property
     def axes_per_core(self) -> float:
         """At a load of 60 %."""
         return LOAD / self.core_share
+
+
+def state_every_s(size_bytes: float, bytes_per_s: float) -> float:
+    """From one state of an axis to the next, by the rule of the owner, for its data per second."""
+    return max(STATE_S_MIN, size_bytes / STATE_SHARE / bytes_per_s)
 
 
 def measured(
@@ -203,7 +214,6 @@ class _Path:
         results = await self._results(log)
         lags = await self._lags(log, sent, results)
         owners = np.sum(spent[:-1], axis=0)
-        size = states.size_bytes / max(1, len(states.subjects))
         silence_s, caught_up_s = _takeover(results, lags, killed_s) if killed_s else (0.0, 0.0)
         return PathCosts(
             load=self._load,
@@ -219,8 +229,7 @@ class _Path:
             dilation=float(1 + owners[1] / max(owners[0], 1e-9)),
             input_bytes=sent.data_bytes,
             result_bytes=sum(one.size_bytes for one in results),
-            state_bytes=round(size * max(0, states.last - len(states.subjects))),
-            state_size=size,
+            state_size=states.size_bytes / max(1, len(states.subjects)),
             lags_s=np.array([lag.stored_s - lag.due_s for lag in lags]),
             silence_s=silence_s,
             caught_up_s=caught_up_s,
@@ -313,30 +322,31 @@ def row(costs: PathCosts) -> str:
         f"| {costs.load.name} | {costs.core_share * 1e3:.2f} | {costs.server_s * part * 1e3:.2f} "
         f"| {costs.generator_s * part * 1e3:.2f} | {costs.axes_per_core:,.0f} "
         f"| {costs.input_bytes * part / 1e3:.1f} | {costs.result_bytes / max(1, costs.responses):.0f} "
-        f"| {costs.state_bytes / costs.input_bytes:.1%} | {costs.lost} | {quantiles[0]:.2f} | {quantiles[1]:.2f} "
+        f"| {costs.state_size / 1e3:.1f} | {costs.state_share:.1%} | {costs.lost} | {quantiles[0]:.2f} | {quantiles[1]:.2f} "
         f"| {1 - 1 / costs.dilation:.0%} |"
     )
 
 
 HEADING = (
     "| messages | owner, ms/s | server, ms/s | generator, ms/s | axes a core at 60 % | input, kB/s | B a response "
-    "| states / input | lost | lag p50, s | p99, s | waited |\n" + "|---" * 12 + "|"
+    "| state, kB | states / input | lost | lag p50, s | p99, s | waited |\n" + "|---" * 13 + "|"
 )
 
 
 def verdicts(found: dict[str, PathCosts]) -> Iterator[str]:
     """A sentence for each target."""
     blocks, fast, spectra = (found[load.name] for load in (SAMPLES_500, SAMPLES_100, SPECTRA))
-    yield f"axes a core, blocks of 500 ms: {blocks.axes_per_core:,.0f}, {verdict(blocks.axes_per_core, 500, most=False)}"
-    yield f"axes a core, spectra at 2/s: {spectra.axes_per_core:,.0f}, {verdict(spectra.axes_per_core, 3000, most=False)}"
+    for costs, target in ((blocks, 500), (spectra, 3000)):
+        count = costs.axes_per_core
+        yield f"axes a core at {LOAD:.0%}, {costs.load.name}: {count:,.0f}, {verdict(count, target, most=False)}"
     lag_s = float(np.quantile(fast.lags_s, 0.99))
     yield (
         f"p99 from sample to stored result, blocks of 100 ms: {lag_s:.2f} s at {fast.core_share * fast.axes:.0%} of a "
         f"core, {verdict(lag_s, 0.5, most=True)} (a quiet computer and --axes {fast.axes_per_core:.0f} are needed)"
     )
     for costs in (blocks, found[MOTION.name]):
-        share = costs.state_bytes / costs.input_bytes
-        yield f"bytes of states, {costs.load.name}: {share:.1%} of the input, {verdict(share * 100, 10, most=True)} (%)"
+        share = costs.state_share * 100
+        yield f"bytes of states, {costs.load.name}: {share:.1f} % of the input, {verdict(share, 10, most=True)}"
 
 
 def main() -> None:

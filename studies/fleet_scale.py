@@ -1,0 +1,257 @@
+"""A fleet of 100,000 axes on paper, from costs measured in the same run, and a simulation that checks the paper.
+
+    python -m studies.fleet_scale [--seconds 20] [--axes 200]
+
+It measures on the real path (nats-server, owners, generator) what an axis costs, and prints: the assumptions; bytes per
+second, cores, servers and storage by tier; lag and takeover as the simulation of a worker predicts them, compared with
+the measured ones at small scale, and predicted at 60 % of a core of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+
+from bench.fleet_loads import SAMPLES_500, SPECTRA
+from bench.fleet_path import LOAD, PathCosts, measured, state_every_s
+from studies.fleet_queue import WorkerCosts, arrivals, caught_up_s, stored_times
+
+DAY_S, YEAR_S = 86400.0, 365.25 * 86400.0
+_PARTITIONS, _OWNERS = 8, 2
+_SIMULATED_S = 120.0
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """What is not measured."""
+
+    axes: int = 100_000
+    axes_per_machine: int = 40
+    machines_per_site: int = 10
+    partitions: int = 1024
+    load: float = LOAD
+    cores_per_server: int = 32
+    copies: int = 3
+    full_rate_days: float = 7.0
+    minute_years: float = 2.0
+    alarms_per_axis_year: float = 2.0
+    alarm_bytes: float = 1000.0
+    raw_per_alarm_s: float = 120.0
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Name and value of each."""
+        return [
+            ("axes", f"{self.axes:,}"),
+            ("axes a machine, machines a site (one leaf node)", f"{self.axes_per_machine}, {self.machines_per_site}"),
+            ("partitions", f"{self.partitions:,}"),
+            ("load of a core", f"{self.load:.0%}"),
+            ("cores a computer", f"{self.cores_per_server}"),
+            ("copies of the log, and of its server's work", f"{self.copies}"),
+            ("data and responses at full rate", f"{self.full_rate_days:g} days"),
+            ("minute means", f"{self.minute_years:g} years"),
+            ("alarms an axis and year, of 1 kB", f"{self.alarms_per_axis_year:g}"),
+            ("raw data around an alarm", f"{self.raw_per_alarm_s:g} s"),
+        ]
+
+
+@dataclass(frozen=True)
+class AxisCosts:
+    """Of one axis: bytes and processor time per second, and sizes.
+
+    Attributes
+    ----------
+    owner_cores, server_cores
+        Processor time per second.
+    response_bytes, state_bytes
+        Of one stored response, and of one state.
+    """
+
+    messages_per_s: float
+    input_bytes_per_s: float
+    result_bytes_per_s: float
+    owner_cores: float
+    server_cores: float
+    response_bytes: float
+    state_bytes: float
+
+    @classmethod
+    def of(cls, costs: PathCosts) -> AxisCosts:
+        """From a measurement."""
+        seconds = costs.axis_seconds
+        return cls(
+            messages_per_s=costs.messages / seconds,
+            input_bytes_per_s=costs.input_bytes / seconds,
+            result_bytes_per_s=costs.result_bytes / seconds,
+            owner_cores=costs.owner_s / seconds,
+            server_cores=costs.server_s / seconds,
+            response_bytes=costs.result_bytes / max(1, costs.responses),
+            state_bytes=costs.state_size,
+        )
+
+    @property
+    def state_every_s(self) -> float:
+        """From one state to the next."""
+        return state_every_s(self.state_bytes, self.input_bytes_per_s)
+
+
+@dataclass(frozen=True)
+class FleetSize:
+    """The paper: what a fleet of the assumed size needs."""
+
+    axis: AxisCosts
+    given: Assumptions
+
+    @property
+    def sites(self) -> int:
+        return ceil(self.given.axes / self.given.axes_per_machine / self.given.machines_per_site)
+
+    @property
+    def site_bytes_per_s(self) -> float:
+        """From a site's leaf node."""
+        return self.axis.input_bytes_per_s * self.given.axes_per_machine * self.given.machines_per_site
+
+    @property
+    def owner_cores(self) -> float:
+        return self.given.axes * self.axis.owner_cores / self.given.load
+
+    @property
+    def server_cores(self) -> float:
+        """Of all copies."""
+        return self.given.copies * self.given.axes * self.axis.server_cores / self.given.load
+
+    @property
+    def computers(self) -> int:
+        return ceil(self.owner_cores / self.given.cores_per_server) + ceil(
+            self.server_cores / self.given.cores_per_server
+        )
+
+    @property
+    def streams(self) -> int:
+        """Streams among which the data are divided, if one server's core writes a stream."""
+        return max(1, ceil(self.given.axes * self.axis.server_cores / self.given.load))
+
+    def tiers_bytes(self) -> dict[str, float]:
+        """Storage by tier; what is retained permanently, for a year. The log's copies are counted."""
+        given, axis = self.given, self.axis
+        full_s = given.full_rate_days * DAY_S
+        alarms = given.axes * given.alarms_per_axis_year
+        return {
+            "log, full rate": given.axes * axis.input_bytes_per_s * full_s * given.copies,
+            "responses, full rate": given.axes * axis.result_bytes_per_s * full_s,
+            "states": given.axes * axis.state_bytes * given.copies,
+            "minute means": given.axes * axis.response_bytes * given.minute_years * YEAR_S / 60,
+            "hour means, a year": given.axes * axis.response_bytes * YEAR_S / 3600,
+            "alarms, a year": alarms * given.alarm_bytes,
+            "raw around alarms, a year": alarms * given.raw_per_alarm_s * axis.input_bytes_per_s,
+        }
+
+    def rows(self) -> list[tuple[str, str]]:
+        """The table of the paper."""
+        found = [
+            ("messages per second", f"{self.given.axes * self.axis.messages_per_s:,.0f}"),
+            ("data, MB/s", f"{self.given.axes * self.axis.input_bytes_per_s / 1e6:,.0f}"),
+            ("sites; from each, MB/s", f"{self.sites}; {self.site_bytes_per_s / 1e6:.2f}"),
+            ("cores of owners", f"{self.owner_cores:,.0f}"),
+            ("axes a core", f"{self.given.axes / self.owner_cores:,.0f}"),
+            ("axes a partition", f"{self.given.axes / self.given.partitions:.0f}"),
+            ("partitions a core", f"{self.given.partitions / self.owner_cores:.2f}"),
+            ("cores of the log, all copies", f"{self.server_cores:,.0f}"),
+            ("streams for the data", f"{self.streams}"),
+            ("computers", f"{self.computers}"),
+            ("a state every, s", f"{self.axis.state_every_s:.0f}"),
+        ]
+        return found + [(f"{name}, TB", f"{size / 1e12:,.3g}") for name, size in self.tiers_bytes().items()]
+
+
+def worker_costs(costs: PathCosts, partitions: int) -> WorkerCosts:
+    """Service times from a measurement: what a partition costs without data is that of its reads, ten a second."""
+    usual = WorkerCosts(0.0)
+    seconds = costs.axis_seconds / costs.axes
+    message_s = (costs.owner_s - costs.idle_s * partitions * seconds) / costs.messages
+    return replace(usual, message_s=max(message_s, 1e-6), batch_s=costs.idle_s * usual.read_s)
+
+
+def predicted_lags_s(
+    costs: WorkerCosts, *, axes: int, partitions: int, period_s: float, seconds: float, jitter_s: float = 0.0
+) -> np.ndarray:
+    """Of the messages of one worker, in the order of their arrival in each partition."""
+    times = arrivals(axes, partitions, period_s, seconds, jitter_s=jitter_s)
+    stored = stored_times(costs, times)
+    return np.concatenate([after - before for after, before in zip(stored, times)])
+
+
+def predicted_takeover_s(
+    costs: WorkerCosts, *, axes: int, partitions: int, period_s: float, silence_s: float, replayed_s: float
+) -> float:
+    """From the claim until the results of all that arrived before it are stored."""
+    claimed_s = silence_s + replayed_s
+    times = arrivals(axes, partitions, period_s, claimed_s)
+    return max(float(np.max(one, initial=claimed_s)) for one in stored_times(costs, times, claimed_s)) - claimed_s
+
+
+def _comparison(steady: PathCosts, taken: PathCosts, seconds: float) -> Iterator[str]:
+    """Measured and predicted, at small scale."""
+    axes, partitions = steady.axes // _OWNERS, _PARTITIONS // _OWNERS
+    about = {"axes": axes, "partitions": partitions, "period_s": SPECTRA.period_s}
+    costs = worker_costs(steady, _PARTITIONS)
+    lags_s = predicted_lags_s(costs.slower(steady.dilation), seconds=seconds, **about)
+    restored_s = AxisCosts.of(steady).state_every_s / 2
+    again_s = predicted_takeover_s(
+        costs.slower(taken.dilation), silence_s=taken.silence_s, replayed_s=min(restored_s, seconds / 4), **about
+    )
+    yield f"service time of a message {costs.message_s * 1e3:.2f} ms, of a read {costs.batch_s * 1e3:.2f} ms"
+    yield f"time that an owner with work waited for a processor: {1 - 1 / steady.dilation:.0%}"
+    yield "| | measured | simulated |\n|---|---|---|"
+    for name, share in (("p50", 0.5), ("p99", 0.99)):
+        yield f"| lag {name}, s | {np.quantile(steady.lags_s, share):.2f} | {np.quantile(lags_s, share):.2f} |"
+    yield f"| takeover: claimed after, s | {taken.silence_s:.2f} | (given) |"
+    yield f"| takeover: caught up after the claim, s | {taken.caught_up_s:.2f} | {again_s:.2f} |"
+
+
+def _at_load(costs: PathCosts) -> str:
+    """Simulated lag and takeover of a worker whose core has 60 % to do and no other program."""
+    worker = worker_costs(costs, _PARTITIONS)
+    axes = round(LOAD / worker.message_s * costs.load.period_s)
+    partitions = max(1, round(axes * 1024 / 100_000))
+    lags_s = predicted_lags_s(
+        worker, axes=axes, partitions=partitions, period_s=costs.load.period_s, seconds=_SIMULATED_S, jitter_s=0.05
+    )
+    waiting_s = 5.0 + AxisCosts.of(costs).state_every_s / 2
+    again_s = caught_up_s(worker.message_s, axes / costs.load.period_s, waiting_s)
+    return (
+        f"| {costs.load.name} | {axes:,} | {partitions} | {np.quantile(lags_s[len(lags_s) // 10 :], 0.99):.2f} "
+        f"| {waiting_s:.0f} | {again_s:.0f} |"
+    )
+
+
+def main() -> None:
+    """Measure, and print the tables."""
+    parser = argparse.ArgumentParser(prog="python -m studies.fleet_scale", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--axes", type=int, default=200, help="of spectra; a quarter as many of samples")
+    asked = parser.parse_args()
+    size = {"owners": _OWNERS, "partitions": _PARTITIONS}
+    spectra = measured(SPECTRA, asked.axes, asked.seconds, **size)
+    samples = measured(SAMPLES_500, asked.axes // 4, asked.seconds, **size)
+    taken = measured(SPECTRA, asked.axes, asked.seconds, takeover=True, **size)
+    given = Assumptions()
+    print("| assumption | value |\n|---|---|")
+    print(*(f"| {name} | {value} |" for name, value in given.rows()), sep="\n")
+    print(f"\n| {given.axes:,} axes | {spectra.load.name} | {samples.load.name} |\n|---|---|---|")
+    both = zip(FleetSize(AxisCosts.of(spectra), given).rows(), FleetSize(AxisCosts.of(samples), given).rows())
+    print(*(f"| {name} | {first} | {second} |" for (name, first), (_, second) in both), sep="\n")
+    print(f"\n{asked.axes} axes of spectra on {_OWNERS} owners and this computer:")
+    print(*_comparison(spectra, taken, asked.seconds), sep="\n")
+    print(f"\nsimulated: a worker with a core of its own, {LOAD:.0%} of it used, a takeover 5 s after a kill")
+    print(
+        "| messages | axes | partitions | lag p99, s | to compute again, s | caught up after, s |\n" + "|---" * 6 + "|"
+    )
+    print(_at_load(spectra), _at_load(samples), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
