@@ -317,12 +317,12 @@ def verdict(value: float, target: float, *, most: bool) -> str:
 def row(costs: PathCosts) -> str:
     """A line of the table, as Markdown."""
     part = 1 / costs.axis_seconds
-    quantiles = np.quantile(costs.lags_s, (0.5, 0.99)) if len(costs.lags_s) else (np.nan, np.nan)
+    p50_s, p99_s = np.quantile(costs.lags_s, (0.5, 0.99)) if len(costs.lags_s) else (np.nan, np.nan)
     return (
         f"| {costs.load.name} | {costs.core_share * 1e3:.2f} | {costs.server_s * part * 1e3:.2f} "
         f"| {costs.generator_s * part * 1e3:.2f} | {costs.axes_per_core:,.0f} "
         f"| {costs.input_bytes * part / 1e3:.1f} | {costs.result_bytes / max(1, costs.responses):.0f} "
-        f"| {costs.state_size / 1e3:.1f} | {costs.state_share:.1%} | {costs.lost} | {quantiles[0]:.2f} | {quantiles[1]:.2f} "
+        f"| {costs.state_size / 1e3:.1f} | {costs.state_share:.1%} | {costs.lost} | {p50_s:.2f} | {p99_s:.2f} "
         f"| {1 - 1 / costs.dilation:.0%} |"
     )
 
