@@ -67,7 +67,7 @@ def test_what_a_source_sends_is_tracked_checked_listed_and_replayed(
 
     checked = livebode("fleet", "check", fleet)
     assert checked.out == (
-        f"{2 * BATCHES} responses of 1 axes: 0 missing, 0 doubled, 0 different from one uninterrupted computation\n"
+        f"{2 * BATCHES} responses (axes: 1): 0 missing, 0 doubled, 0 different from one uninterrupted computation\n"
     )
     found = json.loads(livebode("fleet", "check", fleet, "--json").out)
     assert found["axes"]["Graz/x"]["responses"] == 2 * BATCHES

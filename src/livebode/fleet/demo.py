@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.configuration.axis import Axis
+from livebode.core import counted
 from livebode.fleet.check import CheckResult, check_results
 from livebode.fleet.coordinator import FleetCoordinator
 from livebode.fleet.log import FleetLog
@@ -75,7 +76,7 @@ def _kill(settings: FleetSettings, axes: dict[str, Axis], say: Callable[[str], N
     owners = _owners(settings, axes)
     victim = max(owners, key=owners.__getitem__)
     os.kill(int(victim.rpartition(":")[2]), signal.SIGKILL)
-    say(f"kill -9 of worker {victim}, the owner of {owners[victim]} partitions")
+    say(f"kill -9 of worker {victim}, the owner of {counted(owners[victim], 'partition')}")
     return time.time()
 
 

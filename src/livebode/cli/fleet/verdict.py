@@ -11,7 +11,7 @@ def verdict(result: CheckResult) -> str:
     total = result.total
     other = f", {total.other_recipe} with another configuration were not compared" if total.other_recipe else ""
     return (
-        f"{total.responses:,} responses of {len(result.axes)} axes: {total.missing} missing, {total.doubled} doubled, "
+        f"{total.responses:,} responses (axes: {len(result.axes)}): {total.missing} missing, {total.doubled} doubled, "
         f"{total.different + total.unexpected} different from one uninterrupted computation{other}"
     )
 
