@@ -43,7 +43,8 @@ LOAD = 0.6
 """Of a core, for which axes are counted."""
 AXES = {SAMPLES_500: 150, SAMPLES_100: 40, MOTION: 10, SPECTRA: 400}
 """Enough that what a partition costs without data is a small part."""
-_IDLE_S, _STEP_S, _REPORTED_S = 2.0, 0.25, 1.2
+_IDLE_S, _STEP_S, _REPORTED_S, _WARM_S = 2.0, 0.25, 1.2, 3.0
+_TRACE = [("partition", "i8"), ("due_s", "f8"), ("arrived_s", "f8"), ("stored_s", "f8")]
 _CONTEXT = multiprocessing.get_context("spawn")
 T = TypeVar("T")
 
@@ -62,10 +63,11 @@ class PathCosts:
         Processor time of an owner per second and partition without data.
     dilation
         Time that the owner computed or waited for a processor, over the time that it computed.
-    lags_s
-        For each message, from its newest sample until its result is stored.
-    silence_s, caught_up_s
-        After a takeover: until the partition is claimed again, and from then until its lag is normal.
+    trace
+        Of each message whose result is stored, in the order of the log: partition; when its newest sample was sampled,
+        when the log received it, when its result was stored, seconds since 1970.
+    began_s, killed_s, claimed_s
+        When sending began; with a takeover, when an owner was killed, and when all its partitions were claimed again.
     """
 
     load: AxisLoad
@@ -82,14 +84,21 @@ class PathCosts:
     input_bytes: int
     result_bytes: int
     state_size: float
-    lags_s: np.ndarray
-    silence_s: float = 0.0
-    caught_up_s: float = 0.0
+    trace: np.ndarray
+    began_s: float
+    killed_s: float = 0.0
+    claimed_s: float = 0.0
 
     @property
     def core_share(self) -> float:
         """Of a core that an axis takes from its owner."""
         return self.owner_s / self.axis_seconds
+
+    @property
+    def lags_s(self) -> np.ndarray:
+        """From a message's newest sample until its result was stored, without those of the start."""
+        found: np.ndarray = self.trace["stored_s"] - self.trace["due_s"]
+        return found[self.trace["due_s"] > self.began_s + _WARM_S]
 
     @property
     def state_share(self) -> float:
@@ -130,15 +139,18 @@ class _Path:
         self._asked(lambda log: log.create_streams())
         server = next(one for one in psutil.Process().children() if one.name() == "nats-server")
         with self._owners(owners) as processes, self._generator(seconds) as (go, answers):
-            self._wait(lambda: self._claims() >= self._partitions)
+            self._wait(processes, lambda: self._claims() >= self._partitions)
             assert answers.get(timeout=600) == "ready"
             idle_s = self._idle_s(processes)
             before = [_used(one.pid) for one in (*processes, server)]
             go.set()
-            killed_s = self._take_over(processes, seconds) if takeover else 0.0
+            killed_s = 0.0
+            if takeover:
+                killed_s = self._take_over(processes, seconds)
+                before[0] = np.zeros(2)
             sent: Generated = answers.get(timeout=10 * seconds + 600)
             ended_s = time.time()
-            self._wait(lambda: self._current(ended_s))
+            self._wait(processes, lambda: self._current(ended_s))
             after = [_used(one.pid) for one in (*processes, server)]
             spent = [now - then for now, then in zip(after, before)]
             return self._asked(lambda log: self._costs(log, sent, spent, idle_s, killed_s))
@@ -190,8 +202,10 @@ class _Path:
 
         return asyncio.run(ask())
 
-    def _wait(self, done: Callable[[], bool]) -> None:
+    def _wait(self, processes: list[Any], done: Callable[[], bool]) -> None:
         while not done():
+            if not all(one.is_alive() for one in processes):
+                raise RuntimeError("an owner has ended; its messages are above")
             time.sleep(_STEP_S)
 
     def _claims(self) -> int:
@@ -212,9 +226,8 @@ class _Path:
     ) -> PathCosts:
         extent, states = await log.extent(LOG_STREAM), await log.extent(STATE_STREAM, ">")
         results = await self._results(log)
-        lags = await self._lags(log, sent, results)
         owners = np.sum(spent[:-1], axis=0)
-        silence_s, caught_up_s = _takeover(results, lags, killed_s) if killed_s else (0.0, 0.0)
+        claims_s = [one.stored_s for one in results if one.claim and one.stored_s > killed_s]
         return PathCosts(
             load=self._load,
             axes=self._count,
@@ -230,9 +243,10 @@ class _Path:
             input_bytes=sent.data_bytes,
             result_bytes=sum(one.size_bytes for one in results),
             state_size=states.size_bytes / max(1, len(states.subjects)),
-            lags_s=np.array([lag.stored_s - lag.due_s for lag in lags]),
-            silence_s=silence_s,
-            caught_up_s=caught_up_s,
+            trace=await self._trace(log, sent, results),
+            began_s=sent.began_s,
+            killed_s=killed_s,
+            claimed_s=max(claims_s) if killed_s else 0.0,
         )
 
     async def _results(self, log: FleetLog) -> list[_Result]:
@@ -245,8 +259,7 @@ class _Path:
             found.append(_Result(partition, one.through, message.stored_s, one.claim, responses, size))
         return found
 
-    async def _lags(self, log: FleetLog, sent: Generated, results: list[_Result]) -> list[_Lag]:
-        """Of the messages whose results are stored, in the order of the log."""
+    async def _trace(self, log: FleetLog, sent: Generated, results: list[_Result]) -> np.ndarray:
         found, last = [], (await log.extent(LOG_STREAM)).last
         through = {number: [one for one in results if one.partition == number] for number in range(self._partitions)}
         numbers = {number: [one.through for one in rows] for number, rows in through.items()}
@@ -257,8 +270,8 @@ class _Path:
                 axis = self._keys[key_of(message.subject)]
                 header = read_header(message.data[read_header(message.data).length :])
                 due_s = sent.due_s(axis, header.sample // self._load.samples)
-                found.append(_Lag(partition, due_s, through[partition][at].stored_s))
-        return found
+                found.append((partition, due_s, message.stored_s, through[partition][at].stored_s))
+        return np.array(found, _TRACE)
 
 
 @dataclass(frozen=True)
@@ -271,30 +284,6 @@ class _Result:
     claim: bool
     responses: int
     size_bytes: int
-
-
-@dataclass(frozen=True)
-class _Lag:
-    """When a message was due, and when its result was stored."""
-
-    partition: int
-    due_s: float
-    stored_s: float
-
-
-def _takeover(results: list[_Result], lags: list[_Lag], killed_s: float) -> tuple[float, float]:
-    """From the kill to the last claim, and from there to the last result that is later than usual before the kill."""
-    claims = [one for one in results if one.claim and one.stored_s > killed_s]
-    claimed_s = max(one.stored_s for one in claims)
-    taken = {one.partition for one in claims}
-    usual_s = np.quantile([lag.stored_s - lag.due_s for lag in lags if lag.stored_s < killed_s], 0.99)
-    late = [
-        lag.stored_s
-        for lag in lags
-        if lag.partition in taken and lag.stored_s > killed_s and lag.stored_s - lag.due_s > usual_s
-        and lag.due_s < claimed_s
-    ]  # fmt: skip
-    return claimed_s - killed_s, max([0.0, *(stored_s - claimed_s for stored_s in late)])
 
 
 def _used(pid: int | None) -> np.ndarray:

@@ -21,7 +21,8 @@ from bench.fleet_path import LOAD, PathCosts, measured, state_every_s
 from studies.fleet_queue import WorkerCosts, arrivals, caught_up_s, stored_times
 
 DAY_S, YEAR_S = 86400.0, 365.25 * 86400.0
-_PARTITIONS, _OWNERS = 8, 2
+PARTITIONS, _OWNERS = 2, 2
+"""Of the measurement: with 200 axes, as many axes a partition as 100,000 in 1,024."""
 _SIMULATED_S = 120.0
 
 
@@ -65,9 +66,11 @@ class AxisCosts:
     Attributes
     ----------
     owner_cores, server_cores
-        Processor time per second.
+        Processor time per second; what a partition costs without data is not included.
     response_bytes, state_bytes
         Of one stored response, and of one state.
+    partition_cores
+        Of a partition without data.
     """
 
     messages_per_s: float
@@ -77,19 +80,22 @@ class AxisCosts:
     server_cores: float
     response_bytes: float
     state_bytes: float
+    partition_cores: float = 0.0
 
     @classmethod
     def of(cls, costs: PathCosts) -> AxisCosts:
         """From a measurement."""
         seconds = costs.axis_seconds
+        message_s = worker_costs(costs, PARTITIONS).message_s
         return cls(
             messages_per_s=costs.messages / seconds,
             input_bytes_per_s=costs.input_bytes / seconds,
             result_bytes_per_s=costs.result_bytes / seconds,
-            owner_cores=costs.owner_s / seconds,
+            owner_cores=message_s * costs.messages / seconds,
             server_cores=costs.server_s / seconds,
             response_bytes=costs.result_bytes / max(1, costs.responses),
             state_bytes=costs.state_size,
+            partition_cores=costs.idle_s,
         )
 
     @property
@@ -116,7 +122,8 @@ class FleetSize:
 
     @property
     def owner_cores(self) -> float:
-        return self.given.axes * self.axis.owner_cores / self.given.load
+        used = self.given.axes * self.axis.owner_cores + self.given.partitions * self.axis.partition_cores
+        return used / self.given.load
 
     @property
     def server_cores(self) -> float:
@@ -184,37 +191,52 @@ def predicted_lags_s(
     return np.concatenate([after - before for after, before in zip(stored, times)])
 
 
-def predicted_takeover_s(
-    costs: WorkerCosts, *, axes: int, partitions: int, period_s: float, silence_s: float, replayed_s: float
-) -> float:
-    """From the claim until the results of all that arrived before it are stored."""
-    claimed_s = silence_s + replayed_s
-    times = arrivals(axes, partitions, period_s, claimed_s)
-    return max(float(np.max(one, initial=claimed_s)) for one in stored_times(costs, times, claimed_s)) - claimed_s
+def simulated_trace(costs: PathCosts) -> np.ndarray:
+    """When the simulated owners would have stored the results of the messages as the log received them.
+
+    With a takeover only the messages of the owner that was killed, from the state that the next one restored.
+    """
+    worker = worker_costs(costs, PARTITIONS).slower(costs.dilation)
+    trace, open_s = costs.trace, 0.0
+    if costs.killed_s:
+        open_s = costs.claimed_s
+        state_s = costs.killed_s - AxisCosts.of(costs).state_every_s
+        trace = trace[(trace["partition"] % _OWNERS == 0) & (trace["arrived_s"] > state_s)]
+    found = []
+    for owner in range(_OWNERS):
+        parts = [trace[trace["partition"] == number] for number in range(owner, PARTITIONS, _OWNERS)]
+        for part, stored_s in zip(parts, stored_times(worker, [part["arrived_s"] for part in parts], open_s)):
+            found.append(part.copy())
+            found[-1]["stored_s"] = stored_s
+    return np.concatenate(found)
 
 
-def _comparison(steady: PathCosts, taken: PathCosts, seconds: float) -> Iterator[str]:
-    """Measured and predicted, at small scale."""
-    axes, partitions = steady.axes // _OWNERS, _PARTITIONS // _OWNERS
-    about = {"axes": axes, "partitions": partitions, "period_s": SPECTRA.period_s}
-    costs = worker_costs(steady, _PARTITIONS)
-    lags_s = predicted_lags_s(costs.slower(steady.dilation), seconds=seconds, **about)
-    restored_s = AxisCosts.of(steady).state_every_s / 2
-    again_s = predicted_takeover_s(
-        costs.slower(taken.dilation), silence_s=taken.silence_s, replayed_s=min(restored_s, seconds / 4), **about
-    )
-    yield f"service time of a message {costs.message_s * 1e3:.2f} ms, of a read {costs.batch_s * 1e3:.2f} ms"
+def caught_up_after_s(costs: PathCosts) -> float:
+    """From the claim after a takeover until the results of what had arrived by then were stored."""
+    trace = costs.trace[costs.trace["partition"] % _OWNERS == 0]
+    return float(np.max(trace["stored_s"][trace["arrived_s"] < costs.claimed_s])) - costs.claimed_s
+
+
+def _comparison(steady: PathCosts, taken: PathCosts) -> Iterator[str]:
+    """Measured and simulated, at small scale."""
+    worker = worker_costs(steady, PARTITIONS)
+    # A killed process cannot report what it has used.
+    taken = replace(taken, owner_s=steady.owner_s, idle_s=steady.idle_s)
+    found, again = (replace(one, trace=simulated_trace(one)) for one in (steady, taken))
+    yield f"service time of a message {worker.message_s * 1e3:.2f} ms, of a read {worker.batch_s * 1e3:.2f} ms"
     yield f"time that an owner with work waited for a processor: {1 - 1 / steady.dilation:.0%}"
     yield "| | measured | simulated |\n|---|---|---|"
     for name, share in (("p50", 0.5), ("p99", 0.99)):
-        yield f"| lag {name}, s | {np.quantile(steady.lags_s, share):.2f} | {np.quantile(lags_s, share):.2f} |"
-    yield f"| takeover: claimed after, s | {taken.silence_s:.2f} | (given) |"
-    yield f"| takeover: caught up after the claim, s | {taken.caught_up_s:.2f} | {again_s:.2f} |"
+        yield f"| lag {name}, s | {np.quantile(steady.lags_s, share):.2f} | {np.quantile(found.lags_s, share):.2f} |"
+    yield f"| takeover: claimed after, s | {taken.claimed_s - taken.killed_s:.2f} | (given) |"
+    yield (
+        f"| takeover: caught up after the claim, s | {caught_up_after_s(taken):.2f} | {caught_up_after_s(again):.2f} |"
+    )
 
 
 def _at_load(costs: PathCosts) -> str:
     """Simulated lag and takeover of a worker whose core has 60 % to do and no other program."""
-    worker = worker_costs(costs, _PARTITIONS)
+    worker = worker_costs(costs, PARTITIONS)
     axes = round(LOAD / worker.message_s * costs.load.period_s)
     partitions = max(1, round(axes * 1024 / 100_000))
     lags_s = predicted_lags_s(
@@ -232,11 +254,11 @@ def main() -> None:
     """Measure, and print the tables."""
     parser = argparse.ArgumentParser(prog="python -m studies.fleet_scale", description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--axes", type=int, default=200, help="of spectra; a quarter as many of samples")
+    parser.add_argument("--axes", type=int, default=200, help="of spectra; half as many of samples")
     asked = parser.parse_args()
-    size = {"owners": _OWNERS, "partitions": _PARTITIONS}
+    size = {"owners": _OWNERS, "partitions": PARTITIONS}
     spectra = measured(SPECTRA, asked.axes, asked.seconds, **size)
-    samples = measured(SAMPLES_500, asked.axes // 4, asked.seconds, **size)
+    samples = measured(SAMPLES_500, asked.axes // 2, asked.seconds, **size)
     taken = measured(SPECTRA, asked.axes, asked.seconds, takeover=True, **size)
     given = Assumptions()
     print("| assumption | value |\n|---|---|")
@@ -245,7 +267,7 @@ def main() -> None:
     both = zip(FleetSize(AxisCosts.of(spectra), given).rows(), FleetSize(AxisCosts.of(samples), given).rows())
     print(*(f"| {name} | {first} | {second} |" for (name, first), (_, second) in both), sep="\n")
     print(f"\n{asked.axes} axes of spectra on {_OWNERS} owners and this computer:")
-    print(*_comparison(spectra, taken, asked.seconds), sep="\n")
+    print(*_comparison(spectra, taken), sep="\n")
     print(f"\nsimulated: a worker with a core of its own, {LOAD:.0%} of it used, a takeover 5 s after a kill")
     print(
         "| messages | axes | partitions | lag p99, s | to compute again, s | caught up after, s |\n" + "|---" * 6 + "|"
