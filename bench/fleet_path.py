@@ -57,6 +57,8 @@ class PathCosts:
     ----------
     axis_seconds
         Axes times seconds of machine time.
+    stores
+        Times that an owner stored results.
     owner_s, server_s, generator_s
         Processor time.
     idle_s
@@ -76,6 +78,7 @@ class PathCosts:
     messages: int
     lost: int
     responses: int
+    stores: int
     owner_s: float
     server_s: float
     generator_s: float
@@ -235,6 +238,7 @@ class _Path:
             messages=sent.messages,
             lost=sent.messages - extent.last,
             responses=sum(one.responses for one in results),
+            stores=sum(not one.claim for one in results),
             owner_s=float(owners[0]),
             server_s=float(spent[-1][0]),
             generator_s=sent.spent_s,

@@ -24,20 +24,24 @@ class WorkerCosts:
     Attributes
     ----------
     message_s
-        Of a message, with its share of results and states.
+        Of tracking a message.
     batch_s
         Of a read, whatever it returns.
+    store_s
+        Of storing results, with states and all else that is not done for each message.
     """
 
     message_s: float
     batch_s: float = 0.0
+    store_s: float = 0.0
     batch: int = 64
     read_s: float = 0.1
     results_s: float = 0.5
 
     def slower(self, factor: float) -> WorkerCosts:
         """The same on a core that other programs use too."""
-        return WorkerCosts(self.message_s * factor, self.batch_s * factor, self.batch, self.read_s, self.results_s)
+        times_s = (self.message_s * factor, self.batch_s * factor, self.store_s * factor)
+        return WorkerCosts(*times_s, self.batch, self.read_s, self.results_s)
 
 
 class _Partition:
@@ -75,7 +79,8 @@ def stored_times(costs: WorkerCosts, partitions: Sequence[Floats], open_s: float
         count = min(costs.batch, arrived - part.next)
         free_s = max(free_s, returned_s) + costs.batch_s + count * costs.message_s
         part.next += count
-        if free_s >= part.due_s:
+        if free_s >= part.due_s and part.kept < part.next:
+            free_s += costs.store_s
             part.stored[part.kept : part.next] = free_s
             part.kept, part.due_s = part.next, free_s + costs.results_s
         if part.kept < len(part.arrivals):

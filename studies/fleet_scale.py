@@ -10,20 +10,25 @@ the measured ones at small scale, and predicted at 60 % of a core of its own.
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
 
-from bench.fleet_loads import SAMPLES_500, SPECTRA
+from bench.fleet_loads import SAMPLES_500, SPECTRA, AxisLoad
 from bench.fleet_path import LOAD, PathCosts, measured, state_every_s
+from livebode.fleet.axis_stream import AxisStream
 from studies.fleet_queue import WorkerCosts, arrivals, caught_up_s, stored_times
 
 DAY_S, YEAR_S = 86400.0, 365.25 * 86400.0
 PARTITIONS, _OWNERS = 2, 2
 """Of the measurement: with 200 axes, as many axes a partition as 100,000 in 1,024."""
-_SIMULATED_S = 120.0
+_SIMULATED_S, _JITTER_S = 120.0, 0.05
+_SILENCE_S = 5.0
+"""From a kill to the claim, as a fleet's coordinator needs."""
+_TRACKED = 10
 
 
 @dataclass(frozen=True)
@@ -86,12 +91,12 @@ class AxisCosts:
     def of(cls, costs: PathCosts) -> AxisCosts:
         """From a measurement."""
         seconds = costs.axis_seconds
-        message_s = worker_costs(costs, PARTITIONS).message_s
+        idle_s = costs.idle_s * PARTITIONS * seconds / costs.axes
         return cls(
             messages_per_s=costs.messages / seconds,
             input_bytes_per_s=costs.input_bytes / seconds,
             result_bytes_per_s=costs.result_bytes / seconds,
-            owner_cores=message_s * costs.messages / seconds,
+            owner_cores=(costs.owner_s - idle_s) / seconds,
             server_cores=costs.server_s / seconds,
             response_bytes=costs.result_bytes / max(1, costs.responses),
             state_bytes=costs.state_size,
@@ -171,15 +176,34 @@ class FleetSize:
             ("computers", f"{self.computers}"),
             ("a state every, s", f"{self.axis.state_every_s:.0f}"),
         ]
-        return found + [(f"{name}, TB", f"{size / 1e12:,.3g}") for name, size in self.tiers_bytes().items()]
+        return found + [(f"{name}, TB", _amount(size / 1e12)) for name, size in self.tiers_bytes().items()]
 
 
-def worker_costs(costs: PathCosts, partitions: int) -> WorkerCosts:
-    """Service times from a measurement: what a partition costs without data is that of its reads, ten a second."""
-    usual = WorkerCosts(0.0)
+def _amount(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def tracking_s(load: AxisLoad, axes: int) -> float:
+    """Processor time of tracking a message, in this process."""
+    streams = {number: AxisStream(axis, 1) for number, axis in enumerate(load.axes(axes).values())}
+    messages = [[load.message(axis, number) for axis in streams] for number in range(2 * _TRACKED)]
+    for number, row in enumerate(messages):
+        if number == _TRACKED:  # the first ones create trackers
+            began_s = time.process_time()
+        for stream, message in zip(streams.values(), row):
+            stream.process(message, number + 1, 0.0)
+    return (time.process_time() - began_s) / (_TRACKED * axes)
+
+
+def worker_costs(costs: PathCosts, message_s: float) -> WorkerCosts:
+    """Service times from a measurement: what a partition costs without data is that of its reads, ten a second.
+
+    What is neither reading nor tracking is that of storing.
+    """
+    usual = WorkerCosts(message_s)
     seconds = costs.axis_seconds / costs.axes
-    message_s = (costs.owner_s - costs.idle_s * partitions * seconds) / costs.messages
-    return replace(usual, message_s=max(message_s, 1e-6), batch_s=costs.idle_s * usual.read_s)
+    rest_s = costs.owner_s - costs.idle_s * PARTITIONS * seconds - costs.messages * message_s
+    return replace(usual, batch_s=costs.idle_s * usual.read_s, store_s=max(0.0, rest_s) / costs.stores)
 
 
 def predicted_lags_s(
@@ -191,13 +215,13 @@ def predicted_lags_s(
     return np.concatenate([after - before for after, before in zip(stored, times)])
 
 
-def simulated_trace(costs: PathCosts) -> np.ndarray:
+def simulated_trace(costs: PathCosts, worker: WorkerCosts) -> np.ndarray:
     """When the simulated owners would have stored the results of the messages as the log received them.
 
     With a takeover only the messages of the owner that was killed, from the state that the next one restored.
     """
-    worker = worker_costs(costs, PARTITIONS).slower(costs.dilation)
-    trace, open_s = costs.trace, 0.0
+    worker = worker.slower(costs.dilation)
+    trace, open_s = costs.trace, float(np.min(costs.trace["arrived_s"]))
     if costs.killed_s:
         open_s = costs.claimed_s
         state_s = costs.killed_s - AxisCosts.of(costs).state_every_s
@@ -217,14 +241,15 @@ def caught_up_after_s(costs: PathCosts) -> float:
     return float(np.max(trace["stored_s"][trace["arrived_s"] < costs.claimed_s])) - costs.claimed_s
 
 
-def _comparison(steady: PathCosts, taken: PathCosts) -> Iterator[str]:
-    """Measured and simulated, at small scale."""
-    worker = worker_costs(steady, PARTITIONS)
-    # A killed process cannot report what it has used.
-    taken = replace(taken, owner_s=steady.owner_s, idle_s=steady.idle_s)
-    found, again = (replace(one, trace=simulated_trace(one)) for one in (steady, taken))
-    yield f"service time of a message {worker.message_s * 1e3:.2f} ms, of a read {worker.batch_s * 1e3:.2f} ms"
-    yield f"time that an owner with work waited for a processor: {1 - 1 / steady.dilation:.0%}"
+def _comparison(steady: PathCosts, taken: PathCosts, worker: WorkerCosts) -> Iterator[str]:
+    """Measured and simulated, at small scale; the service times are those without a takeover."""
+    found, again = (replace(one, trace=simulated_trace(one, worker)) for one in (steady, taken))
+    yield (
+        f"service times: {worker.message_s * 1e3:.2f} ms to track a message, {worker.batch_s * 1e3:.2f} ms for a read, "
+        f"{worker.store_s * 1e3:.1f} ms to store results"
+    )
+    for name, one in (("without", steady), ("with", taken)):
+        yield f"share of time that an owner with work waited for a processor, {name} takeover: {1 - 1 / one.dilation:.0%}"
     yield "| | measured | simulated |\n|---|---|---|"
     for name, share in (("p50", 0.5), ("p99", 0.99)):
         yield f"| lag {name}, s | {np.quantile(steady.lags_s, share):.2f} | {np.quantile(found.lags_s, share):.2f} |"
@@ -234,18 +259,17 @@ def _comparison(steady: PathCosts, taken: PathCosts) -> Iterator[str]:
     )
 
 
-def _at_load(costs: PathCosts) -> str:
-    """Simulated lag and takeover of a worker whose core has 60 % to do and no other program."""
-    worker = worker_costs(costs, PARTITIONS)
-    axes = round(LOAD / worker.message_s * costs.load.period_s)
-    partitions = max(1, round(axes * 1024 / 100_000))
-    lags_s = predicted_lags_s(
-        worker, axes=axes, partitions=partitions, period_s=costs.load.period_s, seconds=_SIMULATED_S, jitter_s=0.05
-    )
-    waiting_s = 5.0 + AxisCosts.of(costs).state_every_s / 2
-    again_s = caught_up_s(worker.message_s, axes / costs.load.period_s, waiting_s)
+def _at_load(costs: PathCosts, worker: WorkerCosts) -> str:
+    """Simulated lag and takeover of a worker with a core of its own, of which it uses about 60 %."""
+    own = costs.owner_s / (costs.axis_seconds / costs.axes) / PARTITIONS
+    partitions = max(1, round(LOAD / own))
+    axes = partitions * costs.axes // PARTITIONS
+    about = {"axes": axes, "partitions": partitions, "period_s": costs.load.period_s}
+    lags_s = predicted_lags_s(worker, seconds=_SIMULATED_S, jitter_s=_JITTER_S, **about)
+    waiting_s = _SILENCE_S + AxisCosts.of(costs).state_every_s / 2
+    again_s = caught_up_s(own * partitions * costs.load.period_s / axes, axes / costs.load.period_s, waiting_s)
     return (
-        f"| {costs.load.name} | {axes:,} | {partitions} | {np.quantile(lags_s[len(lags_s) // 10 :], 0.99):.2f} "
+        f"| {costs.load.name} | {axes:,} | {partitions} | {own * partitions:.0%} | {np.quantile(lags_s, 0.99):.2f} "
         f"| {waiting_s:.0f} | {again_s:.0f} |"
     )
 
@@ -267,12 +291,12 @@ def main() -> None:
     both = zip(FleetSize(AxisCosts.of(spectra), given).rows(), FleetSize(AxisCosts.of(samples), given).rows())
     print(*(f"| {name} | {first} | {second} |" for (name, first), (_, second) in both), sep="\n")
     print(f"\n{asked.axes} axes of spectra on {_OWNERS} owners and this computer:")
-    print(*_comparison(spectra, taken), sep="\n")
-    print(f"\nsimulated: a worker with a core of its own, {LOAD:.0%} of it used, a takeover 5 s after a kill")
-    print(
-        "| messages | axes | partitions | lag p99, s | to compute again, s | caught up after, s |\n" + "|---" * 6 + "|"
-    )
-    print(_at_load(spectra), _at_load(samples), sep="\n")
+    workers = {one.load: worker_costs(one, tracking_s(one.load, one.axes)) for one in (spectra, samples)}
+    print(*_comparison(spectra, taken, workers[SPECTRA]), sep="\n")
+    print(f"\nsimulated: a worker with a core of its own, and a takeover {_SILENCE_S:g} s after a kill")
+    print("| messages | axes | partitions | load | lag p99, s | to compute again, s | caught up after, s |")
+    print("|---" * 7 + "|")
+    print(*(_at_load(one, workers[one.load]) for one in (spectra, samples)), sep="\n")
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ def test_results_of_an_idle_worker_are_stored_after_half_a_period_on_average() -
 def test_every_message_is_stored_after_it_arrived_and_in_order() -> None:
     times = arrivals(40, 4, 0.5, 20.0, jitter_s=0.3, seed=2)
     assert sum(map(len, times)) == 40 * 40
-    for one, stored in zip(times, stored_times(WorkerCosts(0.005, 0.002), times)):
+    for one, stored in zip(times, stored_times(WorkerCosts(0.005, 0.002, 0.01), times)):
         assert np.all(stored > one)
         assert np.all(np.diff(stored) >= 0)
 
