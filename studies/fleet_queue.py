@@ -101,7 +101,6 @@ def arrivals(
     return [np.sort(np.concatenate(times)) if times else np.zeros(0) for times in found]
 
 
-def caught_up_s(message_s: float, rate_hz: float, waiting_s: float) -> float:
-    """Closed form: time to compute what arrived in `waiting_s` while as much arrives as before, load below 1."""
-    load = message_s * rate_hz
+def caught_up_s(load: float, waiting_s: float) -> float:
+    """Closed form: time to compute what arrived in `waiting_s` while as much arrives as before; load below 1."""
     return waiting_s * load / (1 - load)

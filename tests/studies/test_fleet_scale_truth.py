@@ -60,7 +60,7 @@ def test_a_takeover_catches_up_as_the_closed_form_states() -> None:
     stored = stored_times(costs, times, waiting_s)
     delayed = [one[after - one > 0.5] for one, after in zip(times, stored)]
     last_s = max(float(one[-1]) for one in delayed)
-    assert last_s - waiting_s == pytest.approx(caught_up_s(message_s, axes / period_s, waiting_s), rel=0.05)
+    assert last_s - waiting_s == pytest.approx(caught_up_s(message_s * axes / period_s, waiting_s), rel=0.05)
 
 
 def test_cores_and_streams_follow_from_the_costs_of_an_axis() -> None:
