@@ -30,7 +30,7 @@ def report(costs: PathCosts, owners: int, seconds: float) -> str:
     return "\n".join(
         [
             f"messages sent {costs.messages:,}, stored {costs.messages - costs.lost:,}, lost {costs.lost}",
-            f"messages whose result is stored {len(costs.lags_s):,}; responses {costs.responses:,}",
+            f"messages whose result is stored {len(costs.trace):,}; responses {costs.responses:,}",
             f"lag from spectrum to stored result: p50 {p50_s:.2f} s, p99 {p99_s:.2f} s",
             *(f"{name:<14}{used:6.2f} cores needed" for name, used in cores.items()),
             f"owners waited for a processor in {1 - 1 / costs.dilation:.0%} of the time in which they had work",

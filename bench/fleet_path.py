@@ -335,7 +335,7 @@ def verdicts(found: dict[str, PathCosts]) -> Iterator[str]:
     lag_s = float(np.quantile(fast.lags_s, 0.99))
     yield (
         f"p99 from sample to stored result, blocks of 100 ms: {lag_s:.2f} s at {fast.core_share * fast.axes:.0%} of a "
-        f"core, {verdict(lag_s, 0.5, most=True)} (a quiet computer and --axes {fast.axes_per_core:.0f} are needed)"
+        f"core, {verdict(lag_s, 0.5, most=True)} (judge it on a quiet computer)"
     )
     for costs in (blocks, found[MOTION.name]):
         share = costs.state_share * 100
