@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -147,6 +147,11 @@ soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth
 FLEET_FAULTS ?= 1000
 fleet-faults: $(BUILT) ## kill, freeze and disturb a fleet 1,000 times, and compare every response bit for bit (4 h; FLEET_FAULTS=20: 5 min)
 	$(BIN)/python -m studies.fleet_faults $(FLEET_FAULTS)
+
+fleet-scale: $(BUILT) ## costs of an axis of a fleet on this computer, and what 100,000 axes need (docs/explanation/fleet-scale.md; 5 min)
+	$(BIN)/python -m bench.fleet_path
+	$(BIN)/python -m bench.fleet_load
+	$(BIN)/python -m studies.fleet_scale
 
 attacks: $(BUILT)  ## attack the dashboard, 45 s for each kind, and print what the owner and the record notice
 	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/dashboard/test_attacks_fault.py

@@ -62,7 +62,7 @@ def test_the_summary_counts_and_names_what_was_done(log: Path, tmp_path: Path) -
     assert stored["counts"]["responses"] == 2000 // stored["found"]["hop"]
     assert stored["counts"]["invalid_responses"] == 100 // stored["found"]["hop"] - 1
     assert stored["configuration"]["lines"] == {"frequencies": "50,100,200", "window": 100}
-    assert set(stored["versions"]) == {"livebode", "numpy", "python", "instruction_set"}
+    assert set(stored["versions"]) == {"livebode", "numpy", "python", "instruction_set", "states"}
     assert stored["found"]["frequency_hz"] == [50, 100, 200]
 
 

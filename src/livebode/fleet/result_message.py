@@ -98,7 +98,8 @@ class PendingResults:
             response_rows(key, run, outputs[0][0], Responses.join([responses for _, responses in outputs]))
             for (key, run), outputs in self._responses.items()
         ]
-        rows = pa.Table.from_batches(batches, SCHEMA)
+        # One batch instead of one for each axis: buffers of a few rows are neither small nor fast to compress.
+        rows = pa.Table.from_batches(batches, SCHEMA).combine_chunks()
         return ResultMessage(through, owner, rows=rows, events=self._events, recipes=self._recipes)
 
 
