@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import logging
+
 from nats.aio.client import Client
 from nats.errors import SecureConnRequiredError
+
+# Python 3.11 says this at the end of every connection that was begun in plain text.
+logging.getLogger("asyncio").addFilter(lambda record: "eof_received() has no effect" not in record.getMessage())
 
 
 class EncryptedClient(Client):
