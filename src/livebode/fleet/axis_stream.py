@@ -94,7 +94,8 @@ class AxisStream(StatefulBase):
                 self._fail(error, events)
         if sum(found.value.size for found in responses) * RESPONSE_BYTES > _OUTPUT_BYTES_MAX:
             what = f"message {position} of the log has too many samples: its responses were dropped"
-            self._events.report("malformed", what)
+            sample, time_s = self._events.position
+            events.append(Event("malformed", sample, time_s, what))
             responses = []
         self.responses += sum(map(len, responses))
         events += self._events.take()
