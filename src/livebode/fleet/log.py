@@ -216,9 +216,14 @@ class FleetLog:
             pause_s = min(2 * pause_s, _RETRY_S_MAX)
 
     def _report(self, error: Exception) -> None:
+        from nats.js.errors import NoStreamResponseError
+
+        reason = str(error) or type(error).__name__
+        if isinstance(error, NoStreamResponseError):
+            reason = "nothing there takes this message: start `livebode fleet run`, and check that the key may send it"
         if not self.trouble:
-            _logger.warning("the log does not answer (%s); retrying", error or type(error).__name__)
-        self.trouble = str(error) or type(error).__name__
+            _logger.warning("the log does not answer (%s); retrying", reason)
+        self.trouble = reason
 
 
 def _stored(raw: Any) -> StoredMessage:

@@ -33,6 +33,6 @@ class FleetError(LivebodeError):
         "no-data": "The log has no data of this axis in the time that was asked for.",
         "not-exactly-once": "Stored responses are missing, doubled or different from one uninterrupted computation.",
         "server-ended": "The server of the log ended at its start.",
-        "server-open": "The server of the log would be open to a network without TLS or keys.",
         "server-missing": "The program nats-server is not installed.",
+        "server-open": "The server of the log would be open to a network without TLS or keys.",
     }
