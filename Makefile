@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature fuzz crash damage soak fleet-faults attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -77,6 +77,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.start
 	$(BIN)/python -m bench.dashboard
 	$(BIN)/python -m bench.runs
+	$(BIN)/python -m bench.archive
 
 BASE ?=
 bench-compare: $(BUILT)  ## the speed of this version and of another commit, alternately (BASE=REV; default: newest tag or stored result)
@@ -109,6 +110,9 @@ fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lac
 common-modes: $(BUILT) ## order and coverage of the bounds of modes common to two outputs (docs/explanation/fits.md)
 	$(BIN)/python -m studies.common_modes
 
+trends: $(BUILT) ## trends over a year of runs: coverage, power, false discoveries of a fleet (docs/explanation/trends.md, 10 min)
+	$(BIN)/python -m studies.archive_trends
+
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/how-to/monitoring.md
 	$(BIN)/python -m studies.monitoring
 
@@ -133,6 +137,9 @@ damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each kind of live source
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/records/test_kills_fault.py
 	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 9 -rP tests/records/test_live_kills_fault.py  # they mostly wait
+
+archive-faults: $(BUILT) ## an archive with bad recordings: kill workers and coordinators 100 times, compare with a loop (20 min)
+	LIVEBODE_ARCHIVE_KILLS=100 $(BIN)/python -m pytest -q -s tests/archive/test_kills_fault.py
 
 soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth of memory, length of the stop, docs/images/soak.png
 	$(BIN)/python -m studies.soak

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from livebode.core import Lines, Responses
-from livebode.fitting import EvaluationGrid, Fitter, TwoMass, two_masses
+from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit_together, two_masses
 
 TARGET_MS = 0.25
 LINES = Lines.parse("20:120:5", rate_hz=4000, window=800)
@@ -57,6 +57,24 @@ def ours(batch: int) -> Callable[[], float]:
     return run
 
 
+def axes_together(axes: int) -> Callable[[], float]:
+    """Milliseconds per fit if each of many axes has one new response: warm, in one computation."""
+    every = responses()
+
+    def run() -> float:
+        fitters = [Fitter(MODEL) for _ in range(axes)]
+        fit_together(fitters, [every[:16]] * axes)
+        times = []
+        for i in range(16, 26):
+            start = time.perf_counter()
+            found = fit_together(fitters, [every[i : i + 1]] * axes)
+            times.append((time.perf_counter() - start) / axes)
+            assert all(one.ok.all() for one in found)
+        return 1e3 * statistics.median(times)
+
+    return run
+
+
 def scipys() -> float:
     """Milliseconds per fit of SciPy's Levenberg–Marquardt, each from the previous result, with the same closed form."""
     every, arm = responses(), 2 * np.log(MODEL.radius_m or 1.0)
@@ -79,7 +97,9 @@ def main() -> None:
     print(
         "two masses at 21 lines, warm, values with covariance and status; median of a fit, best of interleaved rounds"
     )
-    ways = {f"livebode, {batch} at a time": ours(batch) for batch in (1, 16, 100)} | {"scipy least_squares": scipys}
+    ways = {f"livebode, {batch} at a time": ours(batch) for batch in (1, 16, 100)}
+    ways |= {f"livebode, {axes} axes": axes_together(axes) for axes in (16, 100)}
+    ways |= {"scipy least_squares": scipys}
     found = {name: min(way() for _ in range(REPEATS if name[0] == "l" else 3)) for name, way in ways.items()}
     theirs = found["scipy least_squares"]
     for name, ms in found.items():

@@ -8,14 +8,15 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
+from livebode.archive.settings import archive_schema
 from livebode.configuration.schema import axis_schema
 from livebode.experiments.experiment_schema import experiment_schema
 
 HEAD = """# Configuration
 
-Two files configure livebode: `axis.toml` for `livebode run` and the other commands on an axis, `experiment.toml` for
-`livebode design`. All keys are checked before anything starts. If a value is not possible, the message gives the key,
-the value and the remedy. Options of the command line override the file.
+Three files configure livebode: `axis.toml` for `livebode run` and the other commands on an axis, `experiment.toml` for
+`livebode design`, and `archive.toml` for `livebode archive`. All keys are checked before anything starts. If a value is
+not possible, the message gives the key, the value and the remedy. Options of the command line override the file.
 
 A minimal `axis.toml`:
 
@@ -55,6 +56,7 @@ MORE = {
     "serve": "See [the dashboard](../how-to/dashboard.md).",
     "belt": "See [the simulated axis](axis.md).",
     "measured": "A limit on a quantity whose extremes are not known is rejected.",
+    "cluster": "See [archives](../how-to/archive.md).",
     "excitation": "See [excitation design](../how-to/excitation.md).",
 }
 """Text below the heading of a table."""
@@ -64,10 +66,13 @@ than the run's is stable.
 """
 
 
+_FILES = (("axis", axis_schema()), ("experiment", experiment_schema()), ("archive", archive_schema()))
+
+
 def page() -> str:
     """The page in Markdown."""
     parts = [HEAD]
-    for name, schema in (("axis", axis_schema()), ("experiment", experiment_schema())):
+    for name, schema in _FILES:
         parts += [f"## {name}.toml\n", *_tables(schema, "", schema, schema.get("else", {}))]
     return "\n".join(parts)
 

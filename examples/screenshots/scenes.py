@@ -242,6 +242,47 @@ def chinese(studio: Studio) -> bytes:
     return picture(studio.page(studio.faulty_url, "#tab=parameters", locale="zh-CN", timezone_id="Asia/Shanghai"))
 
 
+def _fleet(studio: Studio, address: str, **options: Any) -> Page:
+    return studio.page(studio.fleet_url, address, until="() => window.livebode?.tiles.shown.length", **options)
+
+
+@scene
+def fleet(studio: Studio) -> bytes:
+    return picture(_fleet(studio, "", color_scheme="light"))
+
+
+@scene
+def fleet_alarms_dark(studio: Studio) -> bytes:
+    return picture(_fleet(studio, "#list=alarms&size=medium&place=Brno", color_scheme="dark"))
+
+
+@scene
+def fleet_workers(studio: Studio) -> bytes:
+    return picture(_fleet(studio, "#list=workers&size=large&place=Brno/body"))
+
+
+@scene
+def fleet_axis(studio: Studio) -> bytes:
+    page = _fleet(studio, "#list=alarms")
+    page.locator("#events .state").first.click()
+    return picture(page)
+
+
+@scene
+def fleet_floor_plan(studio: Studio) -> bytes:
+    return picture(_fleet(studio, "#view=plan"))
+
+
+@scene
+def fleet_phone(studio: Studio) -> bytes:
+    return picture(_fleet(studio, "#list=gaps", size=PHONE, **MOBILE), full_page=True)
+
+
+@scene
+def fleet_phone_dark(studio: Studio) -> bytes:
+    return picture(_fleet(studio, "#list=alarms", size=PHONE, color_scheme="dark", **MOBILE), full_page=True)
+
+
 @scene
 def help_and_keys(studio: Studio) -> bytes:
     page = studio.page(studio.faulty_url)

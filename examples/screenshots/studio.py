@@ -27,6 +27,7 @@ SECONDS, MOMENT_S = 40.0, 25.7
 DESK, PHONE, LANDSCAPE, HALL = (1440, 900), (390, 844), (844, 390), (1920, 1080)
 BEGUN, DAY_S = 1_760_000_000.0, 86400.0
 DRAWN = "() => window.livebode?.bode.curves.measured && livebode.tracking.made.data[0].length"
+_PLAN = Path(__file__).with_name("hall.svg")
 _DRAW_MS = 1500  # the page draws its map every 600 ms
 
 
@@ -115,6 +116,18 @@ class Studio(ExitStack):
             self.enter_context(Tracked(held, demo_settings(), directory, hub, self.baseline))
             hub(ClockSet([(0.0, time.time() - held.fast_s)]))
         return dashboard
+
+    @cached_property
+    def fleet_url(self) -> str:
+        """A simulated fleet with a floor plan; one of its partitions has no worker."""
+        from livebode.dashboard.fleet_demo import DemoFeed, DemoFleet
+        from livebode.dashboard.fleet_view import FleetView
+        from livebode.dashboard.floor_plan import floor_plan
+
+        feed = DemoFeed(DemoFleet(10_000), silent=[3], began_s=time.time() - 150)
+        dashboard = Dashboard(Serving("127.0.0.1", 0))
+        dashboard.view_fleet(FleetView(feed, floor_plan(_PLAN)))
+        return self.enter_context(dashboard).url
 
     def page(
         self, url: str, address: str = "", size: tuple[int, int] = DESK, until: str = DRAWN, **options: Any

@@ -40,9 +40,9 @@ Names by subject:
 - Monitoring: Baseline, Event, Monitor, learn
 - Simulation: BeltAxis, SimulatedAxis, Strokes
 - Examples: example_axis, example_responses, example_run
-- Errors: LivebodeError (a ValueError) and its kinds BaselineError, ConfigError, DesignError, ExtraError, FitError,
-  FleetError, GridError, OutputError, RecordError, RecordingError, ServerError, SignalError, SimulationError,
-  SourceError, StateError, UsageError
+- Errors: LivebodeError (a ValueError) and its kinds ArchiveError, BaselineError, ConfigError, DesignError, ExtraError,
+  FitError, FleetError, GridError, LocationError, OutputError, RecordError, RecordingError, ServerError,
+  SignalError, SimulationError, SourceError, StateError, UsageError
 
 Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the true value with probability
 1 − exp(−c²). Every public name loads its part of livebode when it is first used. These names are the public interface,
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from livebode.analysis.learning import learn
     from livebode.core import (
         PID,
+        ArchiveError,
         BaselineError,
         Block,
         Cascade,
@@ -141,11 +142,13 @@ _HOME = {
         "RecordError",
         "OutputError",
         "LivebodeError",
+        "LocationError",
         "FitError",
         "FleetError",
         "ExtraError",
         "DesignError",
         "ConfigError",
+        "ArchiveError",
         "BaselineError",
         "PID",
         "Block",
@@ -168,6 +171,7 @@ _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "PID",
+    "ArchiveError",
     "Baseline",
     "BaselineError",
     "BeltAxis",
@@ -186,6 +190,7 @@ __all__ = [
     "GridError",
     "Lines",
     "LivebodeError",
+    "LocationError",
     "Log",
     "Loop",
     "Model",

@@ -18,10 +18,10 @@ from tests.support.command import livebode
 from tests.support.reports import measured, write_run
 
 COMMANDS = {
-    f"{name} {inner}" if inner else name: one
+    " ".join([name, *inner]): one
     for name, command in typer.main.get_command(app).commands.items()
-    for inner, one in getattr(command, "commands", {"": command}).items()
-    if name != "view"
+    for inner, one in [([word], one) for word, one in getattr(command, "commands", {}).items()] or [([], command)]
+    if "view" not in (name, *inner)  # a page has no result
 }
 LIVEBODE = str(Path(sys.executable).with_name("livebode"))
 

@@ -57,7 +57,7 @@ def test_a_value_is_valid_where_livebode_accepts_it(table: tuple[str, ...]) -> N
     for name, key in TABLES[table]["properties"].items():
         for value in values_of(key) if name != "axes" else ():
             data = with_value(base_of(table), (*table, name), value)
-            if name == "url":
+            if name in ("url", "replay"):
                 del data["source"]["log"]
             address = name == "url" and isinstance(value, str)  # its parts are checked by livebode only
             assert VALID.is_valid(data) == accepted(data) or address, (table, name, value)
@@ -70,7 +70,7 @@ def test_a_value_is_valid_where_livebode_accepts_it(table: tuple[str, ...]) -> N
 def test_a_source_has_the_keys_of_its_kind(kind: str) -> None:
     url = "stdin:" if kind == "stdin" else f"{kind}://192.168.0.5:5000"
     for name, key in TABLES[("source",)]["properties"].items():
-        if name not in ("log", "url", "follow"):
+        if name not in ("log", "url", "follow", "replay"):
             candidates = (key.get("default"), "x", 1, ["x"], {"x": "x"}, *key.get("enum", []))
             value = next(value for value in candidates if fits(key, value))
             data = SMALLEST | {"source": {"url": url, name: value}}
@@ -95,6 +95,8 @@ def fits(key: dict[str, Any], value: Any) -> bool:
         {"source": {}},
         {"source": {"log": "a", "url": "udp://h:1"}},
         {"source": {"url": "udp://h:1", "follow": True}},
+        {"source": {"log": "a", "replay": "runs/b"}},
+        {"source": {"replay": "runs/b", "rate_hz": 4000.0}},
         {"signals": {}},
         {"motion": {}},
         {"loop": {"velocity": {"gain": 1.0}}},

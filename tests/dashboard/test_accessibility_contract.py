@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,41 +15,18 @@ from livebode.dashboard import Dashboard, Serving
 from livebode.report.html import to_html
 from livebode.reporting.report_data import read
 from livebode.reporting.run_report import report_of
+from tests.support.axe import SIZES, violations, with_axe
 from tests.support.baselines import compared
 from tests.support.browser import DESK, Tab
 from tests.support.dashboards import Watched
 from tests.support.guarded import TOKEN, guarded
 from tests.support.many_runs import source_run, weeks
 
-AXE = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
-TAGS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
-# What of the rules depends on the colours or the size of the screen.
-SIZES = ["target-size", "scrollable-region-focusable", "color-contrast"]
 PHONE = {"width": 390, "height": 844}
-CHECK = """async ([within, only]) => {
-  const what = only ? { type: 'rule', values: only } : { type: 'tag', values: TAGS };
-  const found = await axe.run(within, { runOnly: what, resultTypes: ['violations'] });
-  return found.violations.flatMap(({ id, nodes }) => nodes.map((node) =>
-    `${id}: ${node.html.slice(0, 150)} ${(node.any[0] ?? node.all[0] ?? node.none[0])?.message}`));
-}""".replace("TAGS", str(TAGS))
 CHANGE = Event(
     "change", 6000, 1.6, "the belt's stiffness is 2 % less",
     {"what": "stiffness", "amount_percent": -2.0, "since_s": 1.3, "place_m": None},
 )  # fmt: skip
-
-
-def with_axe(browser: Browser) -> Tab:
-    """A tab whose pages all have axe-core; to send it to each of them would cost more than to run it."""
-    tab = Tab(browser, "about:blank", wait=False)
-    tab.context.add_init_script(path=AXE)
-    return tab
-
-
-def violations(tab: Tab, what: str, within: str = "html", only: list[str] | None = None) -> list[str]:
-    """Each in words; of all rules, or of those that are named."""
-    if shots := os.environ.get("SHOTS"):
-        tab.page.screenshot(path=f"{shots}/{what}-{'phone' if only else 'desk'}.png".replace(" ", "-"))
-    return [f"{what}, {'phone' if only else 'desk'}: {one}" for one in tab.page.evaluate(CHECK, [within, only])]
 
 
 def sides(tab: Tab) -> Iterator[list[str] | None]:

@@ -18,7 +18,7 @@ from websockets.asyncio.client import connect as connect_async
 from websockets.sync.client import ClientConnection, connect
 
 from livebode.dashboard import Dashboard, Serving, patience
-from livebode.dashboard.client import DISPLACED
+from livebode.dashboard.browser_socket import DISPLACED
 from livebode.dashboard.listener import connections_max
 from livebode.dashboard.places import PLACES, ClientPlace, Places
 from livebode.dashboard.server import Faults

@@ -24,7 +24,7 @@ from livebode.dashboard.past import Past
 from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import RecentResponses
 from livebode.dashboard.state import State
-from livebode.dashboard.trends import POINTS_MAX, Trend, TrendRows
+from livebode.dashboard.trends import POINTS_MAX, ParameterTrend, TrendRows
 from livebode.runtime import RunControl
 from livebode.runtime.documents import ClockSet, RunEnded, RunStarted, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
@@ -169,7 +169,7 @@ def test_recent_responses_are_the_newest_and_thinned() -> None:
 @given(st.lists(st.integers(1, 700), min_size=1, max_size=12))
 @settings(max_examples=25, deadline=None)
 def test_a_trend_is_evenly_thinned_however_it_came(sizes: list[int]) -> None:
-    trend, at = Trend("two-mass", "Js", "kg m²"), 0
+    trend, at = ParameterTrend("two-mass", "Js", "kg m²"), 0
     for size in sizes:
         time_s = np.arange(at, at + size, dtype=float)
         trend.add(TrendRows(time_s, time_s, 2 * time_s, time_s, np.full(size, "ok")))

@@ -88,6 +88,7 @@ def test_only_values_of_secret_keys_are_removed(tmp_path: Path, place: tuple[str
         f'url = ["mqtt://me:{SECRET}@127.0.0.1:1/t"]',
         f'url = {{ a = "mqtt://me:{SECRET}@127.0.0.1:1/t" }}',
         f'log = "mqtt://me:{SECRET}@127.0.0.1:1/t"',
+        f'log = "https://127.0.0.1:1/a.csv?signature={SECRET}"',
         f'url = "mqtt://127.0.0.1:1/t"\npassword = "{SECRET}"',
         f'url = "mqtt://127.0.0.1:1/t"\npassword_env = "{SECRET}"',
         f'url = "mqtt://127.0.0.1:1/t"\npassword_env = ["{SECRET}"]',

@@ -18,6 +18,8 @@ from livebode.records.segments.journal import Journal
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
 from livebode.records.wide_responses import wide_schema
+from livebode.version import __version__
+from tests.support.monitored import small_baseline
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/reference/formats.md").read_text("utf-8")
@@ -72,16 +74,15 @@ def test_heads_have_the_fields_and_the_sizes_that_are_listed() -> None:
         assert names(rows[0][3]) == [magic.decode()]
         assert int(rows[-1][0]) == size == sum(int(row[1]) for row in rows[:-1])
     assert len(frames.to_frame(COMMIT)) == 16
-    assert len(state.encode(state.Stage("a", 1), {})) == 20 + len(
-        b'{"stage":"a","settings":"","plain":{},"arrays":{},"parts":{}}'
-    )
+    text = f'{{"stage":"a","settings":"","livebode":"{__version__}","plain":{{}},"arrays":{{}},"parts":{{}}}}'
+    assert len(state.encode(state.Stage("a", 1), {})) == 20 + len(text)
 
 
 def keys(rows: list[list[str]]) -> set[str]:
     return {name for row in rows for name in names(row[0])}
 
 
-def test_the_keys_of_stored_files_are_listed() -> None:
+def test_the_keys_of_stored_files_are_listed(tmp_path: Path) -> None:
     run = keys(table(PAGE, "key", under="## run.json")) | keys(table(RUN_PAGE, "key", under="## run.json"))
     for kind in ("piece", "segments"):
         assert set(plain(STORED / kind / "run.json")) <= run, kind
@@ -90,7 +91,10 @@ def test_the_keys_of_stored_files_are_listed() -> None:
     closed = lines(STORED / "segments/manifest.jsonl")[2]
     segment = keys(table(PAGE, "key", under="### Manifest"))
     assert {key for one in closed["segments"] for key in one} == segment
-    assert set(plain(STORED / "baseline.json")) == keys(table(PAGE, "key", under="## Baseline"))
+    small_baseline().save(tmp_path / "baseline.json")
+    written = set(plain(tmp_path / "baseline.json"))
+    assert written == keys(table(PAGE, "key", under="## Baseline"))
+    assert set(plain(STORED / "baseline.json")) < written, "an older livebode wrote it"
 
 
 def test_the_keys_of_a_commit_and_of_a_state_are_listed() -> None:
@@ -103,7 +107,8 @@ def test_the_keys_of_a_commit_and_of_a_state_are_listed() -> None:
     assert found is not None
     tracker = found.states["tracker"]
     described = json.loads(tracker[20 : 20 + int.from_bytes(tracker[8:12], "little")])
-    assert set(described) == keys(table(PAGE, "key", under="## States"))
+    written = json.loads(state.encode(state.Stage("a", 1), {})[20:])
+    assert set(described) | {"livebode"} == set(written) == keys(table(PAGE, "key", under="## States"))
 
 
 def plain(path: Path) -> Mapping[str, object]:

@@ -12,10 +12,10 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = {
-    re.split(r"[<>=,]", need)[0]: extra
+    re.split(r"[<>=,[]", need)[0]: extra
     for extra, needs in PROJECT["optional-dependencies"].items()
     for need in needs
-    if extra != "all"
+    if not need.startswith("livebode")
 }
 CORE = [re.split(r"[<>=,]", need)[0] for need in PROJECT["dependencies"]]
 

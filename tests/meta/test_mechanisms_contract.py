@@ -14,17 +14,17 @@ SOURCE = Path(__file__).parents[2] / "src/livebode"
 @pytest.mark.parametrize(
     ("pattern", "places"),
     [
-        # The journal of a damaged segment is only set aside.
-        (r"os\.(replace|rename)\(|\w\.rename\(|mk[sd]temp\(", {"core/files.py", "records/segments/journal.py"}),
+        # The journal of a damaged segment is only set aside; the copy of a file at a URL has no place.
+        (
+            r"os\.(replace|rename)\(|\w\.rename\(|mk[sd]temp\(",
+            {"core/files.py", "records/segments/journal.py", "locations/copies.py"},
+        ),
         # Data that is sent from a file, or read back at once, has no place.
         (
             r"(TemporaryDirectory|NamedTemporaryFile)\(",
             {
-                "cli/fleet/demo_command.py",
-                "cli/validate_command.py",
-                "dashboard/app.py",
-                "export/universal.py",
-                "report/pdf.py",
+                *("cli/fleet/demo_command.py", "cli/validate_command.py", "dashboard/app.py", "export/universal.py"),
+                *("archive/alone.py", "archive/tracking.py", "report/pdf.py"),
             },
         ),
         (r"\bfsync\(", {"core/files.py", "doctor/disk.py"}),

@@ -14,11 +14,13 @@ from typing import Any
 import pytest
 import typer
 
+from livebode.archive.settings import ArchiveSettings
 from livebode.cli.app import app
 from livebode.configuration import Axis
 from livebode.configuration.axes import merged, tables_of
 from tests.support.pages import PAGES, ROOT, steps_of
 
+ARCHIVE = {"inputs": ["*.csv"], "recipe": "recipe.toml", "lake": "lake"}
 SMALLEST = {"source": {"log": "log.parquet"}, "signals": {"output": "y", "input": "u", "excitation": "w"}}
 
 
@@ -37,6 +39,9 @@ TOML = [pytest.param(text, id=f"{name_of(page)}-{n}") for page in PAGES for n, t
 def test_the_toml_of_a_page_is_a_configuration(text: str) -> None:
     """Alone where it has signals, otherwise with the smallest configuration around it."""
     data = tomllib.loads(text)
+    if data.keys() & {"inputs", "cluster"}:
+        assert ArchiveSettings.model_validate(ARCHIVE | data)
+        return
     below = {} if "signals" in data else SMALLEST | ({"source": {}} if "source" in data else {})
     for table in tables_of(merged(below, data), "axis.toml").values():
         assert Axis.of(table, "axis.toml")

@@ -101,8 +101,8 @@ def test_a_live_source_without_specified_lines_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("", "needs either a log or a url"),
-        ('log = "a"\nurl = "udp://h:1"', "needs either a log or a url"),
+        ("", "needs either a log, a url or a replay"),
+        ('log = "a"\nurl = "udp://h:1"', "needs either a log, a url or a replay"),
         ('url = "udp://h"', "give udp://host:port"),
         ('url = "udp://h:1"\nsymbol = "x"', "source.symbol does not apply to udp"),
         ('url = "udp://h:1"\nreorder_batches = 1000', "source.reorder_batches = 1000 is not usable"),

@@ -14,7 +14,7 @@ from livebode.core import SourceError
 from livebode.sources.live import KINDS, LiveBlock, LiveSource
 from livebode.sources.live.opening import MODULES
 from tests.support.errors import refused
-from tests.support.peers.broker import MqttPeer
+from tests.support.peers.broker import Mqtt311Peer, MqttPeer
 from tests.support.peers.opcua import OpcUaPeer
 from tests.support.peers.peer import (
     CHANNELS,
@@ -35,6 +35,7 @@ PEERS = {
     "tcp": TcpPeer,
     "stdin": StdinPeer,
     "mqtt": MqttPeer,
+    "mqtt-3.1.1": Mqtt311Peer,
     "opc.tcp": OpcUaPeer,
     "ads-ring": RingPeer,
     "ads-notify": NotifyPeer,

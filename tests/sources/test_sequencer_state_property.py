@@ -74,7 +74,7 @@ def streams(draw: st.DrawFn, make: Make) -> list[AnyBatch]:
 def sequencer(begun: Position | None, reorder: int) -> tuple[Sequencer, SourceEvents]:
     later = count(step=1000)  # no Event is left out for its rate
     events = SourceEvents(clock=lambda: float(next(later)))
-    made = Sequencer(events, reorder=reorder, rate_hz=RATE_HZ)
+    made = Sequencer(events, reorder=reorder, rate_hz=RATE_HZ, sender_numbers=reorder % 2 == 1)
     if begun is not None:
         made.resume(begun, paced=False)  # paced: with an estimate by the clocks of this computer
     return made, events

@@ -141,6 +141,8 @@ def wrong_ones(snapshot: bytes) -> Iterator[tuple[bytes, tuple[str, ...]]]:
     newer = ("state.newer-version",)
     yield renewed(snapshot, encodings=1), newer
     yield renewed(snapshot, versions=1), newer
+    (version,) = struct.unpack_from("<H", snapshot, 6)
+    yield renewed(snapshot, versions=-version), ("state.older-version",)
     yield from ((inside, newer) for inside in newer_inside(snapshot))
 
 

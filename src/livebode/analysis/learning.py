@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from datetime import UTC, datetime
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from livebode.configuration.axis import Axis, FitSection
@@ -12,6 +13,7 @@ from livebode.configuration.fit_settings import fitter_of
 from livebode.configuration.recorded import recorded_configuration
 from livebode.configuration.recording import open_recording
 from livebode.core import BaselineError, Block, LivebodeError
+from livebode.locations import Location, Url, local_copy, resolved
 from livebode.monitoring import (
     Baseline,
     LearnedMachine,
@@ -30,12 +32,13 @@ _RADIUS_M = 1.0
 
 
 def learn(
-    paths: str | PathLike[str] | Sequence[str | PathLike[str]], report: Callable[[str], None] = lambda _: None
+    paths: str | PathLike[str] | Url | Sequence[str | PathLike[str] | Url],
+    report: Callable[[str], None] = lambda _: None,
 ) -> Baseline:
     """The Baseline of runs of the healthy machine, all with the same lines and signals; as `livebode learn`.
 
     Tables are learned from the runs' responses. With a torque and a scheduling position, a model of the moving machine
-    is also learned, from the recordings of the runs; `report` receives the progress.
+    is also learned, from the recordings of the runs; `report` receives the progress. Runs may be at URLs.
 
     Raises
     ------
@@ -43,6 +46,8 @@ def learn(
         If a run cannot be read.
     BaselineError
         If the runs do not match, or contain too little data.
+    LocationError
+        If a run at a URL cannot be downloaded.
 
     Examples
     --------
@@ -52,11 +57,15 @@ def learn(
     >>> baseline.tables[0].names[:3], baseline.hop
     (('20 Hz', '30 Hz', '40 Hz'), 100)
     """
-    if isinstance(paths, str | PathLike):
+    if isinstance(paths, str | PathLike | Url):
         paths = [paths]
     if not paths:
         raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
-    runs = [RunRecord.open(Path(path)) for path in paths]
+    with ExitStack() as copies:
+        return _learned([RunRecord.open(copies.enter_context(local_copy(path))) for path in paths], report)
+
+
+def _learned(runs: list[RunRecord], report: Callable[[str], None]) -> Baseline:
     axes = [_axis(run) for run in runs]
     _check_once(runs, axes)
     for run, axis in zip(runs, axes):
@@ -87,8 +96,9 @@ def learn(
         tuple(tables),
         machine,
         axes[0].motion is not None,
-        tuple(str(run.path) for run in runs),
+        tuple(run.place for run in runs),
         remark,
+        learned=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
 
@@ -122,9 +132,10 @@ def _axis(run: RunRecord) -> Axis:
 
 def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
     """Duplicated data would count as twice as much evidence."""
-    seen: dict[Path, RunRecord] = {}
+    seen: dict[Location, RunRecord] = {}
     for run, axis in zip(runs, axes):
-        things = [path.resolve() for path in (run.path, *axis.source.logs)]
+        replayed = () if axis.source.replay is None else (axis.source.replay,)
+        things = [resolved(place) for place in (run.path, *axis.source.logs, *replayed)]
         for thing in things:
             if thing in seen:
                 raise BaselineError(
@@ -146,6 +157,7 @@ def _check_same(first: RunRecord, mine: Axis, run: RunRecord, axis: Axis) -> Non
         ("motion options", mine.motion, axis.motion),
         ("fit options", mine.fit, axis.fit),
         ("covariates", mine.monitoring.covariates, axis.monitoring.covariates),
+        ("the unit of the response", first.found.get("unit", ""), run.found.get("unit", "")),
     ):
         if one != other:
             raise BaselineError(

@@ -12,6 +12,7 @@ from livebode.configuration.axis import Axis, FitSection
 from livebode.configuration.ready import ReadyCondition
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Block, FitError, RecordError, SignalError, UsageError
+from livebode.locations import Location, resolved
 from livebode.records import RunRecord
 from livebode.sources import Log, open_log
 from livebode.validation import Validation, validate
@@ -101,8 +102,8 @@ def validate_run(
     return judged, notes + refused
 
 
-def _freshness(own: Sequence[Path], log: Path) -> list[str]:
-    if log.resolve() not in [path.resolve() for path in own]:
+def _freshness(own: Sequence[Location], log: Location) -> list[str]:
+    if resolved(log) not in map(resolved, own):
         return []
     return [f"{log.name} is the recording of the run: this is not independent data, because the model was fitted to it"]
 

@@ -21,6 +21,7 @@ from livebode.cli.commands import GROUPS, SUMMARIES, command, subcommand
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.first_page import ABOUT, OPTIONS
 from livebode.cli.log_options import File, Level, LogOptions, with_log
+from livebode.cli.remote import with_copies
 from livebode.cli.terminal import protect, unchecked_output
 from livebode.core import DamageWarning, LivebodeError
 from livebode.version import __version__
@@ -72,7 +73,7 @@ class _Commands(Mapping[str, TyperCommand]):
             return _Group(name=name, group=name, help=SUMMARIES[name], context_settings=_HELP, no_args_is_help=True)
         function = subcommand(self._group, name) if self._group else command(name)
         alone = typer.Typer(add_completion=False)
-        alone.command(name, cls=_Command, context_settings=_HELP)(with_log(function))
+        alone.command(name, cls=_Command, context_settings=_HELP)(with_log(with_copies(function)))
         return cast("TyperCommand", typer.main.get_command(alone))
 
     def __iter__(self) -> Iterator[str]:

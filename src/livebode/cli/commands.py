@@ -34,17 +34,28 @@ SUMMARIES: Mapping[str, str] = {
     "compare": "Find the lines, parameters and margins that differ between two runs, with amounts and bounds.",
     "view": "Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still "
     "recording.",
+    "archive": "Track every recording of an archive on all cores or a cluster, and keep the results in one lake.",
     "fleet": "Track the axes of a fleet from a log on several workers: every result once, also when a worker dies.",
     "doctor": "Check this computer, a configuration and whether its machine can be reached.",
-    "schema": "Print the JSON Schema of axis.toml or experiment.toml: an editor uses it to complete and check the "
-    "keys.",
+    "schema": "Print the JSON Schema of axis.toml, experiment.toml or archive.toml: an editor uses it to complete "
+    "and check the keys.",
 }
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
+    "archive": {
+        "run": "Track the recordings of an archive that its lake does not have yet.",
+        "list": "List the runs of a lake by machine, and the recordings in quarantine.",
+        "retry": "Track recordings in quarantine again, each in a process of its own.",
+        "compact": "Join the small files of a lake, and remove files that belong to no result.",
+        "trend": "Find how a quantity changes over months, for each machine: slope, jumps and bends with bounds.",
+        "compare": "Find the quantities that differ between two axes, or between two spans of one, with bounds.",
+        "report": "Write the trends of all quantities and machines as one page, the worst machine first.",
+    },
     "fleet": {
         "run": "Start the workers of a fleet on this computer, and replace those that die, until Ctrl-C.",
         "send": "Send the samples of live sources to the log, through a buffer on disk.",
         "status": "Show partitions, axes, backlog and losses of a fleet.",
+        "view": "Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.",
         "check": "Compute all responses of a fleet again from its log, and compare the stored ones bit for bit.",
         "replay": "Compute the responses of an axis again from the log, and write them as a table.",
         "server": "Write the configuration of nats-server for a fleet.",

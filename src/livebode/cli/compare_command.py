@@ -29,12 +29,15 @@ from livebode.cli.report_options import (
 )
 from livebode.core import UsageError
 from livebode.language import in_language
+from livebode.locations import location
 from livebode.records import to_json
 
 
 def compare_command(
-    before: Annotated[Path, typer.Argument(metavar="BEFORE", help="Run directory.")],
-    after: Annotated[Path, typer.Argument(metavar="AFTER", help="Directory of a later run with the same signals.")],
+    before: Annotated[Path, typer.Argument(metavar="BEFORE", help="Run directory.", parser=location)],
+    after: Annotated[
+        Path, typer.Argument(metavar="AFTER", help="Directory of a later run with the same signals.", parser=location)
+    ],
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write FILE.html and FILE.pdf.")] = None,
     ignore_below: Annotated[
         str | None,

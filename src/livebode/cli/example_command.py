@@ -42,12 +42,15 @@ def example_command(
             value=name,
             allowed=[*EXAMPLES, _ALL],
         )
-    files = write_examples(list(EXAMPLES) if name == _ALL else [name], out, force=force)
+    names = [one for one, example in EXAMPLES.items() if example.usable] if name == _ALL else [name]
+    files = write_examples(names, out, force=force)
     if as_json:
         print(to_json({"directory": str(out), "files": [str(path) for path in files]}))
         return
     for path in files:
         print(path)
+    if left_out := [one for one in EXAMPLES if name == _ALL and one not in names]:
+        print(f"left out, because an optional package is missing: {', '.join(left_out)}")
     print("\nTry:" if name != _ALL else "\nTry, for example:")
     print(f"  cd {out}")
     for command in EXAMPLES["standstill" if name == _ALL else name].commands:

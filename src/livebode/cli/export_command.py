@@ -9,7 +9,9 @@ from typing import Annotated
 import typer
 
 from livebode.cli.options import Json
+from livebode.cli.remote import beside
 from livebode.core import Responses, UsageError, counted
+from livebode.locations import location
 from livebode.records import RunRecord, to_json
 
 _IN_PYTHON = {
@@ -19,7 +21,7 @@ _IN_PYTHON = {
 
 
 def export_command(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
     to: Annotated[str, typer.Option(metavar="FORMAT", help="Format: csv, mat, netcdf or uff.")],
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="File to write. \\[default: RUN with the format's suffix]")
@@ -37,7 +39,7 @@ def export_command(
 
     _check(to, at, mean, parameters, tuple(export.TABLES if parameters else export.FORMATS))
     record = RunRecord.open(run, output_only=parameters)
-    name = record.path.resolve()
+    name = beside(record.path)
     path = out or name.with_name(name.name + "-parameters" * parameters + export.ENDINGS[to])
     if parameters:
         table = export.ParameterTable(record.path, partial(record.tables, "parameters"))

@@ -16,6 +16,7 @@ from livebode.configuration.recorded import recorded_configuration
 from livebode.core import UsageError
 from livebode.fitting import POLE_MODELS
 from livebode.fitting.pole_search import Kind
+from livebode.locations import location
 from livebode.records import RunRecord, to_json
 
 _OPTIONS = {"radius_m": "radius", "inertia_ratio": "ratio", "fixed": "fix"}
@@ -25,7 +26,9 @@ def fit_command(
     directories: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RUN...", help="Run directory; several, of one input and different outputs, for common poles."
+            metavar="RUN...",
+            help="Run directory; several, of one input and different outputs, for common poles.",
+            parser=location,
         ),
     ],
     model: Annotated[

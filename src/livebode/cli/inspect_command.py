@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -15,6 +14,7 @@ from livebode.cli.options import Dbc, Excitation, From, Json, Output, Rate, Skip
 from livebode.core import UsageError, counted
 from livebode.estimation.settings import default_hop
 from livebode.excitation.pattern import pattern
+from livebode.locations import location
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ _WIDTH_MAX = 4096
 
 
 def inspect_command(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A recording.")],
+    log: Annotated[str, typer.Argument(metavar="LOG", help="A recording.")],
     excitation: Excitation = None,
     output: Output = None,
     input_: Annotated[
@@ -61,7 +61,7 @@ def inspect_command(
     _check(excitation, output, input_, lines, window)
     of_lines = None if lines is None or window is None else (lines, window)
     found = inspect(
-        log,
+        location(log),
         rate_hz=rate,
         time=time,
         dbc=dbc,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,7 +10,8 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.options import Json
-from livebode.core import OutputError, counted
+from livebode.core import BaselineError, OutputError, UsageError, counted
+from livebode.locations import location
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -20,25 +22,87 @@ _MACHINE = ("stiffness", "load", "damping", "inertia")
 
 
 def learn_command(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN…", help="Run directories of the healthy machine.")],
-    out: Annotated[Path, typer.Option(metavar="BASELINE", help="JSON file to write.")],
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    runs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="RUN…", help="Run directories of the healthy machine.", parser=location),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="BASELINE", help="JSON file to write.")] = None,
+    reason: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEXT",
+            help="Why this baseline is learned. An existing file is then replaced as its next version: the earlier "
+            "ones are retained in NAME.history beside it.",
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file; a baseline is retained.")] = False,
+    history: Annotated[
+        Path | None, typer.Option(metavar="BASELINE", help="List the versions of a baseline, and learn nothing.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Learn a baseline from runs of the healthy machine, for `livebode run --baseline`."""
-
+    if history is not None:
+        _check_alone(runs, out)
+        print(_history(history, as_json=as_json))
+        return
+    if out is None:
+        raise UsageError("missing", "the file of the baseline is not named", "give --out BASELINE", argument="out")
     from livebode.analysis.learning import learn  # with the simulation
 
-    if out.exists() and not force:
+    if out.exists() and not force and reason is None:
         raise OutputError(
-            "exists", f"{str(out)!r} exists already", "choose another --out, or replace it with --force", path=str(out)
+            "exists",
+            f"{str(out)!r} exists already",
+            "replace it as its next version with --reason TEXT, or choose another --out",
+            path=str(out),
         )
     console = terminal.console(stderr=True)
     with console.status("reading the runs", spinner="line") as status:
-        baseline = learn(runs, report=status.update)
-    baseline.save(out)
-    found = _found(baseline)
-    print(to_json({"baseline": str(out)} | found) if as_json else f"{_sentences(found)}\n{out}")
+        learned = learn(runs or [], report=status.update)
+    before = _previous(out, force=force)
+    baseline = _saved(learned, before, out, reason or "")
+    found, replaced = _found(baseline), None if before is None or before.id == baseline.id else before.id
+    named = {"baseline": str(out), "id": baseline.id, "replaces": replaced, "reason": baseline.reason}
+    print(to_json(named | found) if as_json else f"{_sentences(found)}\n{_place(baseline, before, out)}")
+
+
+def _check_alone(runs: list[Path] | None, out: Path | None) -> None:
+    """UsageError if something is to be learned too."""
+    if runs or out is not None:
+        raise UsageError(
+            "conflict", "a history is listed, or a baseline is learned", "give --history alone", options=["--history"]
+        )
+
+
+def _previous(out: Path, *, force: bool) -> Baseline | None:
+    """The baseline in the file to be written; with `force` another file is replaced without a trace."""
+    from livebode.monitoring import Baseline
+
+    try:
+        return Baseline.load(out) if out.exists() else None
+    except BaselineError:
+        if not force:
+            raise
+        return None
+
+
+def _saved(learned: Baseline, before: Baseline | None, out: Path, reason: str) -> Baseline:
+    if before is not None:
+        return learned.save_version(out, reason)
+    first = replace(learned, reason=reason)
+    first.save(out)
+    return first
+
+
+def _place(baseline: Baseline, before: Baseline | None, out: Path) -> str:
+    from livebode.monitoring import retained_file
+
+    if before is None:
+        return f"{out}, version {baseline.id}"
+    if before.id == baseline.id:
+        return f"{out}, version {baseline.id}, is unchanged: what was learned is the same"
+    return f"{out}, version {baseline.id}; the previous one is retained as {retained_file(out, before.id)}"
 
 
 def _found(baseline: Baseline) -> dict[str, Any]:
@@ -155,3 +219,33 @@ def _coarse(found: dict[str, Any]) -> str:
 def _between(low: float, high: float) -> str:
     one, other = f"{low:.3g}", f"{high:.3g}"
     return f"of {one}" if one == other else f"from {one} to {other}"
+
+
+def _history(path: Path, *, as_json: bool) -> str:
+    """The versions of the baseline in a file, the newest first."""
+    from livebode.monitoring import Baseline, retained_file
+
+    baseline = Baseline.load(path)
+    versions = [
+        {
+            "id": version.id,
+            "learned": version.learned or None,
+            "reason": version.reason,
+            "runs": list(version.runs),
+            "file": str(file) if file.exists() else None,
+        }
+        for version, file in [
+            (baseline.version, path),
+            *((version, retained_file(path, version.id)) for version in baseline.history),
+        ]
+    ]
+    if as_json:
+        return to_json({"baseline": str(path), "versions": versions})
+    return "\n".join([f"{path}: {counted(len(versions), 'version')}, the newest first", *map(_version, versions)])
+
+
+def _version(version: dict[str, Any]) -> str:
+    when = (version["learned"] or "at an unknown time").replace("T", " ").replace("+00:00", " UTC")
+    reason = f"reason: {version['reason']}" if version["reason"] else "no reason stated"
+    file = version["file"] or "its file is not here"
+    return f"{version['id']}  learned {when}; {reason}\n    {file}\n    from {', '.join(version['runs'])}"

@@ -10,9 +10,11 @@ import typer
 
 from livebode.cli.options import Json
 from livebode.cli.pictures import margins_in_short
+from livebode.cli.remote import results_directory
 from livebode.configuration import Axis
 from livebode.core import RecordError
 from livebode.core.writing import writing
+from livebode.locations import location
 from livebode.margins.margins import WORDS
 from livebode.records import to_json
 
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def margins_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
     axis: Annotated[
         Path | None,
         typer.Option(metavar="AXIS.toml", help="Read \\[loop] and \\[fit] from this file instead of the run."),
@@ -45,8 +47,9 @@ def margins_command(
     given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
     section = FitSection.model_validate(given) if given else None
     found = loop_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity)
-    with writing(directory, RecordError):
-        picture = save_loop_picture(found, directory, title=directory.name)
+    into = results_directory(directory)
+    with writing(into, RecordError):
+        picture = save_loop_picture(found, into, title=directory.name)
     if as_json:
         print(to_json(found.plain()))
         return

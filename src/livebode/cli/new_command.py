@@ -17,6 +17,7 @@ from livebode.cli.shell import command_line
 from livebode.core import OutputError, UsageError
 from livebode.core.files import write_whole
 from livebode.core.writing import writing
+from livebode.locations import Location, Url, location
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,7 +36,7 @@ _MODELS = ("none", "auto", "rigid", "two-mass", "three-mass")
 
 
 def new_command(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A recording.")],
+    log: Annotated[str, typer.Argument(metavar="LOG", help="A recording.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The configuration to write.")] = Path("axis.toml"),
     excitation: Excitation = None,
     input_: Annotated[
@@ -73,7 +74,8 @@ def new_command(
     asks = not (yes or as_json)
     _check_new(out, force)
     given = {"excitation": excitation, "input": input_, "output": output, "schedule": schedule}
-    recording = open_log(log, rate_hz=rate, time=time, dbc=dbc)
+    place = location(log)
+    recording = open_log(place, rate_hz=rate, time=time, dbc=dbc)
     if asks:
         _check_terminal()
     recording.naming([name for name in given.values() if name and name != _NONE])
@@ -87,7 +89,7 @@ def new_command(
     still = "schedule" not in signals
     averages = average if average is not None else _agrees(console, "Average over all periods, for a standstill", still)
     model = fit or _ask(console, "Model to fit to the responses", "none", _MODELS)
-    source = {"log": _relative(log, out), "rate_hz": rate, "time": time, "dbc": dbc and _relative(dbc, out)}
+    source = {"log": _relative(place, out), "rate_hz": rate, "time": time, "dbc": dbc and _relative(dbc, out)}
     tables: dict[str, dict[str, Any]] = {
         "source": {key: value for key, value in source.items() if value is not None},
         "signals": signals,
@@ -98,7 +100,7 @@ def new_command(
         print(f"livebode: {doubt}", file=sys.stderr)
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(out, result.text(log.name).encode())
+        write_whole(out, result.text(place.name).encode())
     if as_json:
         print(to_json({"file": str(out), "configuration": result.tables}))
         return
@@ -215,8 +217,10 @@ def _ended_input() -> Iterator[None]:
         raise KeyboardInterrupt from None
 
 
-def _relative(path: Path, out: Path) -> str:
-    """A path as the configuration names it, relative to itself."""
+def _relative(path: Location, out: Path) -> str:
+    """A path as the configuration names it, relative to itself; a URL without a secret."""
+    if isinstance(path, Url):
+        return str(path)
     if path.is_absolute():
         return path.as_posix()
     return Path(os.path.relpath(path, out.parent)).as_posix()

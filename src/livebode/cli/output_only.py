@@ -11,6 +11,7 @@ from typing import Any
 from livebode.cli.pictures import one_drawing_at_a_time
 from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.core import counted
+from livebode.locations import original
 from livebode.runtime import OutputOnlyOutcome
 
 
@@ -52,7 +53,7 @@ def show_modes(outcome: OutputOnlyOutcome) -> None:
         print_drawn(text)
     for line in mode_lines(outcome.summary):
         print(line)
-    print(f"{outcome.directory}/")
+    print(f"{original(str(outcome.directory))}/")
 
 
 def mode_lines(summary: dict[str, Any]) -> list[str]:

@@ -15,6 +15,7 @@ from livebode.core import Model, Responses, counted
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.fitting import Fit
 from livebode.fitting.common_poles import CommonPoles
+from livebode.locations import original
 from livebode.runtime import Draw, Outcome
 
 _ALARMS_SHOWN = 8
@@ -52,7 +53,7 @@ def show(outcome: Outcome) -> None:
             unicode="utf" in (sys.stdout.encoding or "").lower(),
         )
     )
-    print(f"{tracked_amount(outcome.summary)}\n{outcome.directory}/")
+    print(f"{tracked_amount(outcome.summary)}\n{original(str(outcome.directory))}/")
     found = outcome.summary["found"]
     for line in _judged(found):
         print(line)

@@ -12,11 +12,15 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.options import Json
 from livebode.core import UsageError
+from livebode.locations import location
 from livebode.records import RunRecord, to_json
 
 
 def query_command(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory; also of a run that is still recording.")],
+    run: Annotated[
+        Path,
+        typer.Argument(metavar="RUN", help="Run directory; also of a run that is still recording.", parser=location),
+    ],
     sql: Annotated[str, typer.Argument(help="SQL query on the tables responses, parameters, samples and events.")],
     rows: Annotated[int, typer.Option(min=1, max=10_000_000, help="Maximum number of rows to print.")] = 1000,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print the result as CSV.")] = False,

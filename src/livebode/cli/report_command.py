@@ -11,6 +11,7 @@ import typer
 
 from livebode.cli.documents import write_documents
 from livebode.cli.options import Json
+from livebode.cli.remote import results_directory
 from livebode.cli.report_options import (
     Appendix,
     Ask,
@@ -26,6 +27,7 @@ from livebode.cli.report_options import (
     Template,
     header,
 )
+from livebode.locations import location
 
 if TYPE_CHECKING:
     from livebode.reporting.report_data import Judged
@@ -34,11 +36,16 @@ _NOT_ALL_MET = 4
 
 
 def report_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory; the run need not be finished.")],
+    directory: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Run directory; the run need not be finished.", parser=location)
+    ],
     on: Annotated[
         Path | None,
         typer.Option(
-            "--on", metavar="LOG", help="Validate the model on this recording, which the run does not contain."
+            "--on",
+            metavar="LOG",
+            help="Validate the model on this recording, which the run does not contain.",
+            parser=location,
         ),
     ] = None,
     out: Annotated[
@@ -87,7 +94,9 @@ def report_command(
     with moments_by(run.clock), in_language(language or first.language or "en"):
         of = read(directory, judged, first)
         document = report_of(of, made=datetime.now(UTC), appendix=appendix)
-        files, remark = write_documents(document, out or directory / "report", force=force or out is None)
+        files, remark = write_documents(
+            document, out or results_directory(directory) / "report", force=force or out is None
+        )
     results = [a.result for a in of.accepted]
     if as_json:
         found = {"files": list(map(str, files)), "verdict": document.result[0].tone}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -16,10 +16,12 @@ from livebode.cli.notices import NoticePrinter
 from livebode.cli.options import Dbc, Excitation, From, Json, Outputs, Port, Rate, Serve, SkipPeriods, Time, To
 from livebode.cli.output_only import draw_modes, show_modes
 from livebode.cli.pictures import drawing, show, tracked_amount
+from livebode.cli.remote import recorded_at
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
 from livebode.configuration.axis import ServeSection
-from livebode.core import ConfigError, LivebodeError, UsageError
+from livebode.core import ConfigError, LivebodeError, LocationError, UsageError
+from livebode.locations import Location, Url, local_copy, location, original
 from livebode.records import to_json
 from livebode.runtime import (
     Destination,
@@ -41,7 +43,7 @@ T = TypeVar("T")
 
 def run_command(
     targets: Annotated[
-        list[Path],
+        list[str],
         typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or several that are averaged, or a configuration."),
     ],
     excitation: Excitation = None,
@@ -108,7 +110,9 @@ def run_command(
         list[str] | None,
         typer.Option(metavar="CHANNEL", help="Channel that a baseline may depend on, such as a temperature."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Run directory. \\[default: runs/<name>]")] = None,
+    out: Annotated[
+        str | None, typer.Option(metavar="DIR", help="Run directory, or its URL. \\[default: runs/<name>]")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run in that directory.")] = False,
     accept_roles: Annotated[
         bool,
@@ -168,9 +172,10 @@ def run_command(
     }
     specified = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
     over = {section: values for section, values in specified.items() if values} | ({"record": {}} if go_on else {})
-    target = targets[0]
+    places = [location(target) for target in targets]
+    target = places[0]
     over |= _output_only(target, output_only, output or [], band)
-    if len(targets) > 1 and any(path.suffix.lower() == ".toml" for path in targets):
+    if len(places) > 1 and any(place.suffix.lower() == ".toml" for place in places):
         raise UsageError(
             "conflict",
             "a configuration cannot be combined with other arguments",
@@ -178,7 +183,7 @@ def run_command(
             argument="log",
         )
     each = [] if output_only else output or []
-    file = ConfigurationFile(target, over) if target.suffix.lower() == ".toml" else None
+    file = _file(target, over)
     if file is not None and len(each) > 1:
         raise UsageError(
             "conflict",
@@ -186,26 +191,46 @@ def run_command(
             "write an axis for each in [axes]",
             argument="output",
         )
-    axes: Axes = _axes(targets, over, each) if file is None else file.read()
-    directory = out or Path("runs") / target.stem
+    axes: Axes = _axes(places, over, each) if file is None else file.read()
     live = any(axis.source.live for axis in axes.values())
-    if (alone := axes.get("")) is not None and alone.output_only is not None:
-        _run_output_only(alone, directory, force, as_json, serve)
-        return
-    with served(serve, _serving(axes), port, [name or target.stem for name in axes], stays=not live) as subscribers_of:
-        if list(axes) == [""] and not live:
-            _show(_run(axes[""], directory, force, as_json, subscribers_of(target.stem)), as_json)
-        else:
-            _run_axes(axes, directory, force, as_json, file, lambda name: subscribers_of(name or target.stem))
+    alone = axes.get("")
+    names = [name or target.stem for name in axes]
+    place = Path("runs") / target.stem if out is None else location(out)
+    segments = live or any(axis.record is not None for axis in axes.values())
+    with recorded_at(place, segments=segments) as (directory, send):
+        if alone is not None and alone.output_only is not None:
+            _run_output_only(alone, directory, force, as_json, serve, send)
+            return
+        with served(serve, _serving(axes), port, names, stays=not live) as subscribers_of:
+            if alone is not None and not live:
+                outcome = _run(alone, directory, force, as_json, subscribers_of(target.stem))
+                send()
+                _show(outcome, as_json)
+            else:
+                _run_axes(axes, directory, force, as_json, file, lambda name: subscribers_of(name or target.stem), send)
 
 
-def _output_only(target: Path, chosen: bool, outputs: list[str], band: str | None) -> dict[str, Any]:
+def _file(target: Location, over: Mapping[str, Mapping[str, Any]]) -> ConfigurationFile | None:
+    """The configuration that is run; None for a recording."""
+    if target.suffix.lower() != ".toml":
+        return None
+    if isinstance(target, Url):
+        raise LocationError(
+            "not-possible",
+            f"the configuration {target} is at a URL",
+            "copy it to this computer; the recordings that it names may be at URLs",
+            path=str(target),
+        )
+    return ConfigurationFile(target, over)
+
+
+def _output_only(target: Location, chosen: bool, outputs: list[str], band: str | None) -> dict[str, Any]:
     """The section of an output-only run; nothing for another one, and UsageError if that has a band."""
     if chosen:
         others = {"others": outputs[1:]} if outputs[1:] else {}
         return {"output_only": others | ({"band_hz": parsed_band(band)} if band else {})}
-    if band and target.suffix.lower() == ".toml":
-        axes = ConfigurationFile(target, {}).read().values()
+    if band and (file := _file(target, {})) is not None:
+        axes = file.read().values()
         if all(axis.output_only is not None for axis in axes):
             return {"output_only": {"band_hz": parsed_band(band)}}
     if band:
@@ -233,7 +258,7 @@ def _serving(axes: Axes) -> ServeSection:
     return first.serve
 
 
-def _axes(recordings: list[Path], specified: dict[str, dict[str, Any]], outputs: list[str]) -> Axes:
+def _axes(recordings: list[Location], specified: dict[str, dict[str, Any]], outputs: list[str]) -> Axes:
     """The configuration of recordings; of several outputs one axis for each, with a name that a directory can have."""
     if len(outputs) < 2:
         return {"": _axis(recordings, specified)}
@@ -247,11 +272,12 @@ def _axes(recordings: list[Path], specified: dict[str, dict[str, Any]], outputs:
     return found
 
 
-def _axis(recordings: list[Path], specified: dict[str, dict[str, Any]]) -> Axis:
+def _axis(recordings: list[Location], specified: dict[str, dict[str, Any]]) -> Axis:
     """The configuration of recordings from the options."""
     if "output" not in specified.get("signals", {}):
         for recording in recordings:
-            read_head(recording)  # a file that is missing or a directory is the first thing to mend
+            with local_copy(recording) as path:
+                read_head(path)  # a file that is missing or a directory is the first thing to mend
         raise UsageError(
             "missing",
             "the output channel is not named",
@@ -284,7 +310,9 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool, subscribers: tup
     )
 
 
-def _run_output_only(axis: Axis, directory: Path, force: bool, as_json: bool, serve: bool) -> None:
+def _run_output_only(
+    axis: Axis, directory: Path, force: bool, as_json: bool, serve: bool, send: Callable[[], None]
+) -> None:
     """Track the modes of one recording, and print the result."""
     if serve:
         raise UsageError(
@@ -299,8 +327,9 @@ def _run_output_only(axis: Axis, directory: Path, force: bool, as_json: bool, se
         return run_output_only(axis, directory, lambda into: draw_modes(into, title), force=force, subscribers=own)
 
     outcome = _with_progress(job, as_json)
+    send()
     if as_json:
-        print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
+        print(to_json({"directory": original(str(outcome.directory))} | outcome.summary), flush=True)
     else:
         show_modes(outcome)
 
@@ -336,6 +365,7 @@ def _run_axes(
     as_json: bool,
     file: ConfigurationFile | None,
     subscribers_of: SubscribersOf,
+    send: Callable[[], None],
 ) -> None:
     """Track live sources or several axes until all have ended."""
     from livebode.cli.axes_terminal import AxesTerminal, plain
@@ -347,6 +377,7 @@ def _run_axes(
     shown = AxesTerminal(quiet=as_json)
     session = Session(axes, to, report=shown.print_event, leave=shown.leave, file=file)
     shown.run(session)
+    send()
     if session.ended_by and all(thread.ended_early for thread in session.all):
         raise KeyboardInterrupt if session.ended_by == signal.SIGINT else SystemExit(128 + session.ended_by)
     if "" in session.threads:
@@ -356,7 +387,9 @@ def _run_axes(
         print(to_json({"axes": plain(session)}))
     for thread in session.all:
         if thread.outcome is not None and not as_json:
-            print(f"{thread.name}: {tracked_amount(thread.outcome.summary)}\n{thread.outcome.directory}/")
+            print(
+                f"{thread.name}: {tracked_amount(thread.outcome.summary)}\n{original(str(thread.outcome.directory))}/"
+            )
     errors = [thread.error for thread in session.all if thread.error is not None and not thread.ended_early]
     if errors:
         raise typer.Exit(2 if all(isinstance(error, (LivebodeError, StoppedError)) for error in errors) else 1)
@@ -369,6 +402,6 @@ def _drawing(axis: Axis) -> Draw:
 
 def _show(outcome: Outcome, as_json: bool) -> None:
     if as_json:
-        print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
+        print(to_json({"directory": original(str(outcome.directory))} | outcome.summary), flush=True)
     else:
         show(outcome)

@@ -10,18 +10,22 @@ import typer
 from livebode.cli.options import Json
 from livebode.core import UsageError
 
-_FILES = ("axis", "experiment")
+_FILES = ("axis", "experiment", "archive")
 
 
 def schema_command(
-    file: Annotated[str, typer.Argument(metavar="axis|experiment", help="The file: axis.toml or experiment.toml.")],
+    file: Annotated[
+        str,
+        typer.Argument(metavar="axis|experiment|archive", help="The file: axis.toml, experiment.toml or archive.toml."),
+    ],
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="File to write. \\[default: standard output]")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Print the JSON Schema of axis.toml or experiment.toml: an editor uses it to complete and check the keys.
+    """Print the JSON Schema of axis.toml, experiment.toml or archive.toml: an editor uses it to complete and check
+    the keys.
 
     The first line of the TOML file names the schema for the editor: `#:schema ./axis.schema.json`.
     """
@@ -39,6 +43,8 @@ def schema_command(
         )
     if file == "axis":
         from livebode.configuration.schema import axis_schema as schema
+    elif file == "archive":
+        from livebode.archive.settings import archive_schema as schema
     else:
         from livebode.experiments.experiment_schema import experiment_schema as schema
     text = to_json(schema(), indent=2)

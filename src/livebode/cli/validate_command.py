@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from livebode.cli.options import Excitation, Json, Output
+from livebode.cli.remote import results_directory
 from livebode.configuration import Axis
 from livebode.core import LivebodeError, RecordError
 from livebode.core.writing import writing
 from livebode.fitting import POLE_MODELS
+from livebode.locations import location
 from livebode.records import RunRecord, to_json
 from livebode.runtime import Destination, run
 
@@ -24,9 +26,15 @@ Channels = dict[str, str | None]
 
 
 def validate_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
     on: Annotated[
-        Path, typer.Option("--on", metavar="LOG|RUN", help="A recording that the run does not contain, or another run.")
+        Path,
+        typer.Option(
+            "--on",
+            metavar="LOG|RUN",
+            help="A recording that the run does not contain, or another run.",
+            parser=location,
+        ),
     ],
     model: Annotated[
         list[str] | None,
@@ -103,8 +111,9 @@ def _simulated(
     from livebode.report import save_validation_picture
 
     found, notes = validate_run(directory, on, sections, lags=lags, samples=samples, channels=channels)
-    with writing(directory, RecordError):
-        picture = save_validation_picture(found, directory, title=f"{directory.name} on {on.name}")
+    into = results_directory(directory)
+    with writing(into, RecordError):
+        picture = save_validation_picture(found, into, title=f"{directory.name} on {on.name}")
     return found, notes, picture
 
 

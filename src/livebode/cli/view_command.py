@@ -10,6 +10,7 @@ import typer
 from livebode.cli.options import Port
 from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
 from livebode.configuration.axis import ServeSection, serve_section
+from livebode.locations import location
 
 
 def view_command(
@@ -18,6 +19,7 @@ def view_command(
         typer.Argument(
             metavar="RUN...",
             help="Run directories, also of runs that are still recording; or one directory that contains runs.",
+            parser=location,
         ),
     ],
     port: Port = None,

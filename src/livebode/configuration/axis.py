@@ -17,6 +17,7 @@ from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, Quantity, counted, nearest_name
 from livebode.output_only import OUTPUTS_MAX
 from livebode.sources.live import SourceSettings, checked_address
+from livebode.sources.live.settings import check_keys
 
 SAME_RATE = 1e-6
 BUDGET_BYTES_MIN = 16 << 20
@@ -528,11 +529,11 @@ class Axis(_Section):
             axis = cls.model_validate(data)
         except ValidationError as error:
             raise _first_of(error).at(origin) from None
-        if (axis.source.log is None) == (axis.source.url is None):
+        if sum(named is not None for named in (axis.source.log, axis.source.url, axis.source.replay)) != 1:
             raise ConfigError(
                 "key-conflict",
-                "[source] needs either a log or a url",
-                "set source.log for a recording, or source.url for a live source",
+                "[source] needs either a log, a url or a replay",
+                "set source.log for a recording, source.url for a live source, or source.replay for a recorded one",
                 key="source",
             ).at(origin)
         if len(axis.source.logs) > 1 and (keys := _of_one_recording(axis)):
@@ -544,6 +545,8 @@ class Axis(_Section):
             ).at(origin)
         if axis.source.url is not None:
             checked_address(axis.source.url, axis.source)
+        if axis.source.replay is not None:
+            check_keys(axis.source, "replay")
         if axis.output_only is not None:
             check_output_only(axis, origin)
         return axis

@@ -11,7 +11,7 @@ _USED = {
     "lines": {"window"},
     "tracking": {"hop"},
 }
-_USED_WHOLE = {"source", "output_only", "serve"}
+_USED_WHOLE = {"source", "output_only", "serve", "machine"}
 
 
 def check_output_only(axis: BaseModel, origin: str) -> None:

@@ -27,7 +27,7 @@ def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:
     RecordError
         If a section that is used again is not in the form that a run writes.
     """
-    found = dict(_kept(summary.get("configuration", {})))
+    found = dict(without_null(summary.get("configuration", {})))
     for name, section in _SECTIONS.items():
         try:
             section.model_validate(found.get(name, {}))
@@ -55,6 +55,7 @@ def recorded_report(summary: dict[str, Any]) -> ReportSection:
     return report if report.machine else report.over({"machine": path})
 
 
-def _kept(values: dict[str, Any]) -> dict[str, Any]:
+def without_null(values: dict[str, Any]) -> dict[str, Any]:
+    """The values that are not null, also in inner tables."""
     kept = {name: value for name, value in values.items() if value is not None}
-    return {name: _kept(value) if isinstance(value, dict) else value for name, value in kept.items()}
+    return {name: without_null(value) if isinstance(value, dict) else value for name, value in kept.items()}

@@ -6,6 +6,7 @@ from typing import Any
 
 from livebode.configuration.axis import Axis
 from livebode.core import LivebodeError, RecordingError
+from livebode.locations import local_copy
 from livebode.sources import Log, open_log
 from livebode.sources.uneven import UNEVEN, UnevenLog, open_uneven
 
@@ -24,15 +25,16 @@ def open_even_or_uneven(axis: Axis) -> Log | UnevenLog:
     if axis.tracking.estimator == "direct":
         named = [signals.input, *named]
     names = list(dict.fromkeys(name for name in named if name))
-    try:
-        log = open_recording(axis)
-        for name in names:
-            _check_clock(log, name)
-        return log
-    except RecordingError as error:
-        if error.code not in UNEVEN or source.time == "none":
-            raise
-    return open_uneven(path, names, **_reading(axis))
+    with local_copy(path):
+        try:
+            log = open_recording(axis)
+            for name in names:
+                _check_clock(log, name)
+            return log
+        except RecordingError as error:
+            if error.code not in UNEVEN or source.time == "none":
+                raise
+        return open_uneven(path, names, **_reading(axis))
 
 
 def _reading(axis: Axis) -> dict[str, Any]:

@@ -78,7 +78,7 @@ def axis_schema() -> Schema:
         "propertyNames": {"pattern": f"^{NAME.pattern}$", "not": {"pattern": f"^{SUCCESSOR.pattern}$"}},
         "additionalProperties": {"$ref": "#/$defs/Axis"},
     }
-    required["properties"]["source"] = {"anyOf": [{"required": ["log"]}, {"required": ["url"]}]}
+    required["properties"]["source"] = {"anyOf": [{"required": [key]} for key in ("log", "url", "replay")]}
     return found | {
         "properties": found["properties"] | {"axes": axes},
         "if": {"required": ["axes"]},
@@ -109,7 +109,11 @@ def _source() -> Schema:
         "if": {"required": ["follow", "log"], "properties": {"follow": {"const": True}}},
         "then": {"propertyNames": {"enum": sorted(LOG | EVERY)}},
     }
-    return {"not": {"required": ["log", "url"]}, "allOf": [*kinds, growing]}
+    replaying = {
+        "if": {"required": ["replay"]},
+        "then": {"propertyNames": {"enum": sorted(EVERY | {"replay"})}},
+    }
+    return {"not": {"required": ["log", "url"]}, "allOf": [*kinds, growing, replaying]}
 
 
 _EXTRA = {SourceSettings: _source}

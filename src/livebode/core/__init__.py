@@ -15,6 +15,7 @@ from livebode.core._unit_reading import QuantityKind, UnitReading, read_unit, sp
 from livebode.core._wording import counted, plural, rounded_down
 from livebode.core.controllers import PID, Cascade, PositionPD
 from livebode.core.errors import (
+    ArchiveError,
     BaselineError,
     ConfigError,
     DamageWarning,
@@ -24,6 +25,7 @@ from livebode.core.errors import (
     FleetError,
     GridError,
     LivebodeError,
+    LocationError,
     OutputError,
     RecordError,
     RecordingError,
@@ -50,6 +52,7 @@ __all__ = [
     "PER_RESPONSE",
     "PID",
     "SPIKE",
+    "ArchiveError",
     "BaselineError",
     "Block",
     "Cascade",
@@ -66,6 +69,7 @@ __all__ = [
     "GridError",
     "Lines",
     "LivebodeError",
+    "LocationError",
     "Loop",
     "Model",
     "OutputError",

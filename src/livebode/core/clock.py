@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from math import isfinite, nan
 from typing import Any, Literal
 
@@ -121,6 +121,17 @@ def date_and_time(unix_s: float) -> str:
     The zone is that of the environment's TZ, daylight saving included.
     """
     return date(datetime.fromtimestamp(unix_s).astimezone())
+
+
+def iso_utc(unix_s: float) -> str | None:
+    """Seconds since 1970 as ISO 8601 in UTC, with milliseconds; None outside of the years 1970 to 5138.
+
+    >>> iso_utc(1_700_000_000.25), iso_utc(-1.0)
+    ('2023-11-14T22:13:20.250Z', None)
+    """
+    if not 0 <= unix_s < _DATES_TO_S:
+        return None
+    return datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def moment_of_start() -> str:

@@ -153,8 +153,9 @@ class Parameters(RowArrays):
         if (ok := self.ok).any():
             at, sigma = self.value[ok], self.sigma[ok]
             moving = np.flatnonzero((sigma > 0).any(axis=0))  # a fixed parameter contributes nothing
-            # For a parameter near zero, sigma gives the scale of a small step.
-            size = _STEP * np.maximum(np.abs(at), sigma)[:, moving]
+            # For a parameter near zero, sigma gives the scale of a small step; one fixed at zero in this row has none.
+            scale = np.maximum(np.abs(at), sigma)[:, moving]
+            size = _STEP * np.where(scale > 0, scale, 1.0)
             steps = size[..., np.newaxis] * np.eye(n)[moving]
             both = of(at[:, np.newaxis] + steps), of(at[:, np.newaxis] - steps)
             slope = (both[0] - both[1]) / (2 * size[..., np.newaxis])

@@ -19,6 +19,7 @@ from typing import Any, ClassVar, NamedTuple, NoReturn, Protocol
 import numpy as np
 
 from livebode.core.errors import StateError
+from livebode.version import __version__
 
 ENCODING = 1
 """Version of the encoding itself."""
@@ -34,10 +35,14 @@ _INVALID = ArithmeticError, AssertionError, AttributeError, LookupError, TypeErr
 
 
 class Stage(NamedTuple):
-    """Name of a stage in its states, and the version of their content. Neither depends on the name of a class."""
+    """Name of a stage in its states, and the version of their content. Neither depends on the name of a class.
+
+    `converts_from` is the oldest version that the stage converts; None: it reads only its own.
+    """
 
     name: str
     version: int
+    converts_from: int | None = None
 
 
 class Stateful(Protocol):
@@ -72,8 +77,8 @@ class StatefulBase:
         Raises
         ------
         StateError
-            If the snapshot is damaged, or from another stage, other settings or a newer version; nothing has changed
-            then.
+            If the snapshot is damaged, or from another stage, other settings, a newer version or one that is too old;
+            nothing has changed then.
         """
         state, before = decode(self._stage, snapshot, self._identity), self.snapshot()
         if (version := _head(self._stage, snapshot)[0]) < self._stage.version:
@@ -135,6 +140,7 @@ def encode(stage: Stage, values: Mapping[str, Any], identity: str = "") -> bytes
     description = {
         "stage": stage.name,
         "settings": _fingerprint(identity),
+        "livebode": __version__,
         "plain": plain,
         "arrays": {name: (array.dtype.str, array.shape) for name, array in arrays.items()},
         "parts": {name: len(part) for name, part in parts.items()},
@@ -168,10 +174,25 @@ def decode(stage: Stage, data: bytes, identity: str = "") -> dict[str, Any]:
             values[name], at = bytes(data[at : at + length]), at + length
         if at != len(data):
             raise ValueError(f"{len(data)} bytes instead of {at}")
-        name, settings = found["stage"], found["settings"]
+        name, settings, writer = found["stage"], found["settings"], str(found.get("livebode", ""))
     except (*_INVALID, RecursionError) as error:
         _damaged(stage, str(error))
-    _check(stage, name, version, identity, settings)
+    if name != stage.name:
+        raise StateError(
+            "other-stage",
+            f"the state belongs to {name!r}, not to {stage.name!r}",
+            "restore it into that",
+            name=stage.name,
+            found=name,
+        )
+    _check_version(stage, version, writer)
+    if settings != _fingerprint(identity):
+        raise StateError(
+            "other-settings",
+            f"the state belongs to {name!r} with other settings",
+            "restore it into one with the same settings",
+            name=name,
+        )
     return values
 
 
@@ -202,39 +223,54 @@ def _head(stage: Stage, data: bytes) -> tuple[int, bytes, int, int]:
         _damaged(stage, "wrong checksum of its head")
     _, encoding, version, length, check = _HEAD.unpack_from(data)
     if encoding > ENCODING:
-        _newer(stage, encoding, ENCODING)
+        _newer(stage, encoding, ENCODING, _writer(data))
     return version, data[_SIZE : _SIZE + length], _SIZE + length, check
 
 
-def _check(stage: Stage, name: str, version: int, identity: str, settings: str) -> None:
-    if name != stage.name:
-        raise StateError(
-            "other-stage",
-            f"the state belongs to {name!r}, not to {stage.name!r}",
-            "restore it into that",
-            name=stage.name,
-            found=name,
-        )
+def _check_version(stage: Stage, version: int, writer: str) -> None:
+    oldest = stage.version if stage.converts_from is None else stage.converts_from
     if version > stage.version:
-        _newer(stage, version, stage.version)
-    if settings != _fingerprint(identity):
+        _newer(stage, version, stage.version, writer)
+    if version < oldest:
         raise StateError(
-            "other-settings",
-            f"the state belongs to {name!r} with other settings",
-            "restore it into one with the same settings",
-            name=name,
+            "older-version",
+            f"{_written(stage, version, writer)}, which reads from version {oldest} on",
+            _remedy(writer),
+            name=stage.name,
+            found=version,
+            readable=oldest,
+            written_by=writer,
         )
 
 
-def _newer(stage: Stage, found: int, readable: int) -> NoReturn:
+def _newer(stage: Stage, found: int, readable: int, writer: str) -> NoReturn:
     raise StateError(
         "newer-version",
-        f"the state of {stage.name!r} has version {found}, and this livebode reads up to version {readable}",
-        "update livebode",
+        f"{_written(stage, found, writer)}, which reads up to version {readable}",
+        _remedy(writer),
         name=stage.name,
         found=found,
         readable=readable,
+        written_by=writer,
     )
+
+
+def _written(stage: Stage, version: int, writer: str) -> str:
+    by = f"livebode {writer}" if writer else "another livebode"
+    return f"the state of {stage.name!r} has version {version}, written by {by}; this is livebode {__version__}"
+
+
+def _remedy(writer: str) -> str:
+    return f"finish the run with {f'livebode {writer}' if writer else 'the version that began it'}, or start a new run"
+
+
+def _writer(data: bytes) -> str:
+    """The livebode that wrote a state in another encoding, if its description says that as this encoding does."""
+    length = _HEAD.unpack_from(data)[3]
+    try:
+        return str(json.loads(data[_SIZE : _SIZE + length])["livebode"])
+    except (*_INVALID, RecursionError):
+        return ""
 
 
 def _damaged(stage: Stage, reason: str) -> NoReturn:

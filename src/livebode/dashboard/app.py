@@ -19,6 +19,8 @@ from livebode.dashboard.access import COOKIE, SESSION_S
 from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
 from livebode.dashboard.client import Client
+from livebode.dashboard.fleet_pages import FleetPages
+from livebode.dashboard.fleet_view import FleetView
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
 from livebode.dashboard.past import Past
@@ -36,8 +38,8 @@ _FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript
 _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
 
-def application(board: Board, serving: Serving, directory: Path | None = None) -> Guard:
-    """The ASGI application: the page of the board, or all runs of a directory, each with a board of its own."""
+def application(board: Board, serving: Serving, directory: Path | None = None, fleet: FleetView | None = None) -> Guard:
+    """The ASGI application: the page of the board, of a fleet, or all runs of a directory, each with its own board."""
     pages = _Pages(board, serving, _files())
     routes: list[BaseRoute] = [
         Route("/login", pages.login_page, methods=["GET"]),
@@ -46,7 +48,9 @@ def application(board: Board, serving: Serving, directory: Path | None = None) -
         Route("/logout", pages.logout, methods=["POST"]),
         Route("/static/{name:path}", pages.static),
     ]
-    if directory is None:
+    if fleet is not None:
+        routes += FleetPages(fleet, board, pages.file, pages.order).routes
+    elif directory is None:
         routes += _page_routes(pages)
     else:
         routes += RunsPages(
@@ -182,7 +186,7 @@ class _Pages:
         return await self._act(request, "unshelve")
 
     async def _act(self, request: Request, act: Act) -> Response:
-        data = await self._order(request)
+        data = await self.order(request)
         if isinstance(data, Response):
             return data
         self._board.act(act, alarm_request(data, len(self._board.states), act))
@@ -196,7 +200,7 @@ class _Pages:
 
     async def change_saved(self, request: Request) -> Response:
         """Save a reference or an annotation with a run, or remove one."""
-        data = await self._order(request)
+        data = await self.order(request)
         if isinstance(data, Response):
             return data
         change = queries.saved_change(data, len(self._board.states))
@@ -204,7 +208,7 @@ class _Pages:
         job = applied(change, Past.of(state), state)
         return JSONResponse(listed(await self._board.elsewhere(change_saved, _directory(state), job)))
 
-    async def _order(self, request: Request) -> bytes | Response:
+    async def order(self, request: Request) -> bytes | Response:
         """The JSON of an operator, or the answer to somebody else."""
         role = self._role(request)
         if role is None:

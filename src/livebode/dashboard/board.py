@@ -15,6 +15,7 @@ from livebode.dashboard.alarm_actions import acknowledgement, shelving, unshelvi
 from livebode.dashboard.alarm_requests import Act, AlarmRequest
 from livebode.dashboard.notices import Notice
 from livebode.dashboard.places import Places
+from livebode.dashboard.pulse import Pulse
 from livebode.dashboard.state import State
 from livebode.dashboard.verdict import verdict
 from livebode.dashboard.viewed import Viewed
@@ -24,22 +25,6 @@ _IDLE_S = 0.5
 _VIEW_EVERY_S = 1.0
 _JOBS_MAX = 8
 T = TypeVar("T")
-
-
-class _Pulse:
-    """Wakes all that wait for the next update."""
-
-    def __init__(self) -> None:
-        self._next = asyncio.Event()
-
-    async def wait_next(self) -> None:
-        """Wait for the next update."""
-        await self._next.wait()
-
-    def beat(self) -> None:
-        """Wake all that wait now."""
-        before, self._next = self._next, asyncio.Event()
-        before.set()
 
 
 class Board:
@@ -58,7 +43,7 @@ class Board:
     def __init__(self, states: list[State], viewed: dict[int, Viewed], access: Access) -> None:
         self.states, self.access = states, access
         self.places = Places(access.open)
-        self.pulse = _Pulse()
+        self.pulse = Pulse()
         self._viewed = viewed
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="livebode dashboard reads")
         self._jobs = 0

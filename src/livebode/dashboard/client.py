@@ -1,19 +1,18 @@
-"""The web socket of a browser: updates at its own rate, and its requests."""
+"""The web socket of a browser that watches an axis: updates at its own rate, and its requests."""
 
 from __future__ import annotations
 
-import asyncio
 import time
 from typing import TYPE_CHECKING, Any
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
-from livebode.core import LivebodeError, Responses, ServerError
+from livebode.core import Responses, ServerError
+from livebode.dashboard.browser_socket import BrowserSocket
 from livebode.dashboard.frames import frame, reference_kind
 from livebode.dashboard.message_times import with_times
 from livebode.dashboard.past import Past
 from livebode.dashboard.queries import ClientMessage, client_message
-from livebode.records import to_json
 from livebode.records.saved_curves import read_saved
 
 if TYPE_CHECKING:
@@ -23,70 +22,24 @@ if TYPE_CHECKING:
 HEALTH_EVERY_S = 0.5
 ROWS_EVERY_S = 0.1
 TRENDS_EVERY_S = 0.25
-SLOW_S = 20.0
-"""A browser that reads nothing for this time is disconnected."""
-DISPLACED = 4000
-"""Code of a web socket that is closed for another browser; the page reconnects later."""
 _ROWS_AT_ONCE = 400
-_REQUESTS_PER_S = 20
 
 
-class Client:
+class Client(BrowserSocket):
     """Sends the newest data that a browser watches; data for which it is too slow are skipped, never queued."""
 
     def __init__(self, board: Board, socket: WebSocket, role: str) -> None:
-        self._board, self._socket, self._role = board, socket, role
+        super().__init__(socket)
+        self._board, self._role = board, role
         self._watched = ClientMessage("watch")
         self._restart = True
         self._paused = False
-        self._displaced = asyncio.Event()
         self._references: dict[int, Responses] = {}
         self._sent: dict[str, Any] = {}
 
-    async def run(self) -> None:
-        """Serve until the browser disconnects or exceeds a limit."""
-        await self._socket.accept()
-        hearing = asyncio.create_task(self._hear())
-        saying = asyncio.create_task(self._send_news())
-        displaced = asyncio.create_task(self._displaced.wait())
-        tasks = {hearing, saying, displaced}
-        try:
-            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            for task in done:
-                task.result()
-            if displaced in done:
-                await asyncio.wait_for(self._socket.close(DISPLACED, "another browser took this place"), SLOW_S)
-        except (TimeoutError, WebSocketDisconnect, RuntimeError, OSError):
-            pass  # it is gone, or too slow
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-
-    def displace(self) -> None:
-        """Disconnect it: another browser has its place."""
-        self._displaced.set()
-
-    async def _hear(self) -> None:
-        count, since = 0, time.monotonic()
-        while True:
-            message = await self._socket.receive()
-            if message["type"] == "websocket.disconnect":
-                return
-            text = message.get("text")
-            now = time.monotonic()
-            if now - since > 1:
-                count, since = 0, now
-            count += 1
-            if count > _REQUESTS_PER_S:
-                await self._socket.close(1008, "too many messages")
-                return
-            try:
-                if text is None:
-                    raise ServerError("request-malformed", "a message is text, not bytes", "send text")
-                await self._heed(client_message(text, len(self._board.states)))
-            except (LivebodeError, KeyError) as error:
-                await self._send({"error": str(error)})
+    async def heed(self, text: str) -> None:
+        """Do what a message of the browser asks for."""
+        await self._heed(client_message(text, len(self._board.states)))
 
     async def _heed(self, asked: ClientMessage) -> None:
         if asked.kind == "watch":
@@ -125,7 +78,8 @@ class Client:
     def _state(self) -> State:
         return self._board.states[self._watched.axis]
 
-    async def _send_news(self) -> None:
+    async def send_news(self) -> None:
+        """Send changes until it is cancelled."""
         while True:
             state = self._state
             if self._restart:
@@ -134,7 +88,7 @@ class Client:
                 self._sent |= {"runs": state.runs, "finished": state.finished}
                 facts = state.facts() | {"role": self._role, "watched": state.shown(self._watched.quantity)}
                 trends = state.trends.plain(whole=True)
-                await self._send({"facts": facts, "axes": self._board.names, "span": state.span(), "trends": trends})
+                await self.send({"facts": facts, "axes": self._board.names, "span": state.span(), "trends": trends})
             elif (self._sent["runs"], self._sent["finished"]) != (state.runs, state.finished):
                 self._restart = True
                 continue
@@ -155,9 +109,9 @@ class Client:
             news["newest"] = state.trends.plain(whole=False)
             self._sent["trends"] = state.trends.version
         if news:
-            await self._send(news)
+            await self.send(news)
         if data := self._frames(state):
-            await asyncio.wait_for(self._socket.send_bytes(data), SLOW_S)
+            await self.send_bytes(data)
 
     def _frames(self, state: State) -> bytes:
         if state.quantities is None or state.newest is None:
@@ -185,6 +139,3 @@ class Client:
             return False
         self._sent[f"{what}_at"] = now
         return True
-
-    async def _send(self, news: dict[str, Any]) -> None:
-        await asyncio.wait_for(self._socket.send_text(to_json(news)), SLOW_S)

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from livebode.core import RecordError, ServerError
 from livebode.core.installing import not_installed
@@ -19,6 +19,9 @@ from livebode.dashboard.hub import Hub
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
+
+if TYPE_CHECKING:
+    from livebode.dashboard.fleet_view import FleetView
 
 HEADER_BYTES_MAX = 16 << 10
 BACKLOG = 4096
@@ -54,6 +57,7 @@ class Dashboard:
         self._states: list[State] = []
         self._viewed: dict[int, Viewed] = {}
         self._runs: Path | None = None
+        self._fleet: FleetView | None = None
         self._server: Any = None
         self._thread: threading.Thread | None = None
         self._socket: socket.socket | None = None
@@ -95,6 +99,10 @@ class Dashboard:
                 path=str(directory),
             )
         self._runs = directory
+
+    def view_fleet(self, fleet: FleetView) -> None:
+        """Show a fleet, instead of axes."""
+        self._fleet = fleet
 
     @property
     def url(self) -> str:
@@ -190,8 +198,8 @@ class Dashboard:
         self._faults = Faults(self._report)
         asyncio.get_running_loop().set_exception_handler(self._faults.handler)
         board = Board(self._states, self._viewed, Access(self._serving, self._report))
-        self._application = application(board, self._serving, self._runs)
-        beating = asyncio.create_task(board.run())
+        self._application = application(board, self._serving, self._runs, self._fleet)
+        beating = asyncio.create_task(board.run() if self._fleet is None else self._fleet.run())
         beating.add_done_callback(self._stopped)
         try:
             await self._server.serve()

@@ -90,13 +90,17 @@ class Healthy:
 
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Healthy | None:
-        """Read the baseline of the configuration; None if there is none. LivebodeError if the file cannot be read."""
+        """Read the baseline of the run, in the version that it was compared with; None if there is none.
+
+        LivebodeError if the file cannot be read.
+        """
         path = recorded_configuration(dict(summary)).get("monitoring", {}).get("baseline")
         if path is None:
             return None
-        from livebode.monitoring import Baseline  # with the simulation
+        from livebode.monitoring import Baseline, file_of  # with the simulation
 
-        tables = [table for table in Baseline.load(Path(path)).tables if table.what == "lines"]
+        file = file_of(Path(path), (summary.get("monitoring") or {}).get("baseline_id"))
+        tables = [table for table in Baseline.load(file).tables if table.what == "lines"]
         return cls(tables[0]) if tables else None
 
     def response(self, beside: Responses, before: float) -> Responses | None:

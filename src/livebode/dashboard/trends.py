@@ -27,7 +27,7 @@ class TrendRows(RowArrays):
     status: NDArray[Any]
 
 
-class Trend:
+class ParameterTrend:
     """Every n-th row of one parameter, with n doubled whenever there are too many, and the newest row."""
 
     def __init__(self, model: str, name: str, unit: str) -> None:
@@ -72,7 +72,7 @@ class Trends:
     """The trends of one run, by model and name."""
 
     def __init__(self) -> None:
-        self.by_name: dict[tuple[str, str], Trend] = {}
+        self.by_name: dict[tuple[str, str], ParameterTrend] = {}
         self.version = 0
 
     def take(self, parts: tuple[Parameters, ...]) -> None:
@@ -89,10 +89,10 @@ class Trends:
         if key not in self.by_name:
             if len(self.by_name) >= TRENDS_MAX:
                 return
-            self.by_name[key] = Trend(model, name, unit)
+            self.by_name[key] = ParameterTrend(model, name, unit)
         self.by_name[key].add(rows)
         self.version += 1
 
     def plain(self, *, whole: bool) -> list[dict[str, Any]]:
-        """Plain data for the page; see `Trend.plain`."""
+        """Plain data for the page; see `ParameterTrend.plain`."""
         return [trend.plain(whole=whole) for trend in self.by_name.values() if trend.newest is not None]

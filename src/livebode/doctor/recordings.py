@@ -9,16 +9,18 @@ from livebode.configuration.axis import Axis
 from livebode.configuration.recording import open_even_or_uneven
 from livebode.core import LivebodeError
 from livebode.doctor.check import Check
+from livebode.locations import Location
 from livebode.preparation.contents import ChannelSummary, contents_of
 
 
-def check_recording(name: str, axis: Axis, path: Path) -> Check:
+def check_recording(name: str, axis: Axis, path: Location) -> Check:
     """A recording that does not grow is read to its end."""
     facts = {"path": str(path)}
-    if not path.exists():
-        return Check(name, "failed", f"there is no recording {path}", "check source.log", facts)
-    if not os.access(path, os.R_OK):
-        return Check(name, "failed", f"{path} cannot be read", "check its permissions", facts)
+    if isinstance(path, Path):
+        if not path.exists():
+            return Check(name, "failed", f"there is no recording {path}", "check source.log", facts)
+        if not os.access(path, os.R_OK):
+            return Check(name, "failed", f"{path} cannot be read", "check its permissions", facts)
     if axis.source.follow:
         return Check(name, "ok", f"{path} can be read", facts=facts)
     own = axis.model_copy(update={"source": axis.source.model_copy(update={"log": path})})

@@ -22,6 +22,7 @@ from livebode.sources.live.secret import secret
 REMOVED = "[removed]"
 _SECRET_NAME = re.compile(r"pass(word|wd|phrase)|secret|token|credential|auth|user|login|api_?key", re.IGNORECASE)
 _USER_IN_URL = re.compile(r"(?<=://)[^\s\"'<>]*(?=@)")
+_QUERY_IN_URL = re.compile(r"https?://[^\s\"'<>?]*\?([^\s\"'<>]+)")
 _PIECES = re.compile(r"[^\w.%+~-]+")
 _LETTERS_MIN = 4
 """A shorter text is not looked for in others: it is in many words."""
@@ -64,9 +65,9 @@ class Secrets:
         return value if isinstance(value, int | float | None) else self.text(str(value))
 
     def text(self, text: str) -> str:
-        """A text without what was removed before, and without users in URLs."""
-        for user in _USER_IN_URL.findall(text):
-            self._removed(user)
+        """A text without what was removed before, and without users and queries in URLs."""
+        for secret_part in (*_USER_IN_URL.findall(text), *_QUERY_IN_URL.findall(text)):
+            self._removed(secret_part)
         for found in sorted(self._found, key=len, reverse=True):
             text = text.replace(found, REMOVED)
         return text

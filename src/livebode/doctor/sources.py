@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 from livebode.configuration.axis import Axis
-from livebode.core import LivebodeError
+from livebode.core import LivebodeError, counted
 from livebode.doctor.check import Check
 from livebode.doctor.recordings import check_recording
+from livebode.runtime.recorded_run import RecordedRun
 from livebode.sources.live import make_source
 from livebode.sources.live.address import Address
 
@@ -29,6 +30,9 @@ def check_sources(axes: Mapping[str, Axis]) -> list[Check]:
 def _check(of: str, axis: Axis) -> Check:
     name, settings = f"{NAME} of {of}" if of else NAME, axis.source
     try:
+        if settings.replay is not None:
+            samples = RecordedRun(settings.replay).samples
+            return Check(name, "ok", f"{settings.replay} has {counted(samples, 'recorded sample')}")
         if settings.url is None:
             found = [check_recording(name, axis, path) for path in settings.logs]
             return next((check for check in found if check.verdict != "ok"), found[0])

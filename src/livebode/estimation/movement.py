@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -73,15 +75,25 @@ class Movement(StatefulBase):
 
 def _moving(periods: Floats, times: float) -> Flags:
     """Times of motion from the schedule in consecutive periods, (periods, places), relative to the previous ones."""
-    now = periods[_BEFORE:]
-    bends = np.full(periods.size, np.nan)
-    bends[2:] = np.abs(np.diff(periods.ravel(), 2))
-    known = np.cumsum(np.isfinite(bends).reshape(periods.shape), axis=1)
-    jitter = np.maximum.accumulate(np.nan_to_num(bends).reshape(periods.shape), axis=1)
-    largest, count, apart = jitter[_BEFORE:], known[_BEFORE:], np.full(now.shape, np.nan)
-    for i in range(1, _PERIODS + 1):
-        earlier = slice(_BEFORE - i, len(periods) - i)
-        apart = np.fmax(apart, np.abs(now - periods[earlier]))
-        largest = np.maximum(largest, jitter[earlier, -1:])
-        count = count + known[earlier, -1:]
+    now, steps = periods[_BEFORE:], np.subtract(*_ends(periods.ravel()))
+    bends = np.full(periods.shape, np.nan)
+    np.subtract(*_ends(steps), out=bends.reshape(-1)[2:])
+    np.abs(bends, out=bends)
+    known = np.cumsum(np.isfinite(bends), axis=1)
+    jitter = np.maximum.accumulate(np.where(np.isnan(bends), 0.0, bends), axis=1)
+    apart = np.fmax.reduce(np.abs(now[:, np.newaxis] - _before(periods)), axis=1)
+    largest = np.maximum(jitter[_BEFORE:], _before(jitter[:, -1].copy()).max(axis=1)[:, np.newaxis])
+    count = known[_BEFORE:] + _before(known[:, -1].copy()).sum(axis=1)[:, np.newaxis]
     return np.asarray((count >= _BENDS_MIN) & (apart > times * largest))
+
+
+def _ends(series: Floats) -> tuple[Floats, Floats]:
+    """All but the first, and all but the last."""
+    return series[1:], series[:-1]
+
+
+def _before(rows: NDArray[Any]) -> NDArray[Any]:
+    """For each row after the remembered ones the nine before it, without a copy, (rows, 9, …)."""
+    first, step = rows[_BEFORE - _PERIODS :], rows.strides[:1]
+    shape = len(rows) - _BEFORE, _PERIODS, *rows.shape[1:]
+    return np.ndarray(shape, rows.dtype, first, strides=step + rows.strides)

@@ -81,7 +81,7 @@ class RepeatingErrors(PeriodCutter):
         Even and odd distortion.
     """
 
-    _stage = Stage("repeating-errors", 2)
+    _stage = Stage("repeating-errors", 2, converts_from=1)
     _STATE = (
         *PeriodCutter._STATE, "_output", "_told", "_largest", "_step", "_periods", "_moments",
         "_movement", "_silence", "levels",

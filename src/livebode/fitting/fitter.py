@@ -26,7 +26,8 @@ from livebode.fitting.delays import DelayChoice
 from livebode.fitting.models import model_named
 from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
-from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, FittedRows, fit_rows
+from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, FittedRows
+from livebode.fitting.tasks import FitTask
 from livebode.fitting.weighing import epsilon_for, squares
 
 Floats = NDArray[np.float64]
@@ -109,6 +110,11 @@ class Fitter(StatefulBase):
         return self.model.names
 
     @property
+    def identity(self) -> str:
+        """Equal for fitters with the same settings."""
+        return self._identity
+
+    @property
     def derived_names(self) -> tuple[str, ...]:
         """Of `derived`."""
         return self.model.derived_names
@@ -125,6 +131,19 @@ class Fitter(StatefulBase):
         GridError
             If they are on other lines than the previous ones.
         """
+        parts: list[Parameters] = []
+        first = 0
+        while not parts or first < len(responses):
+            task = self.task(responses[first:])
+            parts.append(self.take(task, task.fitted(), emit))
+            first += len(task.responses)
+        return Parameters.join(parts)
+
+    def task(self, responses: Responses) -> FitTask:
+        """The fit of the first of these Responses, as many as the group still lacks; `take` accepts its result.
+
+        The errors are those of `process`. See `fit_together`, which fits the tasks of several fitters at once.
+        """
         if responses.quantity != "plant":
             raise SignalError(
                 "wrong-quantity",
@@ -133,17 +152,28 @@ class Fitter(StatefulBase):
                 quantity=responses.quantity,
             )
         use = self._prepare(responses.lines)
-        parts = []
-        first = 0
-        while first < len(responses):
-            last = min(len(responses), first + _GROUP - self._seen % _GROUP)
-            parts.append(self._group(responses[first:last], use))
-            first = last
-        if not parts:
-            parts = [self._parameters(responses, fit_rows(self._delay.problem, *measured_of(responses, use)))]
-        found = Parameters.join(parts)
-        self._report(found, emit)
-        return found
+        part = responses[: _GROUP - self._seen % _GROUP]
+        problem, rows = self._delay.problem, len(part)
+        epsilon = None if self._epsilon is None else np.full(rows, self._epsilon)
+        start = None if self._start is None else np.repeat(problem.with_held(self._start)[np.newaxis], rows, axis=0)
+        return FitTask(part, problem, *measured_of(part, use), start, epsilon)
+
+    def take(self, task: FitTask, found: FittedRows, emit: Emit = ignore) -> Parameters:
+        """Parameters of a task from its fitted rows; the next task starts from them."""
+        found = self._delay.weigh(self._seen // _GROUP, task.measured, task.noise_dof, found)
+        good = np.flatnonzero(found.status == OK)
+        near = np.flatnonzero((found.status == OK) | (found.status == FRICTION))
+        parts = squares(task.measured, found.response)
+        self._rows += [(parts[0][i], parts[1][i], parts[2][i]) for i in good]
+        if near.size:
+            self._next = found.ended[near[-1]]
+        self._seen += len(task.responses)
+        if len(task.responses) and self._seen % _GROUP == 0:
+            self._finish_group(task.problem)
+            self._delay.decide()
+        parameters = self._parameters(task.responses, found)
+        self._report(parameters, emit)
+        return parameters
 
     def derived(self, parameters: Parameters) -> Parameters:
         """Derived quantities with bounds: resonances, damping ratios, quality factors, ratios."""
@@ -226,26 +256,6 @@ class Fitter(StatefulBase):
                 window=lines.window,
             )
         return self._use
-
-    def _group(self, responses: Responses, use: NDArray[np.bool_]) -> Parameters:
-        """Rows of a group, or of a part of it."""
-        measured, noise_dof = measured_of(responses, use)
-        problem, rows = self._delay.problem, len(responses)
-        epsilon = None if self._epsilon is None else np.full(rows, self._epsilon)
-        start = None if self._start is None else np.repeat(problem.with_held(self._start)[np.newaxis], rows, axis=0)
-        found = fit_rows(problem, measured, noise_dof, start, epsilon)
-        found = self._delay.weigh(self._seen // _GROUP, measured, noise_dof, found)
-        good = np.flatnonzero(found.status == OK)
-        near = np.flatnonzero((found.status == OK) | (found.status == FRICTION))
-        parts = squares(measured, found.response)
-        self._rows += [(parts[0][i], parts[1][i], parts[2][i]) for i in good]
-        if near.size:
-            self._next = found.ended[near[-1]]
-        self._seen += len(responses)
-        if self._seen % _GROUP == 0:
-            self._finish_group(problem)
-            self._delay.decide()
-        return self._parameters(responses, found)
 
     def _finish_group(self, problem: Problem) -> None:
         self._rows = self._rows[-_MEMORY:]

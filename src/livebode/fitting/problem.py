@@ -115,6 +115,13 @@ class Problem:
         return Problem(model, self.grid, rest, [name for name in model.names if name not in rest])
 
     @property
+    def identity(self) -> tuple[object, ...]:
+        """Equal for problems with the same model, grid and free parameters."""
+        frequency_hz, *rest = self.grid
+        held = tuple(sorted(self.held.items()))
+        return type(self.model), repr(self.model), held, frequency_hz.tobytes(), *rest
+
+    @property
     def size(self) -> int:
         """Number of free parameters."""
         return int(np.count_nonzero(self.free))

@@ -68,7 +68,7 @@ class FleetCoordinator:
                 "distributed.scheduler.worker-ttl": f"{WORKER_TTL_S}s",
             }
         )
-        self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
+        self._cluster = LocalCluster(
             n_workers=self._settings.workers,
             threads_per_worker=self._settings.partitions,
             host="127.0.0.1",
@@ -76,11 +76,11 @@ class FleetCoordinator:
             memory_limit=0,
             silence_logs=logging.CRITICAL,
         )
-        self._client = Client(self._cluster)  # type: ignore[no-untyped-call]
+        self._client = Client(self._cluster)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._client.close()  # type: ignore[no-untyped-call]
+        self._client.close()
         self._cluster.close()
 
     @property

@@ -132,6 +132,11 @@ class FleetLog:
         ack = await self._repeated(lambda: self._js.publish(subject, data, headers=headers, timeout=_REQUEST_S))
         return int(ack.seq)
 
+    async def publish(self, subject: str, data: bytes) -> None:
+        """Send a message that is not stored; while the server does not answer, it is dropped."""
+        with contextlib.suppress(self._nats.errors.Error):
+            await self._connection.publish(subject, data)
+
     async def append_after(self, stream: str, subject: str, data: bytes, after: int) -> int:
         """Store a message if `after` is still the number of the last one of its subject; returns its number.
 

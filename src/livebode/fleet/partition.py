@@ -18,6 +18,7 @@ from livebode.configuration.axis import Axis
 from livebode.core import StateError
 from livebode.fleet.axis_stream import AxisStream
 from livebode.fleet.log import ClaimLostError, FleetLog, StoredMessage
+from livebode.fleet.page_status import PageStatus
 from livebode.fleet.reader import Reader
 from livebode.fleet.result_message import PendingResults, ResultMessage
 from livebode.fleet.server_config import PAYLOAD_BYTES_MAX
@@ -75,6 +76,7 @@ class PartitionOwner:
         self._due_s = self._status_due_s = 0.0
         self._since_s = time.time()
         self._newest_s = 0.0
+        self._page = PageStatus(number, self._owner)
 
     async def run(self, stop: asyncio.Event) -> bool:
         """Own the partition; returns whether it was stopped (True) or another process has claimed it (False)."""
@@ -218,6 +220,9 @@ class PartitionOwner:
         return f"{STATES}.{self._number}.{key}"
 
     async def _publish_status(self, waiting: int) -> None:
+        lag_s = max(0.0, time.time() - self._newest_s) if waiting else 0.0
+        for subject, message in self._page.messages(self._streams, time.time(), waiting, lag_s):
+            await self._log.publish(subject, message)
         about = {
             "partition": self._number,
             "owner": self._owner,
@@ -225,7 +230,7 @@ class PartitionOwner:
             "at_s": time.time(),
             "through": self._through,
             "waiting": waiting,
-            "lag_s": max(0.0, time.time() - self._newest_s) if waiting else 0.0,
+            "lag_s": lag_s,
             "unknown": self._unknown,
             "axes": {key: _axis_status(stream) for key, stream in self._streams.items()},
         }

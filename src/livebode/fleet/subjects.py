@@ -23,7 +23,7 @@ def axis_key(machine: MachineSection) -> str:
     >>> axis_key(MachineSection(site="Ulm 2", machine="press.4", axis="x"))
     'Ulm%202._.press%2E4.x'
     """
-    return ".".join(_token(name) for name in (machine.site, machine.line, machine.machine, machine.axis))
+    return ".".join(axis_token(name) for name in (machine.site, machine.line, machine.machine, machine.axis))
 
 
 def axis_path(key: str) -> str:
@@ -44,7 +44,8 @@ def key_of(subject: str) -> str:
     return subject.split(".", 2)[2]
 
 
-def _token(name: str | None) -> str:
+def axis_token(name: str | None) -> str:
+    """The token of a subject for the name of one level."""
     if not name:
         return _EMPTY
     escaped = quote(name, safe="").replace(".", "%2E")

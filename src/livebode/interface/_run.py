@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from html import escape
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import pyarrow as pa
@@ -15,10 +14,12 @@ from livebode.analysis.averaged import Averaged, averaged
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import loop_report
 from livebode.configuration.axis import Axis, FitSection, LoopSection
+from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Event, Lines, LivebodeError, Loop, PlotKind, Response, Responses, counted, plot_responses
 from livebode.core.clock import moment, moments_by
 from livebode.fitting import Fit
+from livebode.locations import Url, local_copy, location, shared_copy
 from livebode.margins import Margins
 from livebode.records import PARAMETERS, RunRecord
 
@@ -35,12 +36,12 @@ class Run:
     Parameters
     ----------
     path
-        The run directory.
+        The run directory, or its URL (docs/how-to/remote.md).
 
     Attributes
     ----------
     path
-        Its directory.
+        Its directory; of a run at a URL that of the downloaded copy, which exists as long as this object.
     summary
         run.json: configuration, versions, counts (docs/run-directory.md).
     lines
@@ -53,6 +54,8 @@ class Run:
     RecordError
         If the directory is not of a run, or run.json cannot be read. A damaged part of the tables is skipped with a
         `DamageWarning`.
+    LocationError
+        If there is no complete run at the URL, or it cannot be downloaded.
 
     Examples
     --------
@@ -65,12 +68,19 @@ class Run:
     (array([20., 30., 40.]), 59.4)
     """
 
-    def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = Path(path)
-        self._record = RunRecord.open(self.path)
+    def __init__(self, path: str | PathLike[str] | Url) -> None:
+        place = location(path)
+        self._copy = shared_copy(place) if isinstance(place, Url) else None  # exists as long as this object
+        with local_copy(place) as self.path:
+            self._record = RunRecord.open(self.path)
         self.summary: Mapping[str, Any] = self._record.summary
         self.lines: Lines = self._record.lines
         self.finished = self._record.finished
+
+    @property
+    def machine(self) -> str:
+        """The machine as a path, such as "Graz/line 2/press 4/X", from [machine]; empty without one."""
+        return MachineSection(**self.summary.get("machine", {})).path
 
     @cached_property
     def responses(self) -> Responses:

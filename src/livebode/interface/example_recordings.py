@@ -5,9 +5,11 @@ The same files on every call: each recording has a fixed seed.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +19,10 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 
 from livebode.core import Block, Lines, OutputError
-from livebode.core.files import whole_files
+from livebode.core.files import whole_directory, whole_files
 from livebode.core.writing import writing
 from livebode.excitation import chirp, multisine
+from livebode.interface._example_hall import write_hall
 from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Standstill, Strokes, TensionLoss
 
 _RATE_HZ, _WINDOW = 4000.0, 400
@@ -34,17 +37,24 @@ _SIGNALS = ("w", "u", "velocity")
 class Example:
     """Recordings of one kind, their configurations, and the commands to begin with.
 
-    `recordings` are functions that simulate, by name of their files; `configurations` names of files.
+    `recordings` are functions that simulate, by name of their files; `configurations` names of files; `lakes` functions
+    that write a directory, by its name.
     """
 
     about: str
     recordings: dict[str, Callable[[], pa.Table]]
     configurations: tuple[str, ...]
     commands: tuple[str, ...]
+    lakes: dict[str, Callable[[Path], None]] = field(default_factory=dict)
 
     @property
     def files(self) -> list[str]:
-        return [*self.recordings, *self.configurations]
+        return [*self.recordings, *self.configurations, *self.lakes]
+
+    @property
+    def usable(self) -> bool:
+        """Whether the packages that write it are installed."""
+        return not self.lakes or find_spec("deltalake") is not None
 
 
 def _simulated(names: tuple[str, ...], **settings: Any) -> Callable[[], pa.Table]:
@@ -108,6 +118,16 @@ EXAMPLES = {
         ("moving.toml",),
         ("livebode run moving.toml",),
     ),
+    "archive": Example(
+        "three recordings as an archive, one of which is of another kind",
+        {"standstill.csv": _standstill(1), "standstill-2.csv": _standstill(2), "chirp.csv": _single_chirp},
+        ("archive.toml", "archive-recipe.toml"),
+        (
+            "livebode archive run archive.toml",
+            "livebode archive list archive.toml",
+            "livebode archive list archive.toml --quarantined",
+        ),
+    ),
     "chirp": Example(
         "a single chirp, which does not repeat",
         {"chirp.csv": _single_chirp},
@@ -154,6 +174,13 @@ EXAMPLES = {
         ("ambient.toml",),
         ("livebode run ambient.toml",),
     ),
+    "hall": Example(
+        "a year of a hall with eight axes, as the lake of an archive",
+        {},
+        (),
+        ("livebode archive trend hall Keff", "livebode archive report hall"),
+        {"hall": write_hall},
+    ),
 }
 """The examples by name."""
 
@@ -188,7 +215,20 @@ def write_examples(names: list[str], folder: Path, *, force: bool = False) -> li
             files = [folder / path.name for path in sorted(partial.iterdir())]
             for path in files:
                 _check(path, partial / path.name, force)
+        for name in names:
+            files += [_lake(folder / own, write, force) for own, write in EXAMPLES[name].lakes.items()]
     return files
+
+
+def _lake(path: Path, write: Callable[[Path], None], force: bool) -> Path:
+    """Write a lake; one that is there already is left as it is, because a lake contains the times of its commits."""
+    if path.exists() and not force:
+        if not (path / "runs" / "_delta_log").is_dir():
+            raise _exists(path)
+        return path
+    with whole_directory(path, shutil.rmtree) as partial:
+        write(partial)
+    return path
 
 
 def _write(example: Example, folder: Path) -> None:
@@ -205,10 +245,14 @@ def _write(example: Example, folder: Path) -> None:
 def _check(path: Path, written: Path, force: bool) -> None:
     """An OutputError if something else is there."""
     if path.is_dir() or (not force and path.exists() and path.read_bytes() != written.read_bytes()):
-        raise OutputError(
-            "exists",
-            f"{str(path)!r} exists already, and is not the file of the example",
-            "choose another directory, or replace it with force",
-            path=str(path),
-            argument="force",
-        )
+        raise _exists(path)
+
+
+def _exists(path: Path) -> OutputError:
+    return OutputError(
+        "exists",
+        f"{str(path)!r} exists already, and is not the file of the example",
+        "choose another directory, or replace it with force",
+        path=str(path),
+        argument="force",
+    )

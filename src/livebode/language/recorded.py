@@ -5,6 +5,9 @@ kinds of events, the names of parameters and the statuses here with those of the
 """
 
 SENTENCES = (
+    "{runs} runs with a value, and a trend needs {needed}",
+    "the runs span {days} days, and a trend needs {needed}",
+    "the covariates cannot be separated from each other or from the time",
     "{channel} repeats every {period} samples rather than every {window}: {share} % of its power changes from one "
     "window to the next, {rest} % from one such period to the next",
     "compare lines.window with the design of the excitation",
@@ -337,8 +340,8 @@ NAMES = (
     "resonance 1 damping", "resonance 2 damping", "antiresonance 1 damping", "antiresonance 2 damping",
     "resonance 1 q", "resonance 2 q", "antiresonance 1 q", "antiresonance 2 q", "gain may rise by",
     "gain may fall by", "peak sensitivity Ms", "gain margin", "gain reduction", "phase margin", "delay margin",
-    "peak sensitivity", "bandwidth", "acknowledged", "backlog", "backlog-cleared", "baseline-unknown", "change",
-    "best-linear-approximation", "recordings-differ",
+    "peak sensitivity", "bandwidth", "acknowledged", "axis-failed", "backlog", "backlog-cleared", "baseline-unknown",
+    "change", "best-linear-approximation", "recordings-differ",
     "change-cleared", "change-corrected", "clock-jump", "computer-clock", "configuration-applied",
     "configuration-postponed", "configuration-refused", "connected", "disconnected", "distorted",
     "distortion-levels", "doubtful", "drift",

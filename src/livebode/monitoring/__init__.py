@@ -1,6 +1,7 @@
 """Learns a baseline of the healthy machine and raises an alarm when the machine changes."""
 
 from livebode.monitoring.baseline import Baseline, signals_of
+from livebode.monitoring.baseline_version import BaselineVersion, file_of, retained_file
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S
 from livebode.monitoring.learning import learn_machine
@@ -17,6 +18,7 @@ __all__ = [
     "DEFAULT_INTERVAL_S",
     "PLACES",
     "Baseline",
+    "BaselineVersion",
     "Evidence",
     "LearnedMachine",
     "MachineDetector",
@@ -26,8 +28,10 @@ __all__ = [
     "ScheduleTable",
     "TableMonitor",
     "WindowRows",
+    "file_of",
     "learn_machine",
     "learn_table",
     "places",
+    "retained_file",
     "signals_of",
 ]

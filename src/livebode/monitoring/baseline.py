@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from livebode.core import BaselineError, Lines, counted
 from livebode.estimation import Settings
 from livebode.monitoring import baseline_file
 from livebode.monitoring.baseline_file import ROLES
+from livebode.monitoring.baseline_version import BaselineVersion, retained_file
 from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.rows import PLACES, places
 from livebode.monitoring.table import ScheduleTable
@@ -41,6 +42,12 @@ class Baseline:
         The runs that it was learned from.
     remark
         Reason for the missing machine; empty where there is one.
+    learned
+        When it was learned, ISO 8601 in UTC; empty where an older livebode wrote it.
+    reason
+        Why it was learned; empty where nobody stated it.
+    history
+        The versions that it replaced, the newest first.
 
     Examples
     --------
@@ -62,6 +69,19 @@ class Baseline:
     corrected: bool = False
     runs: tuple[str, ...] = ()
     remark: str = ""
+    learned: str = ""
+    reason: str = ""
+    history: tuple[BaselineVersion, ...] = ()
+
+    @property
+    def id(self) -> str:
+        """The first 16 hexadecimal digits of the SHA-256 of what was learned: two files with one id judge alike."""
+        return baseline_file.id_of(vars(self))
+
+    @property
+    def version(self) -> BaselineVersion:
+        """This version, as the next one lists it in its history."""
+        return BaselineVersion(self.id, self.learned, self.runs, self.reason)
 
     def __repr__(self) -> str:
         f, what = self.lines.frequency_hz, [table.what for table in self.tables]
@@ -142,8 +162,40 @@ class Baseline:
         return cls(**baseline_file.load(Path(path)))
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write it to a file, completely or not at all; docs/how-to/monitoring.md describes the content."""
+        """Write it to a file, completely or not at all; docs/how-to/monitoring.md describes the content.
+
+        An existing file is replaced; `save_version` retains it.
+        """
         baseline_file.save(vars(self), Path(path))
+
+    def save_version(self, path: str | PathLike[str], reason: str = "") -> Baseline:
+        """Replace the baseline in a file as its next version, and return that.
+
+        The previous file is retained as NAME.history/ID.json beside it, and the new one lists all earlier versions.
+        Where both judge alike (same id), the file remains as it is.
+
+        Parameters
+        ----------
+        path
+            The file to replace.
+        reason
+            Why it is replaced.
+
+        Raises
+        ------
+        BaselineError
+            If there is no baseline in the file.
+        OutputError
+            If it cannot be written; the file is unchanged.
+        """
+        path = Path(path)
+        previous = self.load(path)
+        if previous.id == self.id:
+            return previous
+        following = replace(self, reason=reason, history=(previous.version, *previous.history))
+        baseline_file.retain(path, retained_file(path, previous.id))
+        following.save(path)
+        return following
 
 
 def signals_of(settings: Settings) -> dict[str, str | None]:

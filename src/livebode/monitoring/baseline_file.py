@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from livebode.core.files import write_whole
 from livebode.core.writing import writing
 from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.baseline_part import BaselinePart
+from livebode.monitoring.baseline_version import BaselineVersion
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
 from livebode.monitoring.machine import LearnedMachine
@@ -28,8 +31,17 @@ ROLES = ("output", "input", "excitation", "schedule")
 
 _FORMAT = "livebode baseline"
 _VERSION = 4
+_ID_DIGITS = 16
 _LEARN = "learn one from runs (livebode learn)"
 _COVARIATE_ARRAYS = {"mean": 1, "low": 1, "high": 1, "slope": 2, "covariance": 3}  # and their dimensions
+
+
+def id_of(baseline: Mapping[str, Any]) -> str:
+    """The id of what was learned, from the fields of a Baseline; paths, dates and reasons do not change it."""
+    # A whole number is the same one as int and as float.
+    content = json.loads(json.dumps(_learned_plain(baseline), allow_nan=False), parse_int=float)
+    text = json.dumps(content, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:_ID_DIGITS]
 
 
 def save(baseline: Mapping[str, Any], path: Path) -> None:
@@ -38,6 +50,13 @@ def save(baseline: Mapping[str, Any], path: Path) -> None:
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, text.encode())
+
+
+def retain(path: Path, copy: Path) -> None:
+    """Copy a baseline as it is, whole or not at all."""
+    with writing(copy):
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(copy, path.read_bytes())
 
 
 def load(path: Path) -> dict[str, Any]:
@@ -82,12 +101,25 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def _plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
-    lines = baseline["lines"]
+    history = baseline["history"]
     return {
         "format": _FORMAT,
         "version": _VERSION,
         "livebode": __version__,
+        "id": id_of(baseline),
+        "learned": baseline["learned"],
+        "reason": baseline["reason"],
         "runs": list(baseline["runs"]),
+        "replaces": history[0].id if history else None,
+        "history": [asdict(version) for version in history],
+        "remark": baseline["remark"],
+        **_learned_plain(baseline),
+    }
+
+
+def _learned_plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
+    lines = baseline["lines"]
+    return {
         "lines": {"bins": lines.bins, "quiet": lines.quiet, "window": lines.window, "rate_hz": lines.rate_hz},
         "hop": baseline["hop"],
         "signals": baseline["signals"],
@@ -95,7 +127,6 @@ def _plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
         "quantity": baseline["quantity"],
         "corrected": baseline["corrected"],
         "machine": _machine_plain(baseline["machine"]) if baseline["machine"] else None,
-        "remark": baseline["remark"],
         "tables": [_table_plain(table) for table in baseline["tables"]],
     }
 
@@ -122,7 +153,7 @@ def _fields(data: BaselinePart) -> dict[str, Any]:
     hop = data.whole("hop")
     if hop < 1:
         raise data.wrong("hop", "below 1")
-    return {
+    fields = {
         "lines": lines,
         "hop": hop,
         "signals": {role: signals.value(role) and signals.text(role) for role in ROLES},
@@ -133,7 +164,17 @@ def _fields(data: BaselinePart) -> dict[str, Any]:
         "corrected": data.truth("corrected"),
         "runs": data.texts("runs"),
         "remark": data.text("remark"),
+        "learned": data.text("learned") if data.has("learned") else "",
+        "reason": data.text("reason") if data.has("reason") else "",
+        "history": tuple(map(_version, data.parts("history"))) if data.has("history") else (),
     }
+    if data.has("id") and data.text("id") != id_of(fields):
+        raise data.wrong("id", f"not that of its content, {id_of(fields)}: it was changed after it was learned")
+    return fields
+
+
+def _version(data: BaselinePart) -> BaselineVersion:
+    return BaselineVersion(data.text("id"), data.text("learned"), data.texts("runs"), data.text("reason"))
 
 
 def _machine_plain(machine: LearnedMachine) -> dict[str, Any]:

@@ -67,6 +67,10 @@ class BaselinePart:
             raise self.wrong(name, f"below {least:g} in one place", float(np.nanmin(array)))
         return array
 
+    def has(self, name: str) -> bool:
+        """Whether there is a value of this name: older files lack some."""
+        return isinstance(self.data, dict) and name in self.data
+
     def value(self, name: str) -> Any:
         if not isinstance(self.data, dict):
             raise self._damaged(self.path[:-1], "is not a table")

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.ripple import torques
 from livebode.motion import MovingModel
-from livebode.motion.replay import INPUTS, PLACE_M, advance, engine, late, torque_only
+from livebode.motion.replay import late
+from livebode.simulation.open_belt import Pair, open_belt
 
 Floats = NDArray[np.float64]
 
@@ -27,14 +28,10 @@ class Replay:
     """
 
     def __init__(self, model: MovingModel, rate_hz: float, delay_s: float = 0.0) -> None:
-        self._rate_hz, self._delay_samples = rate_hz, delay_s * rate_hz
+        self._rate_hz, self._delay_samples, self._radius_m = rate_hz, delay_s * rate_hz, model.radius_m
         self._at = np.linspace(model.low_m, model.high_m, _GRID)
-        stiffness, damping = model.stiffness_at(self._at), model.damping_at(self._at)
-        most = float(stiffness.max()), float(damping.max())
-        self._stiffness, self._damping = stiffness / most[0], damping / most[1]
-        self._load_kg, self._radius_m = model.load_kg, model.radius_m
-        self._settings = engine(model, torque_only(rate_hz), most)
-        self._inertia_kg_m2 = model.inertia_kg_m2
+        self._stiffness, self._damping = model.stiffness_at(self._at), model.damping_at(self._at)
+        self._pair = Pair(model.inertia_kg_m2, model.load_kg)
 
     def __call__(self, u: Floats, position_m: Floats, offset: Offset) -> tuple[Floats, Floats]:
         """Velocity of the motor from rest, rad/s (samples,), and its slopes (5, samples).
@@ -44,44 +41,40 @@ class Replay:
         The model's parameters are changed by `offset`. Effects that are not in u or not in the model, such as friction,
         make the velocity drift slowly.
         """
-        inputs, inertia_kg_m2 = self._inputs(u, position_m, offset)
-        plain = self._run(inertia_kg_m2, inputs)
+        pair, more = self._changed(offset), 1.0 + _STEP
+        pairs = [
+            pair,
+            pair._replace(stiffness=more),
+            pair._replace(load_kg=pair.load_kg * more),
+            pair._replace(damping=pair.damping * more),
+            pair._replace(inertia_kg_m2=pair.inertia_kg_m2 * more),
+        ]
+        plain, *moved = self._run(pairs, u, position_m, offset)
         slopes = np.empty((len(DIRECTIONS) + 1, u.size))
-        for i, row in enumerate((4, 6, 5)):
-            moved = inputs.copy()
-            moved[row] *= 1.0 + _STEP
-            slopes[i] = self._run(inertia_kg_m2, moved)
-        slopes[3] = self._run(inertia_kg_m2 * (1.0 + _STEP), inputs)
-        slopes[:4] = (slopes[:4] - plain) / _STEP
+        slopes[:4] = (np.array(moved) - plain) / _STEP
         slopes[4] = -np.gradient(plain) * self._rate_hz
         return plain, slopes
 
     def plain(self, u: Floats, position_m: Floats, offset: Offset) -> Floats:
         """The velocity alone."""
-        inputs, inertia_kg_m2 = self._inputs(u, position_m, offset)
-        return self._run(inertia_kg_m2, inputs)
+        return np.asarray(self._run([self._changed(offset)], u, position_m, offset)[0])
 
     def ripple(self, cycles_per_m: Floats, position_m: Floats, shaft_m: Floats) -> Floats:
         """Velocity under cosine and sine of each order alone, of 1 N m, rad/s (2·orders, samples)."""
-        inputs, inertia_kg_m2 = self._inputs(np.zeros(position_m.size), position_m, Offset())
-        velocity = np.empty((2 * cycles_per_m.size, position_m.size))
-        for row, torque in zip(velocity, torques(cycles_per_m, shaft_m)):
-            inputs[2] = torque
-            row[:] = self._run(inertia_kg_m2, inputs)
-        return velocity
+        torque = np.array(list(torques(cycles_per_m, shaft_m)))
+        return self._run([self._pair] * len(torque), torque, position_m, Offset())
 
-    def _inputs(self, u: Floats, position_m: Floats, offset: Offset) -> tuple[Floats, float]:
-        """Of the engine, and the motor's inertia."""
+    def _changed(self, offset: Offset) -> Pair:
+        """The pair with the parameters of an Offset; its stiffness is in the course of the belt."""
         factors = np.exp(offset.logarithms)
-        inputs = np.zeros((INPUTS, u.size))
-        inputs[0], inputs[2] = PLACE_M / self._radius_m, u
-        inputs[4] = np.interp(position_m, self._at, self._stiffness * np.exp(offset.stiffness(self._at)))
-        inputs[5] = np.interp(position_m, self._at, self._damping) * factors[2]
-        inputs[6] = self._load_kg * factors[1]
-        return inputs, float(self._inertia_kg_m2 * factors[3])
+        inertia_kg_m2, load_kg = self._pair.inertia_kg_m2 * factors[3], self._pair.load_kg * factors[1]
+        return Pair(float(inertia_kg_m2), float(load_kg), damping=float(factors[2]))
 
-    def _run(self, inertia_kg_m2: float, inputs: Floats) -> Floats:
-        settings = self._settings | {"motor_inertia_kg_m2": inertia_kg_m2}
-        wrong = "the baseline's model diverges under this torque"
-        velocity = np.asarray(advance(settings, inputs, wrong, "check its signals and units")[1])
-        return late(velocity, self._delay_samples)
+    def _run(self, pairs: list[Pair], torque_n_m: Floats, position_m: Floats, offset: Offset) -> Floats:
+        """Velocities of the motor of each pair, rad/s (pairs, samples), from rest."""
+        stiffness = np.interp(position_m, self._at, self._stiffness * np.exp(offset.stiffness(self._at)))
+        damping = np.interp(position_m, self._at, self._damping)
+        velocity, _ = open_belt(
+            pairs, torque_n_m, stiffness, damping, rate_hz=self._rate_hz, radius_m=self._radius_m
+        )  # fmt: skip
+        return np.array([late(row, self._delay_samples) for row in velocity])

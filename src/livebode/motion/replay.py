@@ -14,12 +14,13 @@ from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
 from livebode.simulation.mechanics import Mechanics
 from livebode.simulation.motion import Standstill
+from livebode.simulation.open_belt import Pair, open_belt
 from livebode.simulation.settings import Drive
 
 Floats = NDArray[np.float64]
 
-PLACE_M = 1.0  # where the small motion is simulated; the spans are set tick by tick
-INPUTS = 10
+_PLACE_M = 1.0  # where the small motion is simulated; the spans are set tick by tick
+_INPUTS = 10
 _STATES = 4
 _ANYWHERE_M = 1e12
 
@@ -30,8 +31,10 @@ def by_torque(model: MovingModel, rate_hz: float, u: Floats, position_m: Floats)
     Torque of any origin (excitation, motion, the controllers' response to noise) moves the model as it moved the
     machine. Effects that are not in u or not in the model, such as friction, make it drift slowly; see `without_drift`.
     """
-    _, motor, cart = _run(model, torque_only(rate_hz), u, position_m)
-    return late(motor, model.delay_s * rate_hz), cart
+    pair, radius_m = Pair(model.inertia_kg_m2, model.load_kg), model.radius_m
+    stiffness, damping = model.stiffness_at(position_m), model.damping_at(position_m)
+    motor, cart = open_belt([pair], u, stiffness, damping, rate_hz=rate_hz, radius_m=radius_m)
+    return late(motor[0], model.delay_s * rate_hz), cart[0]
 
 
 def by_excitation(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats]:
@@ -41,8 +44,21 @@ def by_excitation(model: MovingModel, drive: Drive, w: Floats, position_m: Float
     acceleration of the reference. The loop is closed over the velocity without the model's delay, which is
     in the result alone.
     """
-    u, motor, _ = _run(model, drive, w, position_m)
-    return u, late(motor, model.delay_s * drive.rate_hz)
+    stiffness, damping = model.stiffness_at(position_m), model.damping_at(position_m)
+    most = float(stiffness.max()), float(damping.max())
+    inputs = np.zeros((_INPUTS, w.size))
+    inputs[0], inputs[2] = _PLACE_M / model.radius_m, w
+    inputs[4], inputs[5], inputs[6] = stiffness / most[0], damping / most[1], model.load_kg
+    output = np.empty((3 + _STATES, w.size))
+    done = Engine(_engine(model, drive, most), _PLACE_M).advance(inputs, output)
+    if done < w.size:
+        raise SimulationError(
+            "diverged",
+            "the fitted model diverges in its loop",
+            "check the loop's description and the radius",
+            sample=int(done),
+        )
+    return output[0], late(output[1], model.delay_s * drive.rate_hz)
 
 
 def late(velocity: Floats, samples: float) -> Floats:
@@ -66,14 +82,8 @@ def without_drift(model: Floats, measured: Floats, window: int) -> Floats:
     return np.asarray(model + slow)
 
 
-def torque_only(rate_hz: float) -> Drive:
-    """A drive without controllers: its torque is the input w."""
-    return Drive(rate_hz=rate_hz, velocity_rate_hz=rate_hz, position_rate_hz=rate_hz, velocity_gain_n_m_s=0.0,
-                 position_gain_per_s=0.0)  # fmt: skip
-
-
-def engine(model: MovingModel, drive: Drive, most: tuple[float, float]) -> dict[str, Any]:
-    """Settings of the Engine for the model's small motion around `PLACE_M`, however far it goes.
+def _engine(model: MovingModel, drive: Drive, most: tuple[float, float]) -> dict[str, Any]:
+    """Settings of the Engine for the model's small motion around `_PLACE_M`, however far it goes.
 
     `most`: the stiffness, N/m, and the damping, N s/m, that its inputs 4 and 5 give tick by tick as shares.
     """
@@ -84,29 +94,8 @@ def engine(model: MovingModel, drive: Drive, most: tuple[float, float]) -> dict[
         radius_m=model.radius_m,
         stiffness_n_per_m=most[0],
         damping_n_s_per_m=most[1],
-        nominal_position_m=PLACE_M,
-        frozen_position_m=PLACE_M,
+        nominal_position_m=_PLACE_M,
+        frozen_position_m=_PLACE_M,
     )
-    axis = BeltAxis(mechanics=mechanics, drive=drive, motion=Standstill(position_m=PLACE_M))
+    axis = BeltAxis(mechanics=mechanics, drive=drive, motion=Standstill(position_m=_PLACE_M))
     return engine_settings(axis) | {"position_m_min": -_ANYWHERE_M, "position_m_max": _ANYWHERE_M}
-
-
-def advance(settings: dict[str, Any], inputs: Floats, wrong: str, remedy: str) -> Floats:
-    """Outputs of the Engine for inputs of shape (10, samples), from rest; SimulationError where it diverges."""
-    output = np.empty((3 + _STATES, inputs.shape[1]))
-    done = Engine(settings, PLACE_M).advance(inputs, output)
-    if done < inputs.shape[1]:
-        raise SimulationError("diverged", wrong, remedy, sample=int(done))
-    return output
-
-
-def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats, Floats]:
-    """u, velocity of the motor, velocity of the cart."""
-    stiffness, damping = model.stiffness_at(position_m), model.damping_at(position_m)
-    most = float(stiffness.max()), float(damping.max())
-    inputs = np.zeros((INPUTS, w.size))
-    inputs[0], inputs[2] = PLACE_M / model.radius_m, w
-    inputs[4], inputs[5], inputs[6] = stiffness / most[0], damping / most[1], model.load_kg
-    wrong = "the fitted model diverges in its loop"
-    output = advance(engine(model, drive, most), inputs, wrong, "check the loop's description and the radius")
-    return output[0], output[1], output[6]

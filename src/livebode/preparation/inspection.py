@@ -10,6 +10,7 @@ from typing import Any, TypedDict
 from livebode.core import Lines, LivebodeError, RecordingError, UsageError
 from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, pattern, recognise
+from livebode.locations import Location
 from livebode.preparation.contents import Contents, read_contents
 from livebode.preparation.part import chosen_part
 from livebode.preparation.plan import LIVE_RESPONSES_PER_S, SEARCHED, beginning
@@ -138,7 +139,7 @@ class Inspection:
 
 
 def inspect(
-    path: Path,
+    path: Location,
     *,
     rate_hz: float | None = None,
     time: str | None = None,
@@ -189,7 +190,7 @@ def inspect(
 
 
 def open_with_or_without_rate(
-    path: Path, rate_hz: float | None, given: _Given, required: Sequence[str], *, needs_rate: bool
+    path: Location, rate_hz: float | None, given: _Given, required: Sequence[str], *, needs_rate: bool
 ) -> tuple[Log, str]:
     """The log, and why it has no rate (empty if it has one); the channels can be listed without.
 

@@ -84,13 +84,17 @@ def moves(schedule: np.ndarray, window: int) -> bool:
     return bool(Movement(periods.shape[1]).process(0, periods.ravel()).any())
 
 
-def transient_event(periods: int, settings: Settings, first: int = 0, time_s: float = 0.0) -> Event:
-    """Event for the excluded samples up to the steady state, at sample `first`, where the excitation begins."""
-    samples = first + periods * settings.lines.window
+def transient_event(periods: int, settings: Settings, first: int = 0, time_s: float = 0.0, *, begun: int = 0) -> Event:
+    """Event for the excluded samples up to the steady state, at sample `first`, where the excitation begins.
+
+    `begun` is the number of the first sample. The event's `samples` is the number of the first sample that is used.
+    """
+    stop = first + periods * settings.lines.window
+    samples = stop - begun
     which = "period differs" if periods == 1 else f"{periods} periods differ"
-    before = "with the samples before them, " if first else ""
+    before = "with the samples before them, " if first > begun else ""
     message = (
         f"the first {which} from the steady state: {before}{counted(samples, 'sample')} "
         f"({samples / settings.lines.rate_hz:.4g} s) are excluded; --all-periods includes them"
     )
-    return Event("transient", first, time_s, message, {"periods": periods, "samples": samples})
+    return Event("transient", first, time_s, message, {"periods": periods, "samples": stop})

@@ -29,6 +29,7 @@ from livebode.core import (
     Responses,
 )
 from livebode.core.clock import RunClock
+from livebode.locations import original
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import StoredTable
@@ -132,7 +133,12 @@ class RunRecord:
             if self.on_damage is not None:
                 self.on_damage(damage)
                 return
-            warnings.warn(f"{self.path}: {damage.message}", DamageWarning, stacklevel=2)
+            warnings.warn(f"{self.place}: {damage.message}", DamageWarning, stacklevel=2)
+
+    @property
+    def place(self) -> str:
+        """Where it is, for its user: its path, or the URL that this is a copy of."""
+        return original(str(self.path))
 
     @property
     def found(self) -> dict[str, Any]:

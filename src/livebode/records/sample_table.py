@@ -27,6 +27,17 @@ def samples_of(channels: Sequence[Channel]) -> ColumnTable:
     return ColumnTable(pa.schema(own + columns))
 
 
+def channels_of(schema: pa.Schema) -> tuple[Channel, ...]:
+    """The channels in a table of samples, with their units."""
+    return tuple(
+        Channel(
+            field.name.removesuffix("_") if field.name.removesuffix("_") in _OWN else field.name,
+            ((field.metadata or {}).get(b"unit") or b"").decode(),
+        )
+        for field in list(schema)[len(_OWN) :]
+    )
+
+
 def as_rows(block: Block, table: ColumnTable) -> pa.RecordBatch:
     """The samples of a Block whose channels are those of the table."""
     number = np.arange(block.start, block.stop, dtype=np.int64)

@@ -10,6 +10,7 @@ from livebode.core import QuantityKind
 from livebode.core.clock import ClockKind
 
 Text = Annotated[str, Field(max_length=100_000)]
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Count = Annotated[int, Field(ge=0, lt=1 << 62)]
 Positive = Annotated[int, Field(gt=0, lt=1 << 62)]
 Section = dict[str, Any]
@@ -85,6 +86,22 @@ class _Record(_Part):
     tables: list[Text] = []
 
 
+class _Recorded(_Part):
+    from_: Text | None = Field(alias="from")
+    to: Text | None
+    clock: Literal["time of day", "file", "unknown"]
+
+
+class _ContentFile(_Part):
+    file: Text
+    sha256: Digest
+
+
+class _Content(_Part):
+    sha256: Digest
+    files: list[_ContentFile]
+
+
 class _Configuration(_Part):
     signals: dict[str, Any] = {}
     source: Section = {}
@@ -101,6 +118,10 @@ class _AnySummary(_Part):
     counts: dict[str, Count | None] = {}
     speed: _Speed | None = None
     versions: Section = {}
+    machine: dict[Text, Text] = {}
+    recorded: _Recorded | None = None
+    content: _Content | None = None
+    recipe: Text | None = None
     source: Section | None = None
     fit: Section | None = None
     loop: Section | None = None
@@ -110,6 +131,7 @@ class _AnySummary(_Part):
     record: _Record | None = None
     left_out_samples: Count | None = None
     clock: list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None = None
+    numbering: list[Annotated[list[Count], Field(min_length=3, max_length=3)]] = []
     files: dict[str, list[Section]] = {}
 
 

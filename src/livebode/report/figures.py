@@ -43,6 +43,10 @@ def _figure(picture: Picture) -> Figure:
         from livebode.report.validation import validation_figure
 
         return validation_figure(**picture.data, title=tr("Measured and simulated"), folded=True)
+    if picture.what == "years":
+        from livebode.report.year import years_figure
+
+        return years_figure(**picture.data)
     if picture.what == "comparison":
         from livebode.report.comparison import comparison_figure
 

@@ -63,7 +63,7 @@ def _panel(axes: Axes, look: Style, time_s: Floats, curve: Curve) -> None:
     axes.fill_between(at, low[:, 0], high[:, 0], color=look.run, alpha=0.22, linewidth=0, gid="bound")
     axes.plot(at, middle[:, 0], color=look.run, linewidth=1.2, gid="value")
     axes.set_title(
-        shortened(_label(name, unit), 60),
+        shortened(labelled(name, unit), 60),
         loc="left",
         size=10,
         color=look.ink,
@@ -77,7 +77,8 @@ def _panel(axes: Axes, look: Style, time_s: Floats, curve: Curve) -> None:
     plain(axes)
 
 
-def _label(name: str, unit: str) -> str:
+def labelled(name: str, unit: str) -> str:
+    """A quantity with its unit."""
     text = recognised(name.replace("_", " "))
     return tr("{name} in {unit}", name=text, unit=recognised(unit)) if unit else text
 

@@ -16,7 +16,7 @@ _ACTIVE_MAX = 5
 def alarms(run: RunRecord, event_summary: EventSummary) -> tuple[Finding, ...]:
     """The summary of the monitoring, then the active alarms."""
     monitoring: dict[str, Any] = run.summary.get("monitoring", {})
-    if not monitoring or (run.finished and monitoring.get("baseline") is None):
+    if "message" not in monitoring or (run.finished and monitoring.get("baseline") is None):
         return (_so_far(run, event_summary),)
     tone: Tone = "open"
     active = bool(monitoring.get("standing"))

@@ -72,8 +72,8 @@ class Comparison:
         """For JSON."""
         places = [{"from": p.low, "to": p.high, "back": p.back} | _lines(p.difference) for p in self.found.places]
         return {
-            "before": str(self.found.runs[0].path),
-            "after": str(self.found.runs[1].path),
+            "before": self.found.runs[0].place,
+            "after": self.found.runs[1].place,
             "quantity": self.found.overall.before.quantity,
             "unit": self.found.overall.before.unit,
             "alpha": ALPHA,
@@ -131,7 +131,7 @@ class Comparison:
             (self.changes.parameter_words, self.changes.parameters), (self.changes.margin_words, self.changes.margins),
         )  # fmt: skip
         parts = tuple(Paragraph(recognised(words)) for words, table in absent if words and not table)
-        paths = pairs([(tr("before"), str(self.found.runs[0].path)), (tr("after"), str(self.found.runs[1].path))])
+        paths = pairs([(tr("before"), self.found.runs[0].place), (tr("after"), self.found.runs[1].place)])
         found = (Section(tr("Details of the measurement"), (paths,)), _settings(*self.found.runs))
         return (*found, Section(tr("Not in this report"), parts)) if parts else found
 
@@ -252,7 +252,7 @@ class Comparison:
         parts: list[Part] = [Table((tr("kind"), tr("before"), tr("after")), rows, (1, 2))] if rows else []
         for run, when in zip(self.found.runs, (tr("Before"), tr("After"))):
             monitoring = run.summary.get("monitoring", {})
-            judged = monitoring.get("baseline") is not None
+            judged = monitoring.get("baseline") is not None and "message" in monitoring
             message = monitoring["message"] if judged else marked("changes are not assessed.")
             parts.append(Paragraph(f"{when}: {recognised(message)}"))
         return Section(tr("Events"), tuple(parts))

@@ -7,6 +7,7 @@ from typing import Any
 from livebode.core.clock import moment
 from livebode.core.document import Paragraph, Section
 from livebode.language import listed, marked, number, recognised, tr, trn
+from livebode.locations import location, resolved
 from livebode.reporting.report_data import ReportData, recordings
 from livebode.reporting.wording import duration, pairs
 
@@ -88,7 +89,7 @@ def details(of: ReportData) -> Section:
     """Where the signals came from, and the described controllers with the keys of the configuration."""
     source = of.configuration.get("source", {})
     rows = [
-        (tr("run"), str(of.run.path.resolve())),
+        (tr("run"), str(resolved(location(of.run.place)))),
         (tr("source"), listed(recordings(source)) or str(source.get("url") or "")),
         (tr("format"), str(of.run.found.get("format", ""))),
         (tr("loop"), "; ".join(_loop(of.configuration.get("loop", {})))),

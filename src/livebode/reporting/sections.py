@@ -188,10 +188,12 @@ def events(of: ReportData) -> Section:
     """Alarms and other events."""
     monitoring = of.run.summary.get("monitoring", {})
     words = alarms(of.run, of.event_summary)[0].text
-    if monitoring.get("baseline"):
+    if name := monitoring.get("baseline"):
+        version = monitoring.get("baseline_id")
+        named = f"{name} ({version})" if version else str(name)
         words += " " + tr(
             "Baseline {baseline}, judged by {judge}; mean time between false alarms: {days} days of motion or more.",
-            baseline=monitoring["baseline"], judge=recognised(str(monitoring.get("judged_by", "—"))),
+            baseline=named, judge=recognised(str(monitoring.get("judged_by", "—"))),
             days=monitoring.get("false_alarm_interval_days", "—"),
         )  # fmt: skip
         if covariates := monitoring.get("covariates"):

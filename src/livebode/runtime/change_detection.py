@@ -26,9 +26,15 @@ class ChangeDetection:
     """Passes a run's samples and responses to a Monitor, if there is one, and lists its alarms for run.json."""
 
     def __init__(
-        self, monitor: Monitor | None, baseline: str | None, remark: str = "", covariates: tuple[str, ...] = ()
+        self,
+        monitor: Monitor | None,
+        baseline: str | None,
+        remark: str = "",
+        covariates: tuple[str, ...] = (),
+        baseline_id: str | None = None,
     ) -> None:
         self._monitor, self._baseline, self._remark = monitor, baseline, remark
+        self._id = baseline_id
         self.covariates = covariates
         """Channels that it needs in addition to those of the follower."""
         self._alarms: list[str] = []
@@ -37,6 +43,11 @@ class ChangeDetection:
     def baseline(self) -> str | None:
         """Name of what it compares with; None if it detects nothing."""
         return None if self._monitor is None else self._baseline
+
+    @property
+    def compared_with(self) -> dict[str, Any]:
+        """Name and id of the baseline, as in run.json."""
+        return {"baseline": self.baseline, "baseline_id": self._id}
 
     def take_samples(self, block: Block) -> list[Event]:
         """Monitor the next samples; without this call they are a gap for the Monitor."""
@@ -53,11 +64,11 @@ class ChangeDetection:
     def summary(self, suppressed_s: float = 0.0) -> dict[str, Any]:
         """Entries of run.json of a run that was not assessed for so many seconds, as the machine was not ready."""
         if self._monitor is None:
-            return {"baseline": None, "message": _NO_BASELINE + self._remark}
+            return self.compared_with | {"message": _NO_BASELINE + self._remark}
         found = self._monitor.summary()
         remark = f" Not assessed for {suppressed_s:.1f} s: the machine was not ready." if suppressed_s else ""
         message = {"message": found["message"] + remark + self._remark}
-        return {"baseline": self._baseline} | found | message | {"alarms": self._alarms}
+        return self.compared_with | found | message | {"alarms": self._alarms}
 
     def snapshot(self) -> bytes:
         """Its messages, and the state that the next event depends on; see `restore`."""
@@ -97,6 +108,7 @@ def change_detection(axis: Axis, settings: Settings, *, samples: bool = True) ->
     from livebode.monitoring import Baseline, Monitor  # with the simulation
 
     baseline = Baseline.load(section.baseline)
+    learned = baseline.id
     baseline.check_covariates(covariates)
     left_out = not samples and baseline.machine is not None
     if left_out:
@@ -104,4 +116,4 @@ def change_detection(axis: Axis, settings: Settings, *, samples: bool = True) ->
     monitor = Monitor(baseline, settings, 86400 * section.false_alarm_interval_days, corrected=axis.motion is not None)
     blind = axis.fit is None and "parameters" in monitor.tables
     remark = _NOT_FITTED * blind + _NO_SAMPLES * left_out
-    return ChangeDetection(monitor, str(section.baseline), remark, baseline.covariates)
+    return ChangeDetection(monitor, str(section.baseline), remark, baseline.covariates, learned)

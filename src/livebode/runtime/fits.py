@@ -43,10 +43,13 @@ class Fits:
 
     def process(self, responses: Responses) -> tuple[tuple[Parameters, ...], list[Event]]:
         """Parameters of a batch: its fits, the quantities derived from them, the margins; and events."""
-        fitter = self._fitter or self._begin(responses.unit)
         events: list[Event] = []
-        found = fitter.process(responses, events.append)
-        around = () if self.loop is None else _margins(found, responses, fitter, self.loop)
+        found = self.fitter(responses.unit).process(responses, events.append)
+        self.take(found, responses)
+        return (found, *self.around(found, responses)), events
+
+    def take(self, found: Parameters, responses: Responses) -> None:
+        """Count the fits of these responses, and remember the newest."""
         for word, count in zip(*np.unique(found.status, return_counts=True)):
             self._counts[str(word)] = self._counts.get(str(word), 0) + int(count)
         good = np.flatnonzero(found.ok)
@@ -57,7 +60,12 @@ class Fits:
             if usual.size or self._newest is None:
                 at = (usual if usual.size else good)[-1:]
                 self._newest, self._newest_response = found[at], responses[at]
-        return (found, fitter.derived(found), *around), events
+
+    def around(self, found: Parameters, responses: Responses) -> tuple[Parameters, ...]:
+        """Quantities derived from the fits of these responses, and the margins."""
+        fitter = self.fitter(responses.unit)
+        margins = () if self.loop is None else _margins(found, responses, fitter, self.loop)
+        return fitter.derived(found), *margins
 
     def snapshot(self) -> bytes:
         """State that the next fit depends on, as bytes; see `restore`."""
@@ -85,9 +93,10 @@ class Fits:
         self._fitter, self._unit, self._newest, self._newest_response = fitter, state["unit"], newest, None
         self._counts, self._epsilons = state["counts"], state["epsilons"]
 
-    def _begin(self, unit: str) -> Fitter:
-        self._unit = unit
-        self._fitter = fitter_of(self.section, self._kinds)
+    def fitter(self, unit: str) -> Fitter:
+        """The fitter of the run, whose responses have this unit."""
+        if self._fitter is None:
+            self._unit, self._fitter = unit, fitter_of(self.section, self._kinds)
         return self._fitter
 
     def newest(self) -> Fit | None:

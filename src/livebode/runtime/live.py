@@ -11,23 +11,27 @@ from functools import partial
 from pathlib import Path
 
 from livebode.configuration.axis import Axis, RecordSection
-from livebode.core import Event, LivebodeError
+from livebode.core import ConfigError, Event, LivebodeError
 from livebode.core.clock import moments_by
 from livebode.runtime import successors
 from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition, stream_position
 from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.provenance import provenance
+from livebode.runtime.recorded_run import source_of
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
-from livebode.sources.live import LiveSource, make_source
+from livebode.sources.live import LiveSource
+from livebode.sources.live.replayable import ReplaySource
 
 _logger = logging.getLogger(__name__)
 
 
 def run_live(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Track a machine until its source ends or is stopped, in as many runs as its configuration has changes."""
-    source = make_source(axis.source)
+    _check_apart(axis.source.replay, to.directory)
+    source = source_of(axis.source)
     control.controls(source)
     position = StreamPosition() if to.force else stream_position(successors.newest(to.directory))
     if position.left_at is not None:
@@ -35,6 +39,18 @@ def run_live(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     with source.open(partial(_report_late, to)), contextlib.ExitStack() as finishing:
         pipeline = Pipeline.live(axis, source)
         return _Succession(source, position, to, control, finishing).run(pipeline)
+
+
+def _check_apart(replayed: Path | None, directory: Path) -> None:
+    """ConfigError if the run would be written where its own samples are: force would remove them."""
+    if replayed is not None and replayed.resolve() in [path.resolve() for path in successors.all_of(directory)]:
+        raise ConfigError(
+            "key-conflict",
+            f"source.replay is {str(replayed)!r}, and so is the directory of the run",
+            "choose another directory for the run",
+            key="source.replay",
+            path=str(replayed),
+        )
 
 
 def _report_late(to: Destination, why: str) -> None:
@@ -63,6 +79,8 @@ class _Succession:
         self._source, self._position, self._to = source, position, to
         self._control, self._finishing = control, finishing
         self._relation = ClockRelation()
+        if isinstance(source, ReplaySource):
+            self._relation.clock.pieces = list(source.clock.pieces)
 
     def run(self, pipeline: Pipeline) -> Outcome:
         """The first run and all that follow, until the end."""
@@ -103,6 +121,7 @@ class _Succession:
             # Most keys of a source apply to other kinds of source.
             "configuration": axis.model_dump(mode="json", exclude={"serve", "source"}, by_alias=True)
             | {"source": axis.source.model_dump(mode="json", exclude_defaults=True, by_alias=True)},
+            **provenance(axis),
             "found": {"format": self._source.format, "rate_from": "the sender", "clock": "relative"},
         }
         return RunLoop(

@@ -50,6 +50,7 @@ class LiveChecks:
         lines = settings.lines
         self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
         self._stretch = _Stretch()
+        self._begun: int | None = None
         repeats = settings.periodic and settings.method.reference == "excitation"
         self._reference = settings.excitation if repeats else None
         self._slips = SlipSearch(lines.window)
@@ -74,6 +75,7 @@ class LiveChecks:
         """Findings with this Block."""
         if not len(block):
             return
+        self._begun = block.start if self._begun is None else self._begun
         if self._roles or self._transient:
             if self._stretch.add(block, self._channels, self._size):
                 self._transient = False  # the excitation may have begun in samples that are not judged
@@ -97,7 +99,8 @@ class LiveChecks:
             for one in suspicions(by_role, settings):
                 yield Event("roles-doubtful", start, _time_s(block, start), one.sentence)
         if self._transient and (periods := transient_periods(signals, settings)):
-            yield transient_event(periods, settings, first=start, time_s=_time_s(block, start))
+            begun = start if self._begun is None else self._begun
+            yield transient_event(periods, settings, first=start, time_s=_time_s(block, start), begun=begun)
         self._roles = self._transient = False
         self._report_judged()
 

@@ -20,6 +20,7 @@ from livebode.preparation.output_only import output_only_part, output_only_setti
 from livebode.runtime.documents import FitResults, Subscriber, TrackerResults
 from livebode.runtime.event_groups import EventGroups
 from livebode.runtime.mode_summaries import ModeSummaries
+from livebode.runtime.provenance import RecordedSpan, provenance, recorded
 from livebode.runtime.stream import Stream
 from livebode.runtime.summary import versions
 from livebode.runtime.whole_record import WholeRecord
@@ -82,7 +83,8 @@ class _OutputOnlyRun:
         self._summaries = ModeSummaries()
         self._check = ChannelCheck(settings.outputs, settings.outputs[0])
         self._windows: dict[str, int] = {}
-        self._at = 0, 0.0
+        self._at, self._from_s = (0, 0.0), log.origin_s + log.first / log.rate_hz
+        self._provenance = provenance(axis)
 
     def follow(self) -> None:
         """Process every Block of the recording."""
@@ -130,6 +132,8 @@ class _OutputOnlyRun:
             "output_only": True,
             "configuration": self._axis.model_dump(mode="json", exclude={"serve"}, by_alias=True),
             "found": found,
+            **self._provenance,
+            "recorded": recorded([RecordedSpan(log.path, log.clock_kind, self._from_s, self._at[1])]),
             "versions": versions(),
             "counts": self._tracker.counts | {"windows": sum(self._windows.values())},
             "windows": self._windows,

@@ -28,6 +28,14 @@ class Recorder(Protocol):
     def clock(self) -> Sequence[tuple[float, float]]:
         """The clock of the run that it continues, as in `RunClock`."""
 
+    @property
+    def numbering(self) -> Sequence[tuple[int, int, int]]:
+        """The numbers of the senders in the run that it continues, as in `SenderNumbers`."""
+
+    @property
+    def begun(self) -> str | None:
+        """When the run that it continues began, as in run.json; None for a new one, or if nothing recorded it."""
+
     def previous(self) -> Iterator[Responses]:
         """The newest responses of the run that it continues."""
 

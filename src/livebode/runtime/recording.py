@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +21,7 @@ from livebode.preparation.plan import make_follower, roles_in_doubt, window_in_d
 from livebode.preparation.steady import steady
 from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.provenance import RecordedSpan, provenance, recorded
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
 from livebode.runtime.uneven_recording import run_uneven
@@ -41,14 +43,21 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     of = examined(axis, log, pipeline.follower)
     settings = pipeline.follower.settings
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": of.found}
+    about |= provenance(axis)
     if settings.quantity == "plant" and settings.periodic and not settings.average:
         pipeline = replace(pipeline, drift=DriftTest(settings.lines))
     loop = RunLoop(
         of.source, pipeline, to, about=about, segments=axis.record, started=started, control=control,
-        noticed=of.noticed,
+        noticed=of.noticed, recorded=dated(log),
     )  # fmt: skip
     with moments_by(RunClock.of_kind(log.clock_kind)):
         return loop.run()
+
+
+def dated(log: Log) -> Callable[[float], dict[str, Any]]:
+    """Entry ``recorded`` of run.json, from the time after the last sample of the recording."""
+    from_s = log.origin_s + log.first / log.rate_hz
+    return lambda to_s: recorded([RecordedSpan(log.path, log.clock_kind, from_s, to_s)])
 
 
 @dataclass(frozen=True, eq=False)

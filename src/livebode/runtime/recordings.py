@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from livebode.configuration.axis import Axis
@@ -16,13 +14,16 @@ from livebode.core.clock import RunClock, moments_by
 from livebode.estimation import Tracker
 from livebode.estimation.successive import SuccessiveTrackers
 from livebode.fitting import RecordingsMean
+from livebode.locations import Location, local_copy
 from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.checks import ChannelCheck
 from livebode.preparation.part import configured_part
 from livebode.preparation.plan import make_settings
 from livebode.preparation.recordings import check_same, realisations
+from livebode.records.content import content_sha256
 from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.provenance import RecordedSpan, provenance, recorded
 from livebode.runtime.recording import Examined, examined
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
@@ -90,10 +91,12 @@ def run_recordings(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     }
     found.pop("part", None)
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": found}
+    about |= provenance(axis, [part.sha256 for part in parts])
+    date = recorded([_span(part) for part in parts])
     noticed = [_named(event, part) for part in parts for event in part.of.noticed]
     loop = RunLoop(
         SuccessiveRecordings(sources, [part.shift for part in parts]), pipeline, to,
-        about=about, started=started, control=control, noticed=noticed,
+        about=about, started=started, control=control, noticed=noticed, recorded=lambda _: date,
     )  # fmt: skip
     with moments_by(RunClock.of_kind("relative")):
         return loop.run()
@@ -115,17 +118,17 @@ def _prepared(axis: Axis) -> list[_Part]:
     return parts
 
 
-def _sha256(path: Path, before: Sequence[_Part]) -> str:
+def _sha256(place: Location, before: Sequence[_Part]) -> str:
     """The file's checksum; RecordingError if it is that of an earlier one, which would count as twice the evidence."""
-    with path.open("rb") as file:
-        found = hashlib.file_digest(file, "sha256").hexdigest()
+    with local_copy(place) as path:
+        found = content_sha256(path)
     same = next((part.log.path for part in before if part.sha256 == found), None)
     if same is not None:
         raise RecordingError(
             "recording-repeated",
-            f"{path} has the same content as {same}",
+            f"{place} has the same content as {same}",
             "give each recording once",
-            path=str(path),
+            path=str(place),
             other=str(same),
         )
     return found
@@ -160,8 +163,14 @@ def _about(part: _Part) -> dict[str, Any]:
     }
 
 
+def _span(part: _Part) -> RecordedSpan:
+    log = part.log
+    times = [log.origin_s + sample / log.rate_hz for sample in (log.first, part.stop - part.shift)]
+    return RecordedSpan(log.path, log.clock_kind, *times)
+
+
 def _named(event: Event, part: _Part) -> Event:
     """The event of a recording in the numbers of the run."""
-    name = Path(part.log.path).name
+    name = part.log.path.name
     details = event.details | {"recording": name}
     return replace(event, sample=event.sample + part.shift, message=f"in {name}: {event.message}", details=details)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import nan
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -27,9 +28,11 @@ from livebode.runtime.documents import Channels, ClockSet, FitResults, RunEnded,
 from livebode.runtime.drift_event import drift_events
 from livebode.runtime.live_checks import LiveChecks
 from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.provenance import recorded_live
 from livebode.runtime.recorder import Recorder
 from livebode.runtime.run_control import RunControl, StoppedError
 from livebode.runtime.run_counts import RunCounts
+from livebode.runtime.sender_numbers import SenderNumbers
 from livebode.runtime.shedding import LoadShedding
 from livebode.runtime.stream import Stream
 from livebode.runtime.whole_record import WholeRecord
@@ -91,6 +94,8 @@ class RunLoop:
         Events on the whole recording, found before tracking.
     relation
         The clock of a live source while it is open.
+    recorded
+        Gives the date of a recording, as in run.json, from the time after its last sample.
     delivery
         Arguments for the source's `blocks`.
     """
@@ -110,6 +115,7 @@ class RunLoop:
         previous: PreviousRun | None = None,
         noticed: Sequence[Event] = (),
         relation: ClockRelation | None = None,
+        recorded: Callable[[float], dict[str, Any]] | None = None,
         **delivery: Any,
     ) -> None:
         _keep_freed_memory()
@@ -130,11 +136,14 @@ class RunLoop:
         self._about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
         self._plant = response_unit(source.channels, settings), plant_kinds(source.channels, settings)
         self._begun = summary.begun(self._about, self._follower, *self._plant)
+        if (detection := pipeline.detection) is not None and detection.baseline is not None:
+            self._begun["monitoring"] = detection.compared_with
         self._overview = Overview()
         self._done: dict[str, Any] = {}
         self._found_on_the_way: dict[str, Any] = {}
         self._newest: Fit | None = None
-        self._relation = relation or ClockRelation()
+        self._relation, self._recorded = relation or ClockRelation(), recorded
+        self._numbers = SenderNumbers()
         self._origin_s = 0.0
         self._stepped_s = time.monotonic()
         self._events: list[Event] = []  # found in this Block, published after its responses
@@ -186,6 +195,8 @@ class RunLoop:
         for block in self._blocks:
             if paced and isinstance(block, LiveBlock) and self._relation.take(block, self._events.append):
                 self._set_clock()
+            if isinstance(block, LiveBlock) and self._numbers.take(block):
+                self._renew(numbering=self._numbers.pieces)
             if self._control.ended and not self._live:
                 raise StoppedError("ended before the end of the recording")
             yield block
@@ -285,7 +296,7 @@ class RunLoop:
         """Publish the start, and what the record that it continues contains."""
         begun = self._begun | ({"record": {"finished": False}} if self._recorder.continues else {})
         if (detection := self.pipeline.detection) is not None:
-            begun = begun | {"monitoring": {"baseline": detection.baseline}}
+            begun = begun | {"monitoring": detection.compared_with}
         self._stream.announce(RunStarted(self.to.directory, begun, self._control, self._overview))
         channels = {channel.name: channel for channel in self.source.channels}
         used = tuple(channels[name] for name in self.pipeline.channels)
@@ -320,7 +331,14 @@ class RunLoop:
         """Publish the clock of a live run."""
         pieces = self._relation.clock.pieces
         self._stream.announce(ClockSet(tuple(pieces)))
-        self._renew(clock=list(pieces))
+        self._renew(clock=list(pieces), recorded=self._date(None))
+
+    def _date(self, to_s: float | None) -> dict[str, Any]:
+        """Date of a live run, up to the time after its last sample; None while it runs."""
+        clock, previous = self._relation.clock, self._previous
+        from_s = previous.time_s if previous is not None else clock.pieces[0][0] if clock.pieces else nan
+        date = recorded_live(clock, from_s, to_s)
+        return date | ({"from": self._recorder.begun} if self._recorder.begun else {})
 
     def _renew(self, **found: Any) -> None:
         """Write findings during the run to run.json, now and at the end."""
@@ -370,6 +388,10 @@ class RunLoop:
             self._stream.publish_all(between_events(self._done["between"], *self.position))
         self._stream.finish_groups()
         self._done |= self._found_on_the_way
+        if self._live:
+            self._done["recorded"] = self._date(self.position[1])
+        elif self._recorded is not None:
+            self._done["recorded"] = self._recorded(self.position[1])
         if continued_in is not None:
             self._done["continued_in"] = continued_in
 
@@ -417,6 +439,7 @@ class RunLoop:
             self._renew(left_out_samples=self._counts.left_out_samples)
         if self._recorder.clock:
             self._relation.clock.pieces = list(self._recorder.clock)
+        self._numbers = SenderNumbers.of(self._recorder.numbering)
         return self
 
     def __exit__(self, *error: Any) -> None:
@@ -437,7 +460,7 @@ class RunLoop:
             rate_hz=self._follower.settings.lines.rate_hz,
             parts=dict(self.pipeline.parts) | {"counts": self._counts},
             again=again,
-            ends=self.source.samples is not None,
+            ends=lambda: self.source.samples is not None and not self._control.ended,
             publish=lambda event: self._stream.announce(event),
             waiting=self._counts.groups.waiting,
             position=self._position,

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from livebode.configuration.axis import RecordSection
-from livebode.core import Block, Channel, Event, RecordError, Responses, Spectra, Stateful
+from livebode.core import Block, Channel, Event, RecordError, Responses, Spectra, StateError, Stateful
 from livebode.core.clock import RunClock
 from livebode.core.files import whole_files
 from livebode.core.writing import why, writing
@@ -25,8 +25,9 @@ from livebode.records.segments.store import Store
 from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
 from livebode.runtime.documents import Document, FitResults
 from livebode.runtime.run_control import StoppedError
+from livebode.runtime.same_run import check_same_run, earlier_versions
 
-FOUND_ON_THE_WAY = "clock", "left_out_samples"
+FOUND_ON_THE_WAY = "clock", "left_out_samples", "numbering", "recorded"
 _PICTURES = "pictures"
 _INTERVAL_S = 0.5
 _PIECE_S = 0.25  # with the interval 0.75 s: most data that a kill can cost
@@ -55,7 +56,7 @@ class SegmentedRecord:
     again
         Whether the source begins with the same samples again each time; else its numbers continue.
     ends
-        Whether the source has an end, at which the run is finished; without an end a stopped run can continue.
+        Whether the source has reached its end, so that the run is finished; else a stopped run can continue.
     publish
         Called immediately with events of the record itself.
     waiting
@@ -77,7 +78,7 @@ class SegmentedRecord:
         parts: Mapping[str, Stateful],
         force: bool,
         again: bool,
-        ends: bool,
+        ends: Callable[[], bool],
         publish: Callable[[Event], None],
         waiting: Callable[[], Sequence[Event]] = tuple,
         position: StreamPosition | None = None,
@@ -89,6 +90,7 @@ class SegmentedRecord:
         self._new, self._waited = False, waiting()
         self._first = (0, 0.0) if previous is None else (previous.sample, previous.time_s)
         self._more: dict[str, Any] = {} if previous is None else {"continues": previous.name}
+        self.begun: str | None = None
         self._summary, self._rate_hz = dict(summary), rate_hz
         self._parts = dict(parts) | ({} if position is None else {SOURCE: position})
         self._force, self._again, self._ends, self._publish = force, again, ends, publish
@@ -169,6 +171,11 @@ class SegmentedRecord:
         """Relation of the run's seconds to the time of day, as in `RunClock` and run.json."""
         return RunClock.of(self._more).pieces
 
+    @property
+    def numbering(self) -> list[tuple[int, int, int]]:
+        """Numbers of the senders, as in `SenderNumbers` and run.json."""
+        return list(self._more.get("numbering", ()))
+
     def renew(self, **found: Any) -> None:
         """Write findings during the run to run.json."""
         self._more |= found
@@ -221,7 +228,7 @@ class SegmentedRecord:
         assert last is not None
         # Results that were delayed until the end were written after the last commit, and belong to the present states.
         self._store.commit(last.sample, last.time_s, self._states())
-        self._store.finish(self._named(summary), finished=self._ends or "continued_in" in summary)
+        self._store.finish(self._named(summary), finished=self._ends() or "continued_in" in summary)
 
     def _commit(self, sample: int, time_s: float) -> None:
         self._new, self._waited = False, self._waiting()
@@ -237,28 +244,19 @@ class SegmentedRecord:
     def _restore(self, states: Mapping[str, bytes]) -> None:
         before = RunRecord.open(self.path, self._found_damaged).summary
         now = json.loads(to_json(self._summary))
-        if states.keys() != self._parts.keys() or _identity(before) != _identity(now):
-            raise RecordError(
-                "configuration-differs",
-                f"the unfinished run in {str(self.path)!r} was started with another configuration",
-                "use that one again, choose another directory, or replace the run with force",
-                path=str(self.path),
-            )
+        check_same_run(self.path, before, now, states, self._parts)
         for name, part in self._parts.items():
-            part.restore(states[name])
+            try:
+                part.restore(states[name])
+            except StateError as error:
+                raise error.at(f"the unfinished run in {str(self.path)!r}") from None
         self._more = {name: before[name] for name in ("continues", *FOUND_ON_THE_WAY) if name in before}
+        self._more |= earlier_versions(before, now)
+        self.begun = (before.get("recorded") or {}).get("from")
         self._store.renew(self._named(self._summary))
 
     def _named(self, summary: dict[str, Any]) -> dict[str, Any]:
         return self._more | summary
-
-
-def _identity(summary: Mapping[str, Any]) -> list[Any]:
-    # The segmentation of the record and the texts of the report may change during a run; what is recorded may not.
-    configuration = {name: value for name, value in summary["configuration"].items() if name != "report"}
-    kept = configuration.pop("record", None) or {}
-    found = {key: value for key, value in summary["found"].items() if key not in ("motion", "judged")}  # learned
-    return [configuration, found, kept.get("samples")]
 
 
 def make_way(path: Path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from livebode.analysis.loop_report import loop_report
 from livebode.core import Lines, PlantKinds, Responses
 from livebode.core.clock import moment
+from livebode.core.state import ENCODING
 from livebode.estimation.stream_estimator import Follower
 from livebode.fitting import Fit, RecordingsMean
 from livebode.fitting.drift import Drift
@@ -28,13 +29,14 @@ def begun(about: Mapping[str, Any], tracker: Follower, unit: str, kinds: PlantKi
     return dict(about) | {"found": about.get("found", {}) | found, "versions": versions()}
 
 
-def versions() -> dict[str, str]:
-    """Versions of livebode and of what its results depend on."""
+def versions() -> dict[str, str | int]:
+    """Versions of livebode, of what its results depend on, and of the encoding of its states."""
     return {
         "livebode": __version__,
         "numpy": np.__version__,
         "python": platform.python_version(),
         "instruction_set": instruction_set(),
+        "states": ENCODING,
     }
 
 

@@ -18,6 +18,7 @@ from livebode.preparation.uneven_plan import check_uneven, clock_facts, uneven_e
 from livebode.preparation.uneven_spectra import UnevenSource
 from livebode.runtime.destination import Destination
 from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.provenance import RecordedSpan, provenance, recorded
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
 from livebode.sources.uneven import UnevenLog
@@ -45,11 +46,15 @@ def run_uneven(axis: Axis, log: UnevenLog, to: Destination, control: RunControl,
     if part.is_part:
         found["part"] = {"first": part.first, "stop": part.stop}
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": found}
+    about |= provenance(axis)
+    dates = [part.origin_s + sample / part.rate_hz for sample in (part.first, part.stop)]
+    date = recorded([RecordedSpan(part.path, part.clock_kind, *dates)])
     if settings.quantity == "plant" and not settings.average:
         pipeline = replace(pipeline, drift=DriftTest(settings.lines))
     loop = RunLoop(
-        source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed
-    )
+        source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed,
+        recorded=lambda _: date,
+    )  # fmt: skip
     with moments_by(RunClock.of_kind(part.clock_kind)):
         return loop.run()
 

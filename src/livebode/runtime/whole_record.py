@@ -20,6 +20,8 @@ class WholeRecord:
 
     continues = False
     clock = ()
+    numbering = ()
+    begun = None
 
     def __init__(self, path: Path, *, force: bool, responses: bool = True) -> None:
         self.path = path

@@ -12,6 +12,7 @@
 
 extern "C" {
 #include "axis.h"
+#include "two_masses.h"
 }
 
 namespace nb = nanobind;
@@ -105,6 +106,28 @@ class Engine {
     lb_axis_state state_{};
 };
 
+using Line = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Table = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+void two_masses(double rate_hz, double radius_m, const Table &pairs, const Line &stiffness, const Line &damping,
+                const Table &torque, const Out &motor, const Out &cart)
+{
+    const size_t ticks = stiffness.shape(0), count = pairs.shape(0), torques = torque.shape(0);
+    const bool usable = pairs.shape(1) == 4 && damping.shape(0) == ticks && torque.shape(1) == ticks &&
+                        (torques == 1 || torques == count) && motor.shape(0) == count && motor.shape(1) == ticks &&
+                        cart.shape(0) == count && cart.shape(1) == ticks;
+    if (!usable) throw nb::value_error("shapes of pairs, stiffness, damping, torque and outputs disagree");
+    const lb_two_masses_course course{ticks, rate_hz, radius_m, stiffness.data(), damping.data()};
+    std::vector<lb_two_masses> pair(count);
+    for (size_t i = 0; i < count; ++i) {
+        const double *of = pairs.data() + 4 * i;
+        pair[i] = {of[0], of[1], of[2], of[3]};
+    }
+    nb::gil_scoped_release release;
+    lb_two_masses_advance(&course, count, pair.data(), torque.data(), torques == 1 ? 0 : ticks, motor.data(),
+                          cart.data());
+}
+
 } // namespace
 
 NB_MODULE(_axis, m)
@@ -114,4 +137,6 @@ NB_MODULE(_axis, m)
         .def_prop_ro("plant", &Engine::plant)
         .def("advance", &Engine::advance, nb::arg("input"), nb::arg("output"))
         .def("derivative", &Engine::derivative, nb::arg("now"), nb::arg("torque_n_m"), nb::arg("state"));
+    m.def("two_masses", &two_masses, nb::arg("rate_hz"), nb::arg("radius_m"), nb::arg("pairs"), nb::arg("stiffness"),
+          nb::arg("damping"), nb::arg("torque"), nb::arg("motor"), nb::arg("cart"));
 }

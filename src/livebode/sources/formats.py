@@ -10,9 +10,10 @@ from importlib import import_module
 from pathlib import Path
 
 from livebode.core import LivebodeError, RecordingError
+from livebode.locations import Location, shared_copy
 from livebode.sources.bag import parts_of
 from livebode.sources.dbc import no_frames
-from livebode.sources.recording import Recording, contained
+from livebode.sources.recording import Recording, contained, located
 from livebode.sources.svdxdata import is_project
 
 HEAD_BYTES = 1024
@@ -120,17 +121,29 @@ FORMATS = (
 """All formats; the first that matches reads the file."""
 
 
-def open_recording(path: Path, dbc: Path | None = None) -> Recording:
-    """Open `path` with the format that its content has; `dbc` defines the signals in CAN frames.
+def open_recording(place: Location, dbc: Path | None = None) -> Recording:
+    """Open `place` with the format that its content has; `dbc` defines the signals in CAN frames.
 
     Raises
     ------
     RecordingError
         For a file that is missing, empty, unreadable, or not in one of the formats; for a `dbc` with a file that
         has no CAN frames.
+    LocationError
+        If it is at a URL and cannot be downloaded.
     ExtraError
-        Where the package that reads its format is not installed.
+        Where the package that reads its format, or its storage, is not installed.
     """
+    if isinstance(place, Path):
+        return _opened(place, dbc)
+    copy = shared_copy(place)
+    with located(copy.path):
+        recording = _opened(copy.path, dbc)
+    recording.copy = copy
+    return recording
+
+
+def _opened(path: Path, dbc: Path | None) -> Recording:
     first, head = read_head(path)
     _refuse_foreign(first, head)
     for format_ in FORMATS:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, QuantityKind, RecordingError, UsageError
 from livebode.core.clock import ClockKind
+from livebode.locations import Location
 from livebode.sources.computed import computed_blocks
 from livebode.sources.expressions import Expression
 from livebode.sources.naming import explained, found_channel, resolve
@@ -29,6 +29,7 @@ class Log:
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
     >>> from livebode import open_log
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "log.csv"
@@ -59,8 +60,9 @@ class Log:
         self._named: tuple[Channel, ...] = ()
 
     @property
-    def path(self) -> Path:
-        return self._recording.path
+    def path(self) -> Location:
+        """Its path or URL."""
+        return self._recording.place
 
     @property
     def format(self) -> str:
@@ -190,6 +192,7 @@ class Log:
         Examples
         --------
         >>> import tempfile
+        >>> from pathlib import Path
         >>> from livebode import open_log
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     path = Path(folder) / "log.csv"

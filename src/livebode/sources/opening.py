@@ -12,6 +12,7 @@ import numpy as np
 
 from livebode.core import QuantityKind, RecordingError, UsageError
 from livebode.core.clock import ClockKind
+from livebode.locations import Url, location
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import explained, in_file, resolve
@@ -23,7 +24,7 @@ _logger = logging.getLogger(__name__)
 
 
 def open_log(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Url,
     *,
     rate_hz: float | None = None,
     time: str | None = None,
@@ -38,7 +39,7 @@ def open_log(
     Parameters
     ----------
     path
-        The file; its content, not its ending, determines the format.
+        The file, or its URL (docs/how-to/remote.md); its content, not its ending, determines the format.
     rate_hz
         Samples per second, treated as exact. Default: from a time column or from the file's metadata.
     time
@@ -63,8 +64,10 @@ def open_log(
         for it.
     UsageError
         Where `rate_hz` or `block_samples` is out of range.
+    LocationError
+        Where the file at a URL cannot be downloaded.
     ExtraError
-        Where the package that reads the format is not installed.
+        Where the package that reads the format or the storage is not installed.
 
     Examples
     --------
@@ -87,8 +90,8 @@ def open_log(
             value=rate_hz,
         )
     checked_block_samples(block_samples)
-    recording = open_recording(Path(path), None if dbc is None else Path(dbc))
-    with located(recording.path), explained(recording.skipped):
+    recording = open_recording(location(path), None if dbc is None else Path(dbc))
+    with located(recording.place), explained(recording.skipped):
         log = log_of(recording, rate_hz, time, channels, block_samples, kinds or {}, clock)
     _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)
     return log

@@ -29,8 +29,9 @@ class ParquetRecording(Recording):
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         names = [self._names[column.key] for column in columns]
-        # A column is read once, however often it is in `names`; batches have the file's order.
-        with pq.ParquetFile(self.path, page_checksum_verification=True) as file:
+        # A column is read once, however often it is in `names`; batches have the file's order. With read-ahead the
+        # whole file would be in memory at its end.
+        with pq.ParquetFile(self.path, page_checksum_verification=True, pre_buffer=False) as file:
             for batch in file.iter_batches(max(rows, BATCH_ROWS_MIN), columns=names, use_threads=True):
                 yield [to_numpy(batch.column(name)) for name in names]
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import LivebodeError, RecordingError
+from livebode.locations import LocalCopy, Location, original, with_originals
 
 Chunk = list[NDArray[Any]]
 """One array for each requested column, of equal length, any numeric type; int64 nanoseconds for temporal ones."""
@@ -74,6 +75,8 @@ class Recording(ABC):
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.copy: LocalCopy | None = None
+        """What `path` is a copy of, if that is at a URL; it exists as long as this."""
         self.columns: tuple[Column, ...] = ()
         self.skipped: tuple[Skipped, ...] = ()
         self.scalars: Mapping[str, float] = {}
@@ -82,6 +85,11 @@ class Recording(ABC):
         """Rate where the format itself defines it."""
         self.breaks: tuple[int, ...] = ()
         """Rows at which a new record begins though no sample is counted as missing."""
+
+    @property
+    def place(self) -> Location:
+        """Where the recording is, for its user: its path or URL."""
+        return self.path if self.copy is None else self.copy.url
 
     @abstractmethod
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
@@ -109,26 +117,28 @@ def contained(path: Path, kind: str) -> Iterator[None]:
             "not-readable", f"no permission to read {path}", "ask for read access to it", path=str(path)
         ) from None
     except MemoryError:
+        place = original(str(path))
         raise RecordingError(
             "damaged",
-            f"{path} declares more data than fits in memory",
+            f"{place} declares more data than fits in memory",
             "check that the file is not damaged",
-            path=str(path),
+            path=place,
         ) from None
     except Exception as error:
         lines = str(error.args[0] if isinstance(error, KeyError) and error.args else error).strip().splitlines()
-        reason = (lines[0] if lines else type(error).__name__)[:200].rstrip(" .")
+        reason = original((lines[0] if lines else type(error).__name__)[:200].rstrip(" ."))
+        place = original(str(path))
         raise RecordingError(
             "damaged",
-            f"cannot read {path} as {kind}: {reason}",
+            f"cannot read {place} as {kind}: {reason}",
             "check that the file is complete and of this format",
-            path=str(path),
+            path=place,
             format=kind,
         ) from error
 
 
 @contextmanager
-def located(path: Path) -> Iterator[None]:
+def located(path: Location) -> Iterator[None]:
     """Errors inside it name the file, as a fact and at the beginning of their message."""
     try:
         yield
@@ -136,12 +146,12 @@ def located(path: Path) -> Iterator[None]:
         raise named(error, path) from error.__cause__
 
 
-def named(error: LivebodeError, path: Path) -> LivebodeError:
-    """The error with the name of its file; unchanged if it already names a file."""
-    if "path" in error.facts:
-        return error
-    error.facts["path"] = str(path)
-    return error.at(str(path))
+def named(error: LivebodeError, path: Location) -> LivebodeError:
+    """The error with the name of its file, or its URL; unchanged if it already names a file."""
+    if "path" not in error.facts:
+        error.facts["path"] = str(path)
+        error = error.at(str(path))
+    return with_originals(error)
 
 
 def guarded(chunks: Iterator[Chunk], path: Path, kind: str) -> Iterator[Chunk]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, QuantityKind, RecordingError, UsageError
 from livebode.core.clock import ClockKind, clock_kind_of
+from livebode.locations import Url, location
 from livebode.sources.expressions import Expression
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log
@@ -102,7 +103,7 @@ class UnevenLog(Log):
     def _stamps_of(self, group: str) -> Stamps:
         if group not in self._stamps:
             column, unit = self._clocks[group]
-            chunks = guarded(self._recording.chunks([column], 1 << 16), self.path, self.format)
+            chunks = guarded(self._recording.chunks([column], 1 << 16), self._recording.path, self.format)
             self._stamps[group] = stamps_of(column, unit, chunks, self._given_hz, rate_in_file(self.scalars))
         return self._stamps[group]
 
@@ -241,7 +242,7 @@ def _exact(time: NDArray[Any]) -> NDArray[Any]:
 
 
 def open_uneven(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Url,
     channels: Sequence[str],
     *,
     rate_hz: float | None = None,
@@ -269,8 +270,8 @@ def open_uneven(
         Where `open_log` does so, except that a clock may have any increasing times; or if the channels have no common
         time.
     """
-    recording = open_recording(Path(path), None if dbc is None else Path(dbc))
-    with located(recording.path):
+    recording = open_recording(location(path), None if dbc is None else Path(dbc))
+    with located(recording.place):
         everything = recording.columns
         for name in channels:
             found_channel(name, everything, everything)

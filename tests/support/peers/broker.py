@@ -1,4 +1,4 @@
-"""MQTT: mosquitto, and a publisher at it."""
+"""MQTT: mosquitto, a broker that supports only MQTT 3.1.1 (nats-server), and a publisher at them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import ssl
 import subprocess
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from paho.mqtt import client as mqtt
 
@@ -19,12 +19,20 @@ TOPIC = "plant/axis1"
 class Mosquitto:
     """The broker on a free port of the loopback, its log in a file."""
 
+    name, runs, subscribed = "mosquitto", "running", "Sending SUBACK"
+    """The program, and what it logs when it runs, and for each subscription."""
+
     def __init__(self, folder: Path, lines: tuple[str, ...] = ("allow_anonymous true",)) -> None:
-        self._program = program("mosquitto")
+        self._program = program(self.name)
         self.port = free_port()
-        self._log = folder / "mosquitto.log"
+        self._log = folder / f"{self.name}.log"
         self._log.touch()
-        self._settings = folder / "mosquitto.conf"
+        self._settings = folder / f"{self.name}.conf"
+        self._settings.write_text(self.written(lines, folder))
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def written(self, lines: tuple[str, ...], folder: Path) -> str:  # noqa: ARG002 - for another broker
+        """The broker's settings."""
         listener = [
             f"listener {self.port} 127.0.0.1",
             *lines,
@@ -34,15 +42,14 @@ class Mosquitto:
         ]
         if os.geteuid() == 0:  # else it becomes a user that may not read the tests' files
             listener.append("user root")
-        self._settings.write_text("\n".join(listener) + "\n")
-        self._process: subprocess.Popen[bytes] | None = None
+        return "\n".join(listener) + "\n"
 
     def __enter__(self) -> Mosquitto:
-        began = self.logged("running")
+        began = self.logged(self.runs)
         with self._log.open("ab") as log:
             self._process = subprocess.Popen([self._program, "-c", str(self._settings)], stdout=log, stderr=log)
         try:
-            until(lambda: self.logged("running") > began or self._process.poll() is not None, "the broker to run")
+            until(lambda: self.logged(self.runs) > began or self._process.poll() is not None, "the broker to run")
             assert self._process.poll() is None, self._log.read_text()
         except BaseException:
             self.__exit__()
@@ -59,9 +66,29 @@ class Mosquitto:
         return self._log.read_text(errors="replace").count(text)
 
 
+class Nats(Mosquitto):
+    """nats-server, which rejects MQTT 5."""
+
+    name, runs, subscribed = "nats-server", "Server is ready", "[SUBACK"
+
+    def written(self, lines: tuple[str, ...], folder: Path) -> str:
+        return "\n".join(
+            [
+                "server_name: tests",
+                f'listen: "127.0.0.1:{free_port()}"',
+                f'jetstream {{ store_dir: "{folder / "jetstream"}", max_file: 64MB, max_mem: 16MB }}',
+                f'mqtt {{ listen: "127.0.0.1:{self.port}" }}',
+                "trace: true",
+                *(line for line in lines if not line.startswith("allow_")),
+            ]
+        )
+
+
 class MqttPeer(Peer):
+    broker: ClassVar[type[Mosquitto]] = Mosquitto
+
     def __enter__(self) -> MqttPeer:
-        self._broker = Mosquitto(self.folder).__enter__()
+        self._broker = self.broker(self.folder).__enter__()
         self.settings = {"url": f"mqtt://127.0.0.1:{self._broker.port}/{TOPIC}"}
         self._publisher = publisher(self._broker.port)
         self._subscribed = 0
@@ -72,8 +99,8 @@ class MqttPeer(Peer):
         self._broker.__exit__()
 
     def wait_ready(self) -> None:
-        until(lambda: self._broker.logged("Sending SUBACK") > self._subscribed, "a subscription")
-        self._subscribed = self._broker.logged("Sending SUBACK")
+        until(lambda: self._broker.logged(self.broker.subscribed) > self._subscribed, "a subscription")
+        self._subscribed = self._broker.logged(self.broker.subscribed)
         self._publish(encode_layout(CHANNELS, RATE_HZ))
 
     def _publish(self, payload: bytes) -> None:
@@ -91,6 +118,10 @@ class MqttPeer(Peer):
         self._broker.__enter__()
         self._publisher = publisher(self._broker.port)
         self.wait_ready()
+
+
+class Mqtt311Peer(MqttPeer):
+    broker = Nats
 
 
 def publisher(port: int, context: ssl.SSLContext | None = None, login: tuple[str, str] | None = None) -> Any:

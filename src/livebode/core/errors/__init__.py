@@ -3,6 +3,7 @@
 Wrong use by a programmer (a wrong type, a call in the wrong order) is a TypeError, ValueError or RuntimeError instead.
 """
 
+from livebode.core.errors.archive import ArchiveError
 from livebode.core.errors.base import LivebodeError
 from livebode.core.errors.baseline import BaselineError
 from livebode.core.errors.config import ConfigError
@@ -12,6 +13,7 @@ from livebode.core.errors.extra import ExtraError
 from livebode.core.errors.fit import FitError
 from livebode.core.errors.fleet import FleetError
 from livebode.core.errors.grid import GridError
+from livebode.core.errors.location import LocationError
 from livebode.core.errors.output import OutputError
 from livebode.core.errors.record import RecordError
 from livebode.core.errors.recording import RecordingError
@@ -23,6 +25,7 @@ from livebode.core.errors.state import StateError
 from livebode.core.errors.usage import UsageError
 
 __all__ = [
+    "ArchiveError",
     "BaselineError",
     "ConfigError",
     "DamageWarning",
@@ -32,6 +35,7 @@ __all__ = [
     "FleetError",
     "GridError",
     "LivebodeError",
+    "LocationError",
     "OutputError",
     "RecordError",
     "RecordingError",

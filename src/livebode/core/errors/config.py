@@ -28,6 +28,7 @@ class ConfigError(LivebodeError):
         "axis-name-invalid": "An axis has a name that cannot be the name of its directory.",
         "change-needs-restart": "A changed key cannot be applied while the axis runs.",
         "change-too-early": "A changed configuration cannot be checked before the live source has sent samples.",
+        "cluster-open": "A cluster is reached over a network without mutual TLS.",
         "file-open-to-others": "A file with a secret can be read or changed by other users of the computer.",
         "file-too-long": "The file is longer than a configuration may be.",
         "file-unreadable": "A configuration, or a file that it names, does not exist or cannot be read.",

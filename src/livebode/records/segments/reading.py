@@ -23,7 +23,8 @@ Report = Callable[[Event], None]
 
 def in_segments(run: Path) -> bool:
     """Whether this run is recorded in segments."""
-    return is_folder(run / journal.FOLDER)
+    # Of a finished run the folder is empty, and storages at URLs have no empty directories.
+    return is_folder(run / journal.FOLDER) or (run / NAME).is_file()
 
 
 Rows = dict[str, list[pa.RecordBatch]]

@@ -74,7 +74,7 @@ class FollowSource(LiveSource):
         self._sequencer.schema.rate_hz = self.settings.rate_hz or position.rate_hz
 
     def _receive(self) -> bool:
-        (path,) = self.settings.logs
+        path = Path(self.address.path)
         if path.is_dir():
             self._follow_directory(path)
             return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 import ssl
 from typing import Any, ClassVar
@@ -21,12 +22,16 @@ SESSION_S = 3600
 """How long a broker stores messages while a client with a `client_id` is disconnected."""
 PACKET_BYTES_MAX = 8 * FRAME_BYTES_MAX
 _TOPIC_BYTES_MAX = 65535
-_REFUSALS = {0x84, 0x85, 0x86, 0x87, 0x8A, 0x8C, 0x9D}
+_VERSION_UNSUPPORTED = 0x84
+_REFUSALS = {0x85, 0x86, 0x87, 0x8A, 0x8C, 0x9D}
 _UNANSWERED_MAX = 3
 
 
 class MqttSource(LiveSource):
-    """Subscribes to one topic with QoS 1; each message is a frame, or an object of JSON."""
+    """Subscribes to one topic with QoS 1; each message is a frame, or an object of JSON.
+
+    By MQTT 5, or 3.1.1 where the broker supports only that.
+    """
 
     format: ClassVar[str] = "mqtt"
     reorders: ClassVar[bool] = True
@@ -53,18 +58,21 @@ class MqttSource(LiveSource):
         self._tls = tls_context(settings) if address.scheme == "mqtts" else None
         self._frames, self._lines = FrameDecoder(), LineDecoder(settings.rate_hz)
         self._unanswered = 0
+        self._older, self._unsupported = False, False
         self._refusal: SourceError | None = None
         self._answered = False
 
     def _receive(self) -> bool:
         client = self._client()
-        self._answered = False
+        self._answered, unsupported = False, self._unsupported
         try:
             self._connect(client)
             while not self._stop.is_set():
                 code = client.loop(timeout=TICK_S)
                 if self._refusal is not None:
                     raise self._refusal
+                if self._unsupported and not unsupported:
+                    return False  # and connect by the older version
                 if code:
                     self._gone(code)
             client.disconnect()
@@ -75,7 +83,13 @@ class MqttSource(LiveSource):
 
     def _client(self) -> Any:
         mqtt, settings = self._mqtt, self.settings
-        client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2, client_id=settings.client_id or "", protocol=mqtt.MQTTv5)
+        client = mqtt.Client(
+            mqtt.CallbackAPIVersion.VERSION2,
+            client_id=settings.client_id or "",
+            protocol=mqtt.MQTTv311 if self._older else mqtt.MQTTv5,
+            clean_session=not settings.client_id if self._older else None,
+            reconnect_on_failure=False,
+        )
         client.on_connect, client.on_subscribe, client.on_message = (
             self._on_connect,
             self._on_subscribe,
@@ -89,21 +103,9 @@ class MqttSource(LiveSource):
         return client
 
     def _connect(self, client: Any) -> None:
-        from paho.mqtt.packettypes import PacketTypes
-        from paho.mqtt.properties import Properties
-
-        properties: Any = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
-        properties.MaximumPacketSize = PACKET_BYTES_MAX
-        if self.settings.client_id:
-            properties.SessionExpiryInterval = SESSION_S
+        session = {} if self._older else _session(kept=bool(self.settings.client_id))
         try:
-            client.connect(
-                self.address.host,
-                self.address.port,
-                KEEPALIVE_S,
-                clean_start=not self.settings.client_id,
-                properties=properties,
-            )
+            client.connect(self.address.host, self.address.port, KEEPALIVE_S, **session)
         except ssl.SSLError as error:
             close_left(error)
             raise SourceError(
@@ -113,6 +115,13 @@ class MqttSource(LiveSource):
             ) from None
 
     def _gone(self, code: int) -> None:
+        if self._unsupported and not self._answered and code == self._mqtt.MQTT_ERR_PROTOCOL:
+            raise SourceError(
+                "refused", "the broker supports neither MQTT 5 nor MQTT 3.1.1", "check the address and its listener"
+            )
+        if not self._unsupported:
+            # Some brokers close the connection without an answer at a version that they do not support.
+            self._older = not self._answered and not self._older
         if not self._answered:
             self._unanswered += 1
             if self._tls is not None and self._unanswered >= _UNANSWERED_MAX:
@@ -125,7 +134,10 @@ class MqttSource(LiveSource):
 
     def _on_connect(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         self._answered, self._unanswered = True, 0
-        if reason.value in _REFUSALS:
+        if reason.value == _VERSION_UNSUPPORTED and not self._unsupported:
+            self._older, self._unsupported = not self._older, True
+            self._log(logging.INFO, "the broker does not support MQTT 5; using MQTT 3.1.1")
+        elif reason.value in {_VERSION_UNSUPPORTED, *_REFUSALS}:
             self._refusal = SourceError(
                 "refused", f"the broker rejected the connection: {reason}", "check source.username and its password"
             )
@@ -152,6 +164,18 @@ class MqttSource(LiveSource):
             return
         if batch is not None:
             self._deliver(batch)
+
+
+def _session(*, kept: bool) -> dict[str, Any]:
+    """Arguments of a connection by MQTT 5: the largest message, and how long the broker stores messages."""
+    from paho.mqtt.packettypes import PacketTypes
+    from paho.mqtt.properties import Properties
+
+    properties: Any = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+    properties.MaximumPacketSize = PACKET_BYTES_MAX
+    if kept:
+        properties.SessionExpiryInterval = SESSION_S
+    return {"clean_start": not kept, "properties": properties}
 
 
 def tls_context(settings: SourceSettings) -> ssl.SSLContext:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from livebode.core import ConfigError
+from livebode.core import ConfigError, LocationError
+from livebode.locations import Url
 from livebode.sources.live.address import Address, parse_address
 from livebode.sources.live.follow import FollowSource
 from livebode.sources.live.settings import SourceSettings, check_keys
@@ -48,6 +49,14 @@ def make_source(settings: SourceSettings) -> LiveSource:
                 "set source.url, such as udp://0.0.0.0:5000, or source.log with source.follow = true",
                 key="source",
                 keys=["url"],
+            )
+        if isinstance(settings.logs[0], Url):
+            raise LocationError(
+                "not-possible",
+                f"{settings.logs[0]} cannot be followed: only a file of this computer can grow",
+                "remove source.follow, or follow a local file",
+                key="source.follow",
+                path=str(settings.logs[0]),
             )
         return FollowSource(settings, Address("follow", path=str(settings.logs[0])))
     address = checked_address(settings.url, settings)

@@ -32,7 +32,7 @@ class Sequencer(StatefulBase):
     Batches that arrive at most `reorder` batches late are sorted; samples that are then still missing are lost: the
     next Block begins at the later number with its gap flag. Repeats are dropped. A restart of the sender, detected
     from its epoch or from numbers that begin again, is a gap of unknown size. Blocks are numbered from the first
-    sample received, or from the position at which a run continues (`resume`).
+    sample received, from the position at which a run continues (`resume`), or by the sender (`sender_numbers`).
 
     A batch that is out of place is accepted only when more of its kind follow, with none of the stream between them; a
     sender that was replaced is accepted again in the same way. This and `reorder` bound the memory.
@@ -53,6 +53,9 @@ class Sequencer(StatefulBase):
         Required rate, if it is known in advance.
     confirmed
         Batches of a new epoch that must arrive before it is accepted: 1 if only one sender is possible.
+    sender_numbers
+        Number the Blocks as the sender numbers its samples, from the first one received until a restart of the sender:
+        the numbers do not depend on when reading begins. Else they begin with 0.
     """
 
     _stage = Stage("sequencer", 1)
@@ -65,10 +68,13 @@ class Sequencer(StatefulBase):
         wait_s: float = 1.0,
         rate_hz: float | None = None,
         confirmed: int = CONFIRMED,
+        sender_numbers: bool = False,
     ) -> None:
         self._events, self._reorder, self._wait_s = source_events, reorder, wait_s
         self._unconfirmed = UnconfirmedBatches(source_events, confirmed, reorder)
         self._settings = f"reorder={reorder} wait_s={wait_s!r} rate_hz={rate_hz!r} confirmed={confirmed}"
+        self._settings += f" sender_numbers={sender_numbers}"
+        self._sender_numbers = sender_numbers
         self._jump_s = JUMP_S if confirmed > 1 else FAR_AHEAD_S
         self.schema = StreamSchema(source_events, rate_hz)
         self.clock: ClockMonitor | None = None
@@ -170,6 +176,8 @@ class Sequencer(StatefulBase):
                 if len(self._waiting) <= waiting_max:
                     break
                 self._next = self._begun_at = first
+                if self._sender_numbers and self._number == 0:
+                    self._number = first
             if first > self._next:
                 if len(self._waiting) <= waiting_max:
                     break

@@ -5,14 +5,46 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    SerializationInfo,
+    WithJsonSchema,
+)
+from pydantic_core import PydanticCustomError
 
 from livebode.core import Channel, ConfigError, QuantityKind
 from livebode.core.clock import ClockKind
+from livebode.locations import Location, Url, location
 from livebode.sources.part_limit import PATTERN, part_limit
 from livebode.sources.units import split_unit
 
+
+def _recording(given: Any) -> Location:
+    if not isinstance(given, str | Path | Url):
+        raise PydanticCustomError("location", "input is not a valid path or URL")
+    return location(given)
+
+
+def _plain_recording(value: Any, info: SerializationInfo) -> Any:
+    if info.mode != "json":
+        return value
+    # Of the union below, the first serializer gets a list too.
+    return list(map(str, value)) if isinstance(value, list) else str(value)
+
+
 File = Annotated[Path, Field(strict=False)]
+LocatedFile = Annotated[
+    Any,
+    PlainValidator(_recording),
+    PlainSerializer(_plain_recording),
+    WithJsonSchema({"type": "string", "format": "path"}),
+]
+"""A path or URL; as JSON without a secret in it."""
 FRAMES = {"rate_hz", "reorder_batches"}
 TLS = {"ca_file", "certificate_file", "key_file"}
 LOGIN = {"username", "password_env", "password_file"}
@@ -43,13 +75,13 @@ Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PAT
 
 
 class SourceSettings(BaseModel):
-    """[source]: a recording (`log`), one that grows (`follow`), or a live source (`url`).
+    """[source]: a recording (`log`), one that grows (`follow`), a live source (`url`), or a recorded one (`replay`).
 
     Parameters
     ----------
     log
-        The recording, relative to this file. Several, as ["a.mat", "b.mat"], are tracked one after the other, and their
-        means are averaged.
+        The recording, relative to this file, or its URL, such as "s3://bucket/a.mat". Several, as ["a.mat", "b.mat"],
+        are tracked one after the other, and their means are averaged.
     time
         Time column of the recording, with its unit if the file does not state it: "clock [us]". "none" ignores it.
         Default: found by name.
@@ -67,6 +99,9 @@ class SourceSettings(BaseModel):
         DBC file that defines the signals of a recording of CAN frames, relative to this file.
     follow
         The recording grows: a text table, or a directory of recordings.
+    replay
+        Directory of a run with recorded samples, relative to this file: they are tracked again as the machine sent
+        them, with its own sample numbers.
     url
         Address of a live source, instead of log: kind://host:port; without user and password. Its scheme is the kind.
     rate_hz
@@ -120,7 +155,7 @@ class SourceSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-    log: File | Annotated[list[File], Field(min_length=1, max_length=RECORDINGS_MAX)] | None = None
+    log: LocatedFile | Annotated[list[LocatedFile], Field(min_length=1, max_length=RECORDINGS_MAX)] | None = None
     time: str | None = None
     clock: ClockKind | None = None
     from_: Limit | None = Field(default=None, alias="from")
@@ -128,6 +163,7 @@ class SourceSettings(BaseModel):
     skip_periods: Annotated[int, Field(ge=0, le=1 << 40)] = 0
     dbc: File | None = None
     follow: bool = False
+    replay: File | None = None
     url: str | None = None
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     timeout_s: Annotated[float, Field(gt=0, le=1e6)] = 30.0
@@ -155,19 +191,21 @@ class SourceSettings(BaseModel):
 
     @property
     def live(self) -> bool:
-        """Whether the samples arrive in real time."""
-        return self.url is not None or self.follow
+        """Whether the samples arrive as a machine sends them, or sent them."""
+        return self.url is not None or self.follow or self.replay is not None
 
     @property
     def title(self) -> str:
         """Name of the source in a picture."""
+        if self.replay is not None:
+            return self.replay.name
         if not self.logs:
             return self.url or ""
         more = len(self.logs) - 1
         return f"{self.logs[0].name} and {more} more" if more else self.logs[0].name
 
     @property
-    def logs(self) -> tuple[Path, ...]:
+    def logs(self) -> tuple[Location, ...]:
         """The recordings; none for a live source."""
         if self.log is None:
             return ()
@@ -179,12 +217,12 @@ class SourceSettings(BaseModel):
             name: folder / value for name in self.model_fields_set if isinstance(value := getattr(self, name), Path)
         }
         if isinstance(self.log, list):
-            files["log"] = [folder / path for path in self.log]
+            files["log"] = [folder / place if isinstance(place, Path) else place for place in self.log]
         return self.model_copy(update=files)
 
 
 def check_keys(settings: SourceSettings, kind: str) -> None:
-    """ConfigError for a key that does not apply to this kind of source: the scheme of a URL, or "log"."""
+    """ConfigError for a key that does not apply to this kind of source: the scheme of a URL, "log" or "replay"."""
     if part := [name for key, name in PART.items() if key in settings.model_fields_set]:
         why = "this one grows" if kind == "log" else f"{kind} is a live source"
         raise ConfigError(
@@ -194,7 +232,7 @@ def check_keys(settings: SourceSettings, kind: str) -> None:
             key=f"source.{part[0]}",
             source=kind,
         )
-    taken = LOG if kind == "log" else TAKEN[kind] | {"url"}
+    taken = LOG if kind == "log" else {"replay"} if kind == "replay" else TAKEN[kind] | {"url"}
     if stray := sorted(settings.model_fields_set - taken - EVERY):
         raise ConfigError(
             "key-unused",

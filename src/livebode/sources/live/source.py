@@ -50,6 +50,9 @@ class LiveSource(ABC):
     paced: ClassVar[bool] = True
     """Whether samples arrive when they are taken, so that this computer's clock gives the length of a pause."""
 
+    sender_numbers: ClassVar[bool] = False
+    """Whether its Blocks begin with the sender's number of their first sample, and not with 0."""
+
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
         self._logger = logging.getLogger(type(self).__module__)
@@ -61,6 +64,7 @@ class LiveSource(ABC):
             reorder=settings.reorder_batches if self.reorders else 0,
             rate_hz=settings.rate_hz,
             confirmed=CONFIRMED if self.reorders else 1,
+            sender_numbers=self.sender_numbers,
         )
         self._stop = threading.Event()
         self._pauses = Pauses()

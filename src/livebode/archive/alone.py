@@ -1,0 +1,102 @@
+"""Track one recording in a process of its own, so that what it does to its process concerns nobody else.
+
+`python -m livebode.archive.alone FOLDER` is that process: the task is in FOLDER/task, the result in FOLDER/result.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+from livebode.archive.recordings import ArchivedRecording
+from livebode.archive.results import Failed, Tracked, failed
+from livebode.archive.tasks import track_one
+from livebode.archive.tracking import Job
+from livebode.core import ArchiveError
+from livebode.core.files import write_whole
+
+_LOOK_S = 0.1
+
+
+def track_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Tracked | Failed:
+    """Track a recording in a new process, and wait for it; one that needs too much memory is ended."""
+    started = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="livebode-", dir=scratch) as name:
+        folder = Path(name)
+        (folder / "task").write_bytes(pickle.dumps((job, recording)))
+        with subprocess.Popen(
+            [sys.executable, "-m", "livebode.archive.alone", name],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        ) as process:
+            try:
+                exceeded = _watched(process, job.memory_bytes)
+            finally:
+                process.kill()
+        result = folder / "result"
+        if result.exists():
+            found: Tracked | Failed = pickle.loads(result.read_bytes())
+            return found
+    error = _exceeded(job) if exceeded else _ended(process.returncode)
+    return failed(recording, error, time.perf_counter() - started)
+
+
+def _watched(process: subprocess.Popen[bytes], memory_bytes: int) -> bool:
+    """Wait for the end of a process; whether it was ended because it needs more memory."""
+    from psutil import NoSuchProcess, Process  # type: ignore[import-untyped]
+
+    while True:
+        try:
+            process.wait(_LOOK_S)
+            return False
+        except subprocess.TimeoutExpired:
+            pass
+        try:
+            if Process(process.pid).memory_info().rss > memory_bytes:
+                process.kill()
+                return True
+        except NoSuchProcess:  # it has just ended
+            continue
+
+
+def _exceeded(job: Job) -> ArchiveError:
+    limit_mb = job.memory_bytes // 1_000_000
+    return ArchiveError(
+        "memory-exceeded",
+        f"the recording needs more than {limit_mb} MB of memory",
+        "raise cluster.memory_mb, or split the recording",
+        limit_mb=limit_mb,
+    )
+
+
+def _ended(code: int) -> ArchiveError:
+    how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended itself with exit code {code}"
+    return ArchiveError(
+        "process-ended", f"the process that tracked the recording {how}", "please report it with the recording"
+    )
+
+
+def _end_with(parent: int) -> None:
+    """End this process when the one that started it has ended."""
+    while os.getppid() == parent:
+        time.sleep(_LOOK_S)
+    os._exit(1)
+
+
+def _main(folder: Path) -> None:
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+    job, recording = pickle.loads((folder / "task").read_bytes())
+    result = track_one(job, recording, folder)
+    write_whole(folder / "result", pickle.dumps(result))
+
+
+if __name__ == "__main__":
+    _main(Path(sys.argv[1]))

@@ -1,0 +1,168 @@
+"""The processes of an archive as a client of Dask: on this computer, or others behind mutual TLS."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from livebode.archive.settings import ClusterSection
+from livebode.core import ArchiveError
+from livebode.core.installing import not_installed
+
+try:
+    import dask
+    from distributed import Client, LocalCluster, Security
+    from distributed.diagnostics.plugin import WorkerPlugin
+except ImportError:
+    raise not_installed("Dask is not installed, and an archive needs it", "distributed", "archive") from None
+
+_CONNECT_S = 30
+_SETTINGS = {
+    # The first death of a worker ends the tasks that it had; the archive tries each of their recordings again.
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.scheduler.work-stealing": False,
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 0.95,
+    # With a pool of its own, Arrow could not use what NumPy has freed. Dask's own threshold returns memory so often
+    # that tracking takes a third longer.
+    "distributed.nanny.pre-spawn-environ.ARROW_DEFAULT_MEMORY_POOL": "system",
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 8 << 20,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 20,
+    # Events of the scheduler, which nobody reads, grow with the number of tasks.
+    "distributed.admin.low-level-log-length": 100,
+}
+
+
+class QuietWorker(WorkerPlugin):  # type: ignore[misc]
+    """Ctrl-C is for the coordinator, and what a damaged file lets a library print is not for the terminal."""
+
+    def setup(self, worker: Any) -> None:  # noqa: ARG002
+        """Apply it to a worker's process; nothing to a worker in another program, which is a thread there."""
+        if threading.current_thread() is not threading.main_thread():
+            return
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        warnings.simplefilter("ignore")
+        logging.disable(logging.CRITICAL)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A client of Dask, and the number of its workers."""
+
+    client: Client
+
+    @property
+    def workers(self) -> int:
+        """Workers at this moment, at least one."""
+        return max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1)
+
+    @property
+    def dashboard(self) -> str | None:
+        """Address of Dask's page."""
+        found: str | None = self.client.dashboard_link
+        return found
+
+
+@contextmanager
+def started(section: ClusterSection) -> Iterator[Cluster]:
+    """The cluster of a configuration; its processes end with the block, those behind an address remain.
+
+    Raises
+    ------
+    ArchiveError
+        If its scheduler does not answer.
+    ExtraError
+        If a package for this kind is not installed.
+    """
+    with ExitStack() as stack:
+        stack.enter_context(dask.config.set(_SETTINGS | _certificates(section)))
+        stack.callback(logging.disable, logging.root.manager.disable)
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        try:
+            target = section.address or stack.enter_context(_cluster(section))
+            security = Security() if section.encrypted else None
+            client = stack.enter_context(Client(target, security=security, timeout=_CONNECT_S, set_as_default=False))
+            client.register_plugin(QuietWorker())
+            client.wait_for_workers(1, timeout=None if section.kind == "slurm" else _CONNECT_S)
+        except (OSError, TimeoutError) as error:
+            raise ArchiveError(
+                "cluster-unreachable",
+                f"the cluster {section.address or section.kind!r} does not answer: {error or type(error).__name__}",
+                "check that its scheduler and a worker run, and that the certificates belong together",
+                address=section.address,
+            ) from error
+        yield Cluster(client)
+
+
+def _cluster(section: ClusterSection) -> Any:
+    if section.kind == "ssh":
+        return _by_ssh(section)
+    if section.kind == "slurm":
+        return slurm_cluster(section)
+    return LocalCluster(
+        n_workers=section.workers or os.cpu_count(),
+        threads_per_worker=1,
+        processes=True,
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+        memory_limit=section.memory_mb * 1_000_000,
+        silence_logs=logging.CRITICAL,
+    )
+
+
+def _by_ssh(section: ClusterSection) -> Any:
+    try:
+        import asyncssh  # noqa: F401 - what SSHCluster needs
+        from distributed import SSHCluster
+    except ImportError:
+        raise not_installed("asyncssh is not installed, and a cluster by ssh needs it", "asyncssh", "ssh") from None
+    each = {"nthreads": 1, "memory_limit": section.memory_mb * 1_000_000, "protocol": "tls"}
+    if section.workers:
+        each["n_workers"] = max(section.workers // max(len(section.hosts) - 1, 1), 1)
+    return SSHCluster(
+        section.hosts,
+        worker_options=each,
+        scheduler_options={"protocol": "tls", "port": 0, "dashboard_address": "127.0.0.1:0"},
+        security=Security(),
+    )
+
+
+def slurm_cluster(section: ClusterSection, **over: Any) -> Any:
+    """A scheduler here and workers as jobs of Slurm, one process each."""
+    try:
+        from dask_jobqueue import SLURMCluster
+    except ImportError:
+        raise not_installed("dask-jobqueue is not installed, and Slurm needs it", "dask-jobqueue", "slurm") from None
+    return SLURMCluster(
+        queue=section.queue,
+        cores=1,
+        processes=1,
+        memory=f"{section.memory_mb}MB",
+        n_workers=section.workers or 1,
+        protocol="tls://",
+        security=Security(),
+        scheduler_options={"dashboard_address": "127.0.0.1:0"},
+        **over,
+    )
+
+
+def _certificates(section: ClusterSection) -> dict[str, Any]:
+    if not section.encrypted:
+        return {}
+    own = {"cert": str(section.certificate), "key": str(section.key)}
+    each = {f"distributed.comm.tls.{role}.{name}": path for role in ("scheduler", "worker", "client")
+            for name, path in own.items()}  # fmt: skip
+    return each | {
+        "distributed.comm.tls.ca-file": str(section.authority),
+        "distributed.comm.require-encryption": True,
+    }

@@ -1,0 +1,208 @@
+"""ArchiveSettings: which recordings are tracked, how, where, and where the results go; from archive.toml."""
+
+from __future__ import annotations
+
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+from urllib.parse import urlsplit
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from livebode.archive.template import Template
+from livebode.configuration.axis import Axis
+from livebode.configuration.schema import Schema, schema_of
+from livebode.configuration.section import File
+from livebode.configuration.toml_file import one_line, read_table, shortened
+from livebode.core import ConfigError, nearest_name
+
+Text = Annotated[str, Field(min_length=1)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class ClusterSection(_Section):
+    """[cluster]: the processes that track.
+
+    Parameters
+    ----------
+    kind
+        "local": processes on this computer. "ssh": on other computers. "slurm": jobs of Slurm.
+    address
+        Scheduler of Dask that is running already, such as "tls://head:8786", instead of starting workers.
+    workers
+        Number of processes. Default: of a local cluster one for each core.
+    memory_mb
+        Memory of a process, in MB. A recording that needs more is put in quarantine.
+    hosts
+        Computers of a cluster by ssh; the first one has the scheduler.
+    queue
+        Partition of Slurm.
+    certificate
+        Certificate of this computer in PEM, relative to this file. Required except on the loopback.
+    key
+        Its private key in PEM, relative to this file.
+    authority
+        Certificate of the authority that signed the certificates of all computers in the cluster, relative to this
+        file.
+    """
+
+    kind: Literal["local", "ssh", "slurm"] = "local"
+    address: Text | None = None
+    workers: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    memory_mb: Annotated[int, Field(ge=256)] = 1024
+    hosts: list[Text] = []
+    queue: Text | None = None
+    certificate: File | None = None
+    key: File | None = None
+    authority: File | None = None
+
+    @property
+    def encrypted(self) -> bool:
+        """Whether all three files of mutual TLS are named."""
+        return None not in (self.certificate, self.key, self.authority)
+
+    def checked(self) -> None:
+        """ConfigError if others could send it code: a port of Dask executes what it receives."""
+        remote = self.kind != "local" if self.address is None else not _on_loopback(self.address)
+        if remote and (not self.encrypted or (self.address or "tls://").split("://")[0] != "tls"):
+            raise ConfigError(
+                "cluster-open",
+                f"the cluster {self.address or self.kind} is reached over a network without mutual TLS, and whoever "
+                "reaches a port of Dask can execute code",
+                "set cluster.certificate, cluster.key and cluster.authority, and write the address as tls://HOST:PORT",
+                key="cluster.address" if self.address else "cluster.kind",
+                value=self.address or self.kind,
+            )
+        if self.kind == "ssh" and self.address is None and len(self.hosts) < 2:
+            raise ConfigError(
+                "incomplete",
+                "a cluster by ssh needs cluster.hosts: the computer of the scheduler, and at least one for workers",
+                "add them; a computer may be there twice",
+                key="cluster.hosts",
+            )
+
+    def beside(self, folder: Path) -> ClusterSection:
+        """With files relative to a folder."""
+        files = {name: getattr(self, name) for name in ("certificate", "key", "authority")}
+        return self.model_copy(update={name: folder / path for name, path in files.items() if path is not None})
+
+
+class ArchiveSettings(_Section):
+    """An archive of recordings, and the lake of their results.
+
+    Parameters
+    ----------
+    inputs
+        Paths or URLs of the recordings, with * in a name and ** for any depth. {site}, {line}, {machine} and {axis}
+        name the machine of a recording: "s3://plant/{line}/{machine}/*.csv". Relative to this file.
+    recipe
+        An axis.toml without its source, relative to this file. Its [machine] applies where the inputs name none.
+    lake
+        Directory, relative to this file, or URL of the results.
+    cluster
+        The processes that track.
+    """
+
+    inputs: Annotated[list[Text], Field(min_length=1)]
+    recipe: File
+    lake: Text
+    cluster: ClusterSection = ClusterSection()
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """The settings in a TOML file.
+
+        Raises
+        ------
+        ConfigError
+            If the file cannot be read, is not TOML, or a key or a value is invalid, or a cluster would be open to
+            others.
+        """
+        try:
+            found = cls.model_validate(read_table(path))
+            found.cluster.checked()
+            for template in found.templates:
+                template.checked()
+        except ValidationError as error:
+            raise _first_of(error).at(str(path)) from None
+        except ConfigError as error:
+            raise (error if error.place else error.at(str(path))) from None
+        folder = path.absolute().parent
+        return found.model_copy(
+            update={
+                "inputs": [_beside(folder, one) for one in found.inputs],
+                "recipe": folder / found.recipe,
+                "lake": _beside(folder, found.lake),
+                "cluster": found.cluster.beside(folder),
+            }
+        )
+
+    @property
+    def templates(self) -> list[Template]:
+        """The inputs."""
+        return [Template(one) for one in self.inputs]
+
+    def axis(self) -> Axis:
+        """The axis of the recipe, whose source.log is a placeholder.
+
+        Raises
+        ------
+        ConfigError
+            If the recipe is not a configuration of one axis without a source.
+        """
+        data = read_table(self.recipe)
+        source = data.get("source", {})
+        if isinstance(source, dict) and (named := [key for key in ("log", "url") if key in source]):
+            raise ConfigError(
+                "key-conflict",
+                f"the recipe of an archive has a source of its own (source.{named[0]})",
+                "remove it: the inputs of the archive are the sources",
+                key=f"source.{named[0]}",
+            ).at(str(self.recipe))
+        own = data | {"source": {**source, "log": "recording"}}
+        return Axis.of(own, str(self.recipe)).beside(self.recipe.parent)
+
+
+def archive_schema() -> Schema:
+    """JSON Schema of archive.toml."""
+    return schema_of(ArchiveSettings, "archive")
+
+
+def lake_url(target: str) -> str:
+    """The lake of an archive.toml, or this path or URL itself."""
+    return ArchiveSettings.read(Path(target)).lake if target.lower().endswith(".toml") else target
+
+
+def _beside(folder: Path, place: str) -> str:
+    return place if "://" in place else str(folder / place)
+
+
+def _on_loopback(address: str) -> bool:
+    host = urlsplit(address).hostname or ""
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _first_of(error: ValidationError) -> ConfigError:
+    """The first error, with its key and value; missing keys last, because a misspelt key also causes a missing one."""
+    first = min(error.errors(include_url=False), key=lambda one: one["type"] == "missing")
+    place = one_line(".".join(str(part) for part in first["loc"]))
+    if first["type"] == "missing":
+        return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
+    if first["type"] == "extra_forbidden":
+        section: Any = ClusterSection if first["loc"][0] == "cluster" and len(first["loc"]) > 1 else ArchiveSettings
+        near = nearest_name(str(first["loc"][-1]), list(section.model_fields), "Settings")
+        return ConfigError("key-unknown", f"there is no setting {place!r}", near, key=place)
+    value = shortened(first["input"])
+    return ConfigError(
+        "value-invalid",
+        f"{place} = {value} is not usable: {first['msg'].lower()}",
+        "correct it",
+        key=place,
+        value=value,
+    )

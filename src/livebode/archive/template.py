@@ -1,0 +1,62 @@
+"""Template: a pattern of paths whose braces name the machine of a recording."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+
+from livebode.configuration.machine_section import LEVELS
+from livebode.core import ConfigError
+
+_PARTS = re.compile(r"\*\*/|\*|\?|\{(\w*)\}")
+_WILD = {"**/": "(?:.*/)?", "*": "[^/]*", "?": "[^/]"}
+
+
+@dataclass(frozen=True)
+class Template:
+    """A path or URL with *, ** and ?, and with {site}, {line}, {machine} and {axis}, each the name of a directory."""
+
+    text: str
+
+    def checked(self) -> None:
+        """ConfigError if a name in braces is not a level of a machine, or is there twice."""
+        names = [found[1] for found in _PARTS.finditer(self.text) if found[0].startswith("{")]
+        for name in names:
+            if name not in LEVELS or names.count(name) > 1:
+                what = "is there twice" if name in LEVELS else "is not a level of a machine"
+                raise ConfigError(
+                    "value-invalid",
+                    f"{{{name}}} in {self.text!r} {what}",
+                    "write {site}, {line}, {machine} and {axis}, each once",
+                    key="inputs",
+                    value=self.text,
+                )
+
+    @property
+    def pattern(self) -> str:
+        """The pattern of the files, with * in place of braces.
+
+        >>> Template("plant/{machine}/*.csv").pattern
+        'plant/*/*.csv'
+        """
+        return re.sub(r"\{\w*\}", "*", self.text)
+
+    def machine(self, place: str) -> dict[str, str]:
+        """The levels of the machine that the path of a recording names; none if it does not match.
+
+        >>> Template("plant/{machine}/*.csv").machine("plant/press 4/a.csv")
+        {'machine': 'press 4'}
+        """
+        found = self._expression.fullmatch(place.replace(os.sep, "/"))
+        return found.groupdict() if found else {}
+
+    @property
+    def _expression(self) -> re.Pattern[str]:
+        parts, end = [], 0
+        text = self.text.replace(os.sep, "/")
+        for found in _PARTS.finditer(text):
+            parts.append(re.escape(text[end : found.start()]))
+            parts.append(_WILD.get(found[0]) or f"(?P<{found[1]}>[^/]+)")
+            end = found.end()
+        return re.compile("".join([*parts, re.escape(text[end:])]))

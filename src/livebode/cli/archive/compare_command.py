@@ -1,0 +1,106 @@
+"""`livebode archive compare`: what differs between two axes, or between two spans of one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from livebode.cli import terminal
+from livebode.cli.archive.options import LakeOf
+from livebode.cli.archive.selection import By, CovariateNames, Recipe, Since, Until, selection
+from livebode.cli.options import Json
+from livebode.core import UsageError
+
+if TYPE_CHECKING:
+    from livebode.lake import Lake
+    from livebode.trending import History, MachineHistory, Selection
+
+_COLUMNS = ("quantity", "first", "second", "difference", "in %", "unit", "runs")
+
+
+def compare_command(
+    archive: LakeOf,
+    first: Annotated[str, typer.Argument(metavar="AXIS", help="site/line/machine/axis.")],
+    second: Annotated[
+        str | None, typer.Argument(metavar="OTHER", help="Another axis. \\[default: the same one, from --split on]")
+    ] = None,
+    split: Annotated[
+        str | None, typer.Option(metavar="DATE", help="Compare the runs before this day with those from it on.")
+    ] = None,
+    since: Since = None,
+    until: Until = None,
+    covariate: CovariateNames = None,
+    recipe: Recipe = None,
+    as_json: Json = False,
+) -> None:
+    """Find the quantities that differ between two axes, or between two spans of one, with bounds.
+
+    The influence of the covariates is removed. An asterisk marks what chance does not explain: at most 5 % of the
+    differences marked are expected to be none.
+    """
+    from livebode.archive.settings import lake_url
+    from livebode.lake import Lake
+    from livebode.records import to_json
+    from livebode.reporting.wording import with_bound
+    from livebode.trending import differences
+
+    if (second is None) == (split is None):
+        raise UsageError(
+            "missing", "there is nothing to compare with, or twice", "name another axis, or --split DATE",
+            argument="--split",
+        )  # fmt: skip
+    chosen = selection(By.axis, "", since, until, covariate, recipe)
+    found, few = differences(_pairs(Lake(lake_url(archive)), chosen, first.strip("/"), second, split))
+    if as_json:
+        print(to_json({"differences": [vars(one) for one in found], "too_few_runs": few}))
+        return
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for column in _COLUMNS:
+        table.add_column(column)
+    for one in found:
+        percent = 100 / abs(one.first) if one.first and one.unit != "dB" else None
+        table.add_row(
+            one.name + " *" * one.significant, f"{one.first:.5g}", f"{one.second:.5g}",
+            " ± ".join(with_bound(one.amount, one.bound_95)),
+            "" if percent is None else " ± ".join(with_bound(percent * one.amount, percent * one.bound_95)), one.unit,
+            f"{one.runs[0]} / {one.runs[1]}",
+        )  # fmt: skip
+    terminal.console(width=None if terminal.is_terminal() else 1 << 14, markup=False).print(table)
+    for name in few:
+        print(f"{name}: not compared: fewer than 8 runs on a side")
+    if any(one.significant for one in found):
+        print("*: at most 5 % of the differences marked are expected to be none")
+
+
+def _pairs(
+    lake: Lake, of: Selection, first: str, second: str | None, split: str | None
+) -> list[tuple[History, MachineHistory, MachineHistory]]:
+    """Each quantity that both sides have."""
+    from livebode.cli.archive.selection import day
+    from livebode.core import nearest_name
+    from livebode.trending import histories
+
+    if second is not None:
+        before = after = histories(lake, of)
+    else:
+        at = day(split, "--split")
+        before, after = histories(lake, replace(of, until=at)), histories(lake, replace(of, since=at))
+    names = {axis for history in (*before, *after) for axis in history.machines}
+    for axis in (first, second or first):
+        if axis not in names:
+            raise UsageError(
+                "not-one-of", f"the lake has no axis {axis!r}", nearest_name(axis, sorted(names), "Axes"),
+                argument="axis", value=axis,
+            )  # fmt: skip
+    later = {(history.model, history.name): history for history in after}
+    return [
+        (history, history.machines[first], other.machines[second or first])
+        for history in before
+        if (other := later.get((history.model, history.name))) is not None
+        and first in history.machines
+        and (second or first) in other.machines
+    ]

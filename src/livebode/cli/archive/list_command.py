@@ -1,0 +1,54 @@
+"""`livebode archive list`: the runs of a lake by machine, and the recordings in quarantine."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from livebode.cli import terminal
+from livebode.cli.archive.options import LakeOf
+from livebode.cli.options import Json
+
+
+def list_command(
+    archive: LakeOf,
+    quarantined: Annotated[
+        bool, typer.Option("--quarantined", help="List the recordings in quarantine, with the reason of each.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """List the runs of a lake by machine, and the recordings in quarantine."""
+    from livebode.archive.contents import machines, quarantine
+    from livebode.archive.settings import lake_url
+    from livebode.lake import Lake
+    from livebode.records import to_json
+
+    lake = Lake(lake_url(archive))
+    if quarantined:
+        bad = quarantine(lake)
+        if as_json:
+            print(to_json({"quarantine": bad}))
+        elif bad:
+            _print(("recording", "code", "reason"), [(one["url"], one["code"], one["sentence"]) for one in bad])
+        else:
+            print("no recording is in quarantine")
+        return
+    rows = [one.plain for one in machines(lake)]
+    if as_json:
+        print(to_json({"machines": rows}))
+    elif rows:
+        _print(("machine", "runs", "quarantined", "first", "last"), [tuple(row.values()) for row in rows])
+    else:
+        print(f"the lake {lake.url} has no run yet")
+
+
+def _print(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, overflow="fold", justify="right" if column in ("runs", "quarantined") else "left")
+    for row in rows:
+        table.add_row(*("" if value is None else str(value) for value in row))
+    terminal.console(width=None if terminal.is_terminal() else 1 << 14, markup=False).print(table)

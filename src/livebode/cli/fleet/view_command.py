@@ -1,0 +1,88 @@
+"""`livebode fleet view`: the page of a fleet."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from livebode.cli.options import Port
+from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
+from livebode.configuration.axis import ServeSection, serve_section
+from livebode.core import UsageError
+
+if TYPE_CHECKING:
+    from livebode.dashboard.fleet_feed import StatusFeed
+
+
+def view_command(
+    fleet: Annotated[
+        Path | None, typer.Argument(metavar="FLEET.toml", help="The fleet: its \\[log] says where the log is.")
+    ] = None,
+    demo: Annotated[
+        int | None, typer.Option(metavar="AXES", min=1, max=200_000, help="Show a simulated fleet of so many axes.")
+    ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PLAN.svg",
+            help="Floor plan: elements whose id or data-axis is the path of an axis or a machine show its state.",
+        ),
+    ] = None,
+    trends: Annotated[
+        str, typer.Option(metavar="URL", help="Page of trends, such as that of `livebode view`; each axis links to it.")
+    ] = "",
+    port: Port = None,
+    axis: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="AXIS.toml",
+            help="Read \\[serve] from this file, which may have nothing else: address, tokens, TLS.",
+        ),
+    ] = None,
+) -> None:
+    """Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.
+
+    Acknowledgements and shelves are stored in the log of the fleet, so that all pages of it show the same.
+    """
+    if (fleet is None) == (demo is None):
+        raise UsageError(
+            "options",
+            "give either FLEET.toml or --demo AXES",
+            "`livebode fleet view --demo 10000` shows a simulated fleet",
+        )
+    if trends and not trends.startswith(("https://", "http://", "/")):
+        raise UsageError("unreadable", f"{trends!r} is not an address", "begin it with https://", argument="trends")
+    dashboard = dashboard_of(ServeSection() if axis is None else serve_section(axis), port)
+    from livebode.dashboard.fleet_view import FleetView
+    from livebode.dashboard.floor_plan import floor_plan
+
+    drawing = None if plan is None else floor_plan(plan)
+    dashboard.view_fleet(FleetView(_feed(fleet, demo), drawing, trends))
+    with dashboard:
+        print_line(f"the fleet is at {dashboard.url}")
+        wait_for_the_end()
+
+
+def _feed(fleet: Path | None, demo: int | None) -> StatusFeed:
+    if fleet is None:
+        from livebode.dashboard.fleet_demo import DemoFeed, DemoFleet
+
+        return DemoFeed(DemoFleet(demo or 1))
+    from livebode.dashboard.fleet_feed import NatsFeed
+    from livebode.fleet.settings import FleetSettings
+
+    feed = NatsFeed(FleetSettings.read(fleet).log.url, fleet.stem)
+    asyncio.run(_tried(feed))
+    return feed
+
+
+async def _tried(feed: StatusFeed) -> None:
+    """Connect once, so that a wrong address is reported before the page opens."""
+    from livebode.dashboard.fleet_feed import NatsFeed
+
+    assert isinstance(feed, NatsFeed)
+    await feed.connect()
+    await feed.close()

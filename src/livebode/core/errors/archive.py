@@ -1,0 +1,34 @@
+"""Archives and lakes that cannot be used, and recordings of an archive that cannot be tracked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from livebode.core.errors.base import LivebodeError
+
+
+class ArchiveError(LivebodeError):
+    """An archive, its lake or its cluster cannot be used, or a recording ended the process that tracked it.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> livebode.ArchiveError.codes["memory-exceeded"]
+    'A recording needs more memory than a worker may use.'
+    """
+
+    area: ClassVar[str] = "archive"
+    codes: ClassVar[Mapping[str, str]] = {
+        "changed-meanwhile": "A recording changed between two steps of the same archive run.",
+        "cluster-unreachable": "The scheduler of the cluster does not answer, or refuses the certificate.",
+        "covariate-unknown": "No run has a covariate of that name.",
+        "internal": "Tracking a recording ended with an internal error.",
+        "lake-unusable": "A table of the lake cannot be read or written.",
+        "memory-exceeded": "A recording needs more memory than a worker may use.",
+        "no-recordings": "No file matches the inputs of the archive.",
+        "process-ended": "The process that tracked a recording was ended by a signal, or ended itself.",
+        "quantity-ambiguous": "Several models have a quantity of that name.",
+        "quantity-unknown": "No run of the lake has a quantity of that name.",
+        "recipe-unknown": "No run was tracked with these settings.",
+    }

@@ -1,0 +1,155 @@
+"""Feeds: where the status messages of a fleet come from, and where acts of persons go."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from livebode.core.errors import FleetError
+from livebode.core.installing import not_installed
+from livebode.dashboard.fleet_alarms import FleetAct
+from livebode.fleet.page_status import NAMES, VIEW
+from livebode.fleet.subjects import axis_token
+
+ACT_SUBJECT = "act"
+"""Subjects act.KIND.AXIS, of which the stream ACTS retains the newest."""
+_ACTS_STREAM = "ACTS"
+_CONNECT_S = 3.0
+Hear = Callable[[bytes], None]
+
+
+class StatusFeed(Protocol):
+    """Delivers messages until it is cancelled.
+
+    Attributes
+    ----------
+    name
+        Of the fleet, for the title of the page.
+    trouble
+        Why no messages can arrive at the moment; empty while they can.
+    """
+
+    name: str
+    trouble: str
+
+    async def run(self, hear: Hear, hear_act: Hear) -> None:
+        """Pass each status message to `hear` and each act to `hear_act`, those from before first."""
+
+    async def publish(self, act: FleetAct) -> None:
+        """Store an act and send it to all pages of the fleet, to this one too; FleetError if that is impossible."""
+
+
+class NatsFeed:
+    """The messages of a fleet's log.
+
+    Parameters
+    ----------
+    url
+        Address of nats-server; several are joined by commas.
+    options
+        Of `nats.connect`: credentials and TLS.
+    """
+
+    def __init__(self, url: str, name: str, **options: Any) -> None:
+        self._url, self.name, self._options = url, name, options
+        self.trouble = ""
+        self._connection: Any = None
+
+    async def connect(self) -> None:
+        """Connect.
+
+        Raises
+        ------
+        FleetError
+            If the server cannot be reached.
+        ExtraError
+            If nats-py is not installed.
+        """
+        try:
+            import nats
+        except ImportError:
+            raise not_installed(
+                "the page of a fleet needs nats-py, which is not installed", "nats-py", "fleet"
+            ) from None
+        self._errors = nats.errors.Error
+        try:
+            connecting = nats.connect(
+                self._url.split(","),
+                name="livebode fleet view",
+                connect_timeout=_CONNECT_S,
+                max_reconnect_attempts=-1,
+                reconnect_time_wait=0.5,
+                error_cb=self._note,
+                disconnected_cb=self._lost,
+                reconnected_cb=self._back,
+                **self._options,
+            )
+            # Without a limit of its own it would try for ever, as it does after the connection is lost.
+            self._connection = await asyncio.wait_for(connecting, _CONNECT_S)
+        except (TimeoutError, OSError, nats.errors.Error) as error:
+            raise FleetError(
+                "log-unreachable",
+                f"the log at {self._url} cannot be reached ({self.trouble or error or type(error).__name__})",
+                "check that nats-server runs there, and the url in [log]",
+                url=self._url,
+            ) from None
+
+    async def close(self) -> None:
+        """Disconnect."""
+        if self._connection is not None:
+            with contextlib.suppress(self._errors, TimeoutError):
+                await self._connection.close()
+
+    async def run(self, hear: Hear, hear_act: Hear) -> None:
+        """Subscribe, and deliver until it is cancelled."""
+        from nats.js import api
+
+        if self._connection is None:
+            await self.connect()
+
+        async def status(message: Any) -> None:
+            hear(message.data)
+
+        async def act(message: Any) -> None:
+            hear_act(message.data)
+
+        js = self._connection.jetstream()
+        with contextlib.suppress(self._errors):  # it exists, or this account may only read
+            await js.add_stream(
+                name=_ACTS_STREAM, subjects=[f"{ACT_SUBJECT}.>"], max_msgs_per_subject=1, storage=api.StorageType.FILE
+            )
+        try:
+            await js.subscribe(f"{ACT_SUBJECT}.>", cb=act, ordered_consumer=True)
+        except self._errors as error:
+            self.trouble = f"acknowledgements cannot be read: {error}"
+        for subject in (VIEW, NAMES):
+            await self._connection.subscribe(f"{subject}.*", cb=status)
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await self.close()
+
+    async def publish(self, act: FleetAct) -> None:
+        """Store an act in the log."""
+        levels = ".".join(map(axis_token, act.path.split("/")))
+        kind = "acknowledge" if act.act == "acknowledge" else "shelf"
+        try:
+            await self._connection.jetstream().publish(f"{ACT_SUBJECT}.{kind}.{levels}", act.to_bytes(), timeout=2.0)
+        except (TimeoutError, self._errors) as error:
+            raise FleetError(
+                "log-unreachable",
+                f"the log did not store it ({error or type(error).__name__})",
+                "try again when the log can be reached",
+                url=self._url,
+            ) from None
+
+    async def _note(self, error: Exception) -> None:
+        self.trouble = self.trouble or str(error) or type(error).__name__
+
+    async def _lost(self) -> None:
+        self.trouble = "no connection to the log"
+
+    async def _back(self) -> None:
+        self.trouble = ""

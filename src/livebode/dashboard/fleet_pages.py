@@ -1,0 +1,123 @@
+"""The page of a fleet and its requests."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Awaitable, Callable
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from livebode.core import ServerError
+from livebode.dashboard.access import Role
+from livebode.dashboard.alarm_requests import Act, alarm_request
+from livebode.dashboard.board import Board
+from livebode.dashboard.fleet_client import FleetClient
+from livebode.dashboard.fleet_view import FleetView
+from livebode.dashboard.places import ClientPlace
+
+Order = Callable[[Request], Awaitable[bytes | Response]]
+
+
+class FleetPages:
+    """The handlers of the routes.
+
+    Parameters
+    ----------
+    view
+        The fleet.
+    board
+        Without axes: access control and places.
+    file
+        Answers with a static file.
+    order
+        The JSON of an operator, or the answer to somebody else.
+    """
+
+    def __init__(self, view: FleetView, board: Board, file: Callable[[str], Response], order: Order) -> None:
+        self._view, self._board, self._file, self._order = view, board, file, order
+        self._paths: tuple[int, bytes] = -1, b""
+
+    @property
+    def routes(self) -> list[BaseRoute]:
+        """All of them."""
+        return [
+            Route("/", self.page),
+            Route("/api/axes", self.axes),
+            Route("/api/plan", self.plan),
+            Route("/api/acknowledge", self.acknowledge, methods=["POST"]),
+            Route("/api/shelve", self.shelve, methods=["POST"]),
+            Route("/api/unshelve", self.unshelve, methods=["POST"]),
+            WebSocketRoute("/live", self.live),
+        ]
+
+    async def page(self, request: Request) -> Response:
+        return RedirectResponse("/login", 303) if self._role(request) is None else self._file("fleet.html")
+
+    async def axes(self, request: Request) -> Response:
+        """Path of each axis in a line, in order; the layout is in a header."""
+        if self._role(request) is None:
+            return _unknown()
+        board = self._view.board
+        if self._paths[0] != board.layout:
+            self._paths = board.layout, gzip.compress("\n".join(board.paths).encode(), 1)
+        headers = {"content-encoding": "gzip", "x-layout": str(board.layout)}
+        return Response(self._paths[1], media_type="text/plain; charset=utf-8", headers=headers)
+
+    async def plan(self, request: Request) -> Response:
+        """The floor plan."""
+        if self._role(request) is None:
+            return _unknown()
+        if self._view.plan is None:
+            return JSONResponse({"error": "there is no floor plan"}, 404)
+        return Response(self._view.plan, media_type="image/svg+xml")
+
+    async def acknowledge(self, request: Request) -> Response:
+        return await self._act(request, "acknowledge")
+
+    async def shelve(self, request: Request) -> Response:
+        return await self._act(request, "shelve")
+
+    async def unshelve(self, request: Request) -> Response:
+        return await self._act(request, "unshelve")
+
+    async def live(self, socket: WebSocket) -> None:
+        headers, address = socket.headers, socket.client.host if socket.client else ""
+        try:
+            role = self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
+        except ServerError:
+            role = None
+        if role is None:
+            await socket.close(1008)
+            return
+        client = FleetClient(self._view, socket, role)
+        place = ClientPlace(role, address, client.displace)
+        if not self._board.places.take(place):
+            await socket.close(1013)
+            return
+        self._view.browsers += 1
+        try:
+            await client.run()
+        finally:
+            self._view.browsers -= 1
+            self._board.places.leave(place)
+
+    async def _act(self, request: Request, act: Act) -> Response:
+        data = await self._order(request)
+        if isinstance(data, Response):
+            return data
+        axes = len(self._view.board.axes)
+        if not axes:
+            raise ServerError("not-begun", "no axis is known yet", "wait for the first status")
+        await self._view.act(act, alarm_request(data, axes, act))
+        return JSONResponse({}, 202)
+
+    def _role(self, request: Request) -> Role | None:
+        headers, address = request.headers, request.client.host if request.client else ""
+        return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
+
+
+def _unknown() -> Response:
+    return JSONResponse({"error": "log in first"}, 401)

@@ -1,0 +1,210 @@
+"""Lake: the tables below one URL, and the commits to them."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from livebode.core import ArchiveError
+from livebode.core.files import whole_file
+from livebode.core.installing import not_installed
+from livebode.lake.data_file import DataFile, parquet_writer
+from livebode.lake.schemas import TABLES
+from livebode.locations import Location, delta_options, location, write_whole
+from livebode.locations.storage import make_parent, opened, reporting
+
+try:
+    from deltalake import CommitProperties, DeltaTable
+    from deltalake.exceptions import CommitFailedError, DeltaError, TableNotFoundError
+    from deltalake.transaction import AddAction, RemoveAction
+except ImportError:
+    raise not_installed("deltalake is not installed, and a lake needs it", "deltalake", "archive") from None
+
+Row = tuple[Any, ...]
+_ONCE = CommitProperties(max_commit_retries=0)
+
+
+class Lake:
+    """The results of an archive; the tables are created when something is written.
+
+    A commit is a compare-and-set on the version of its table: what another process has written is known before
+    anything is added, so no row is there twice, however many processes write and whenever one is killed.
+
+    Parameters
+    ----------
+    url
+        Directory, or URL such as s3://plant/lake. Credentials come from the environment.
+    """
+
+    def __init__(self, url: str) -> None:
+        place = location(url)
+        self._place: Location = place.absolute() if isinstance(place, Path) else place
+        self.url = str(place)
+        self._tables: dict[str, DeltaTable] = {}
+        self._known: dict[str, tuple[int, set[Row]]] = {}
+
+    def read(self, name: str, columns: Sequence[str] | None = None, where: pc.Expression | None = None) -> pa.Table:
+        """The rows of a table as they are now, in no order; none if nothing was written yet.
+
+        Rows of results that are not complete are included; see `quantities`.
+
+        Raises
+        ------
+        ArchiveError
+            If the table cannot be read.
+        """
+        with self.reported(name):
+            table = self.opened(name)
+            if table is None:
+                empty = TABLES[name].schema.empty_table()
+                return empty.select(columns) if columns else empty
+            return table.to_pyarrow_dataset().to_table(columns=columns, filter=where)
+
+    def quantities(self) -> pa.Table:
+        """The quantities of the results that count, those with a row in `runs`."""
+        found, counted = self.read("quantities"), self.keys("runs")
+        keys = zip(found["content"].to_pylist(), found["recipe"].to_pylist())
+        return found.filter(pa.array([key in counted for key in keys], pa.bool_()))
+
+    def keys(self, name: str) -> set[Row]:
+        """The keys of the rows of a table."""
+        with self.reported(name):
+            return self._keys(name, self.opened(name))
+
+    def add_rows(self, name: str, rows: pa.Table) -> int:
+        """Append the rows whose key is not in the table, and return their number."""
+        with self.reported(name):
+            while True:
+                table = self._created(name)
+                present, own = self._keys(name, table), _rows_of(rows, TABLES[name].key)
+                new = rows.filter(pa.array([key not in present for key in own], pa.bool_()))
+                if not new.num_rows:
+                    return 0
+                if self._commit(table, name, [self._group_file(name, new)]):
+                    present.update(own)
+                    self._known[name] = (table.version(), present)
+                    return int(new.num_rows)
+
+    def add_files(self, name: str, files: Sequence[DataFile]) -> None:
+        """Add files that are in the table's directory already, except those of results that count already.
+
+        Adding a file twice has no effect. A file whose rows were joined with others by `compact` belongs to a result
+        in `runs`.
+        """
+        with self.reported(name):
+            while files:
+                table = self._created(name)
+                counted = self.keys("runs")
+                files = [file for file in files if file.rows and file.key not in counted]
+                if not files or self._commit(table, name, files):
+                    return
+
+    def store(self, path: Path, table: str) -> None:
+        """Put a file in the directory of a table, completely or not at all.
+
+        Raises
+        ------
+        ArchiveError, LocationError
+            If it cannot be written.
+        """
+        target = self._place / table / path.name
+        if isinstance(target, Path):
+            with self.reported(table):
+                target.parent.mkdir(parents=True, exist_ok=True)
+                with whole_file(target) as partial:
+                    shutil.copyfile(path, partial)
+            return
+        system, inside = opened(target)
+        with reporting(target):
+            make_parent(target, system, inside)
+            system.put_file(str(path), inside)
+
+    def _group_file(self, name: str, rows: pa.Table) -> DataFile:
+        schema, buffer = TABLES[name].schema, pa.BufferOutputStream()
+        with parquet_writer(buffer, schema) as writer:
+            writer.write_table(rows.cast(schema))
+        data = buffer.getvalue().to_pybytes()
+        file = DataFile(name, f"rows-{hashlib.sha256(data).hexdigest()}.parquet", len(data), rows.num_rows)
+        write_whole(self._place / name / file.name, data)
+        return file
+
+    def _commit(self, table: DeltaTable, name: str, files: Sequence[DataFile]) -> bool:
+        """Add the files in the version after the one that was read; False if somebody else has written that one."""
+        before, now_ms = table.version(), time.time_ns() // 1_000_000
+        actions: list[AddAction | RemoveAction] = [
+            AddAction(file.name, file.size_bytes, {}, now_ms, True, file.statistics) for file in files
+        ]
+        try:
+            table.create_write_transaction(actions, "append", TABLES[name].schema, commit_properties=_ONCE)
+        except CommitFailedError:
+            table.update_incremental()
+            if table.version() == before:
+                raise
+            return False
+        table.update_incremental()
+        return True
+
+    def _keys(self, name: str, table: DeltaTable | None) -> set[Row]:
+        if table is None:
+            return set()
+        version, found = self._known.get(name, (-1, set()))
+        if version != table.version():
+            key = list(TABLES[name].key)
+            found = set(_rows_of(table.to_pyarrow_dataset().to_table(columns=key), key))
+            self._known[name] = (table.version(), found)
+        return found
+
+    def opened(self, name: str) -> DeltaTable | None:
+        """The table at its newest version; None if it does not exist."""
+        try:
+            if name in self._tables:
+                self._tables[name].update_incremental()
+            else:
+                self._tables[name] = self._table(name)
+        except TableNotFoundError:
+            return None
+        return self._tables[name]
+
+    def _created(self, name: str) -> DeltaTable:
+        if (table := self.opened(name)) is not None:
+            return table
+        with suppress(CommitFailedError):  # another process has created it in the same moment
+            DeltaTable.create(
+                self._uri(name), TABLES[name].schema, mode="ignore", storage_options=delta_options(self._place)
+            )
+        self._tables[name] = self._table(name)
+        return self._tables[name]
+
+    def _table(self, name: str) -> DeltaTable:
+        return DeltaTable(self._uri(name), storage_options=delta_options(self._place))
+
+    def _uri(self, name: str) -> str:
+        place = self._place / name
+        return str(place) if isinstance(place, Path) else place.address
+
+    @contextmanager
+    def reported(self, name: str) -> Iterator[None]:
+        """Within, an error of a table is an ArchiveError that names it."""
+        try:
+            yield
+        except (DeltaError, OSError) as error:
+            raise ArchiveError(
+                "lake-unusable",
+                f"the table {name} of the lake {self.url!r} cannot be used: {str(error).splitlines()[0]}",
+                "check the address, the permissions and the credentials in the environment",
+                lake=self.url,
+                table=name,
+                reason=str(error),
+            ) from error
+
+
+def _rows_of(table: pa.Table, columns: Sequence[str]) -> list[Row]:
+    return list(zip(*(table[name].to_pylist() for name in columns)))

@@ -1,0 +1,125 @@
+"""The columns of the tables of a lake.
+
+A result belongs to a content (SHA-256 of the recording's bytes) and a recipe (id of the settings). Lists have the item
+name of Delta, "element".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import pyarrow as pa
+
+from livebode.records import parameter_table
+from livebode.records.wide_responses import wide_schema
+
+_TIME = pa.timestamp("us", tz="UTC")
+_KEY = [("content", pa.string()), ("recipe", pa.string())]
+_MACHINE = [(level, pa.string()) for level in ("site", "line", "machine", "axis")]
+
+
+def _list(kind: pa.DataType) -> pa.DataType:
+    return pa.list_(pa.field("element", kind))
+
+
+def _in_delta(kind: pa.DataType) -> pa.DataType:
+    """The type in Delta, whose lists have any length."""
+    return _list(kind.value_type) if pa.types.is_fixed_size_list(kind) else kind
+
+
+RUNS = pa.schema(
+    [
+        *_KEY,
+        *_MACHINE,
+        ("url", pa.string()),
+        ("recorded_from", _TIME),
+        ("recorded_to", _TIME),
+        ("clock", pa.string()),
+        ("duration_s", pa.float64()),
+        ("rate_hz", pa.float64()),
+        ("window", pa.int64()),
+        ("quantity", pa.string()),
+        ("unit", pa.string()),
+        ("frequencies_hz", _list(pa.float64())),
+        ("quiet_bins", _list(pa.int64())),
+        ("responses", pa.int64()),
+        ("parameters", pa.int64()),
+        ("events", pa.int64()),
+        ("livebode", pa.string()),
+    ]
+)
+"""One row for each result, which is written last: a result without it does not count."""
+
+FILES = pa.schema(
+    [("url", pa.string()), ("size_bytes", pa.int64()), ("version", pa.string()), ("content", pa.string()), *_MACHINE]
+)
+"""One row for each place where a content was found; the version of a file changes with its content."""
+
+QUANTITIES = pa.schema(
+    [
+        *_KEY,
+        *_MACHINE,
+        ("recorded_from", _TIME),
+        ("model", pa.string()),
+        ("name", pa.string()),
+        ("unit", pa.string()),
+        ("value", pa.float64()),
+        ("bound_95", pa.float64()),
+        ("low", pa.float64()),
+        ("high", pa.float64()),
+        ("time_s", pa.float64()),
+        ("fits", pa.int64()),
+        ("covariates", pa.map_(pa.string(), pa.float64())),
+    ]
+)
+"""One row for each run and quantity: what a trend reads. The covariates are means over the run."""
+
+RESPONSES = pa.schema([*_KEY, *((field.name, _in_delta(field.type)) for field in wide_schema(1))])
+"""One row for each response, in wide form; the lists have a value for each of the run's frequencies_hz."""
+
+PARAMETERS = pa.schema([*_KEY, *((field.name, field.type) for field in parameter_table.SCHEMA)])
+"""As parameters.parquet of a run."""
+
+EVENTS = pa.schema(
+    [
+        *_KEY,
+        ("kind", pa.string()),
+        ("sample", pa.int64()),
+        ("time_s", pa.float64()),
+        ("message", pa.string()),
+        ("details", pa.string()),
+    ]
+)
+"""As events.jsonl of a run; the details are JSON."""
+
+QUARANTINE = pa.schema(
+    [
+        *_KEY,
+        ("url", pa.string()),
+        *_MACHINE,
+        ("code", pa.string()),
+        ("sentence", pa.string()),
+        ("livebode", pa.string()),
+    ]
+)
+"""One row for each recording that cannot be tracked and each version of livebode that tried."""
+
+
+@dataclass(frozen=True)
+class LakeTable:
+    """The columns of a table, and those by which two rows are the same; none if each result has a file of its own."""
+
+    schema: pa.Schema
+    key: tuple[str, ...] = ()
+
+
+TABLES: Mapping[str, LakeTable] = {
+    "runs": LakeTable(RUNS, ("content", "recipe")),
+    "files": LakeTable(FILES, ("url", "version")),
+    "quantities": LakeTable(QUANTITIES, ("content", "recipe")),
+    "responses": LakeTable(RESPONSES),
+    "parameters": LakeTable(PARAMETERS),
+    "events": LakeTable(EVENTS),
+    "quarantine": LakeTable(QUARANTINE, ("content", "recipe", "livebode")),
+}

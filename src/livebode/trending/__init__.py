@@ -1,0 +1,36 @@
+"""Quantities over months and machines: trends with bounds, changes, and the ranking of a fleet."""
+
+from livebode.trending.assessment import LIMIT_PERCENT, Assessment, assess
+from livebode.trending.changes import SIGNIFICANT
+from livebode.trending.difference import LevelDifference, differences
+from livebode.trending.fleet import FALSE_DISCOVERIES, LOGARITHMIC, Ranked, discoveries, months_to_limit, urgency
+from livebode.trending.quantity_history import History, Level, MachineHistory, Selection, histories, history
+from livebode.trending.trend import MONTH_S, RUNS_MIN, ChangePoint, Effect, NotAssessed, Trend, trend_of
+
+__all__ = [
+    "FALSE_DISCOVERIES",
+    "LIMIT_PERCENT",
+    "LOGARITHMIC",
+    "MONTH_S",
+    "RUNS_MIN",
+    "SIGNIFICANT",
+    "Assessment",
+    "ChangePoint",
+    "Effect",
+    "History",
+    "Level",
+    "LevelDifference",
+    "MachineHistory",
+    "NotAssessed",
+    "Ranked",
+    "Selection",
+    "Trend",
+    "assess",
+    "differences",
+    "discoveries",
+    "histories",
+    "history",
+    "months_to_limit",
+    "trend_of",
+    "urgency",
+]

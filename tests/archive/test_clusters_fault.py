@@ -1,0 +1,55 @@
+"""Mutual TLS: a scheduler takes tasks from who has a certificate of its authority, and from nobody else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import trustme
+from distributed import LocalCluster, Security
+
+from livebode import ArchiveError
+from livebode.archive import clusters
+from livebode.archive.settings import ClusterSection
+
+
+def certified(folder: Path, authority: trustme.CA) -> dict[str, Path]:
+    """Certificate, key and authority of a computer as files."""
+    folder.mkdir()
+    own = authority.issue_cert("127.0.0.1")
+    files = {name: folder / f"{name}.pem" for name in ("certificate", "key", "authority")}
+    own.cert_chain_pems[0].write_to_path(files["certificate"])
+    own.private_key_pem.write_to_path(files["key"])
+    authority.cert_pem.write_to_path(files["authority"])
+    return files
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[tuple[str, dict[str, Path]]]:
+    files = certified(tmp_path / "ours", trustme.CA())
+    each = {f"tls_{role}_{name}": str(files[file]) for role in ("scheduler", "worker", "client")
+            for name, file in (("cert", "certificate"), ("key", "key"))}  # fmt: skip
+    security = Security(tls_ca_file=str(files["authority"]), require_encryption=True, **each)
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, host="tls://127.0.0.1", protocol="tls://",
+        security=security, dashboard_address=None,
+    ) as cluster:  # fmt: skip
+        yield cluster.scheduler_address, files
+
+
+def test_who_has_a_certificate_is_served_and_who_has_another_is_not(
+    scheduler: tuple[str, dict[str, Path]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address, files = scheduler
+    with clusters.started(ClusterSection(address=address, **files)) as cluster:
+        assert cluster.workers == 1
+        assert cluster.client.submit(sum, (1, 2)).result() == 3
+    monkeypatch.setattr(clusters, "_CONNECT_S", 1)
+    strangers = certified(tmp_path / "strangers", trustme.CA())
+    with (
+        pytest.raises(ArchiveError, match="does not answer") as caught,
+        clusters.started(ClusterSection(address=address, **strangers)),
+    ):
+        pass
+    assert caught.value.code == "archive.cluster-unreachable"

@@ -1,0 +1,64 @@
+"""A lake on S3: two coordinators at once store each result once, by conditional puts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from livebode.archive.committing import Committer
+from livebode.archive.recordings import file_rows, find_places, untracked
+from livebode.archive.results import Failed, Hashed, Tracked
+from livebode.archive.settings import ArchiveSettings
+from livebode.archive.tasks import hash_places, track_one
+from livebode.archive.tracking import Job
+from livebode.configuration.recipe import recipe_id
+from livebode.lake import DataFile, Lake
+from livebode.locations import find, write_whole
+from tests.support.archives import write_archive
+from tests.support.object_storage import BUCKET, object_storage
+
+LAKE, RECORDINGS = f"s3://{BUCKET}/lake", 3
+
+
+@pytest.fixture(scope="module")
+def s3() -> Iterator[str]:
+    with object_storage() as address:
+        yield address
+
+
+@pytest.mark.usefixtures("s3")
+def test_two_coordinators_lose_nothing_and_double_nothing(tmp_path: Path) -> None:
+    archive = write_archive(tmp_path, RECORDINGS)
+    for path in (tmp_path / "plant").rglob("*.parquet"):
+        write_whole(f"s3://{BUCKET}/{path.relative_to(tmp_path).as_posix()}", path.read_bytes())
+    text = archive.read_text().replace('"plant/', f'"s3://{BUCKET}/plant/').replace('"lake"', f'"{LAKE}"')
+    archive.write_text(text)
+    settings = ArchiveSettings.read(archive)
+    axis = settings.axis()
+    job = Job(axis, recipe_id(axis), settings.lake, 10**12)
+    hashed = [one for one in hash_places(find_places(settings.templates)) if isinstance(one, Hashed)]
+    contents = [(one.item, one.content) for one in hashed]
+    results: list[Tracked | Failed] = [track_one(job, one) for one in untracked(contents, job.recipe, set())]
+
+    def coordinator(order: int) -> list[DataFile]:
+        lake = Lake(LAKE)
+        lake.add_rows("files", file_rows(contents, job.machine))
+        for result in results[::order]:
+            committer = Committer(lake, job.recipe, job.machine)
+            committer.take([result])
+            committer.commit()
+        return [file for result in results if isinstance(result, Tracked) for file in result.files]
+
+    with ThreadPoolExecutor() as pool:
+        written, _ = pool.map(coordinator, (1, -1))
+    lake = Lake(LAKE)
+    assert len(lake.read("runs")) == len(lake.keys("runs")) == RECORDINGS
+    assert {row["machine"] for row in lake.read("files").to_pylist()} == {f"machine-{n:03}" for n in range(RECORDINGS)}
+    assert lake.read("files").num_rows == RECORDINGS + 1  # one is a copy
+    assert {name: lake.read(name).num_rows for name in ("responses", "parameters", "events")} == {
+        name: sum(file.rows for file in written if file.table == name) for name in ("responses", "parameters", "events")
+    }
+    assert len(find(f"{LAKE}/responses/*.parquet")) == RECORDINGS
