@@ -17,9 +17,12 @@ from nats.js.errors import NoStreamResponseError, ServiceUnavailableError
 
 from livebode.core import ConfigError
 from livebode.core.errors import FleetError
+from livebode.dashboard.fleet_feed import NatsFeed
+from livebode.fleet.connecting import security
 from livebode.fleet.credentials import write_credentials
 from livebode.fleet.log import FleetLog
 from livebode.fleet.message import message_id, write_message
+from livebode.fleet.page_status import VIEW
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import FleetSettings, LogSection
 from livebode.fleet.status import fleet_status
@@ -163,12 +166,26 @@ def test_a_viewer_reads_the_status_and_changes_nothing(fleet: SecureFleet) -> No
         with pytest.raises(ServiceUnavailableError):
             await log._js.pull_subscribe(f"{STATUS}.0", stream=STATUS_STREAM)
         for reply in (f"{LOG}.0.{own}", "$JS.API.STREAM.PURGE.STATUS"):
-            await log._connection.publish("view.STREAM.INFO.STATUS", b"", reply=reply)
+            await log._connection.publish("viewer.STREAM.INFO.STATUS", b"", reply=reply)
         await log._connection.flush()
         assert (await log.extent(STATUS_STREAM)).subjects == {f"{STATUS}.0": 1}
 
+    async def page() -> list[bytes]:
+        heard: list[bytes] = []
+        view = fleet.log("view", "view")
+        feed = NatsFeed(view.url, "fleet", **security(view))
+        running = asyncio.create_task(feed.run(heard.append, heard.append))
+        async with FleetLog(fleet.log("fleet"), "test") as log:
+            while not heard:
+                await log._connection.publish(f"{VIEW}.0", b"page")
+                await asyncio.sleep(0.05)
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        return heard
+
     _as(fleet.log("fleet"), report)
     _as(fleet.log("view", "view"), look)
+    assert asyncio.run(page())[0] == b"page"
     assert _stored(fleet) == {}
 
 

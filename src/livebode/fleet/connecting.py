@@ -49,7 +49,7 @@ async def connected(settings: LogSection, name: str, report: Callable[[Exception
         from livebode.fleet.encrypted_client import EncryptedClient
     except ImportError:
         raise not_installed("the log of a fleet needs nats-py, which is not installed", "nats-py", "fleet") from None
-    options = _security(settings)
+    options = security(settings)
     connection = EncryptedClient() if settings.encrypted else Client()
     attempts = _Attempts(settings, report)
     connecting = connection.connect(settings.url.split(","), name=name, error_cb=attempts.failed, **_RENEWED, **options)
@@ -87,7 +87,8 @@ class _Attempts:
             raise _GivenUpError
 
 
-def _security(settings: LogSection) -> dict[str, Any]:
+def security(settings: LogSection) -> dict[str, Any]:
+    """Options of nats-py for the key and TLS; FleetError if a file with a key or a certificate cannot be used."""
     options: dict[str, Any] = {}
     if settings.credentials is not None:
         options["nkeys_seed"] = checked_credentials(settings.credentials)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from urllib.parse import quote
 
 from livebode.core.errors import FleetError
+from livebode.fleet.page_status import NAMES, VIEW
 from livebode.fleet.settings import FleetSettings, ServerSection, UsersSection, on_loopback
 from livebode.fleet.subjects import EDGE, VIEW_API, axis_path
 
@@ -52,6 +53,9 @@ class ServerAccess:
         exports = [_service(subject, accounts) for subject, accounts in sorted(senders.items())]
         exports += [_service(f"{_JETSTREAM}.{request}", [_VIEW]) for request in _VIEWED]
         viewed = [_import(f"{_JETSTREAM}.{request}", f', to: "{VIEW_API}.{request}"') for request in _VIEWED]
+        for subject in (f"{VIEW}.*", f"{NAMES}.*"):  # what workers publish for the page of the fleet
+            exports.append(f"{{stream: {json.dumps(subject)}, accounts: {json.dumps([_VIEW])}}}")
+            viewed.append(f"{{stream: {{account: {_FLEET}, subject: {json.dumps(subject)}}}}}")
         text = ["accounts {", f"  {_FLEET} {{", "    jetstream: enabled", f"    {mappings}", _users(self.users.fleet)]
         text += [_list("exports", exports), "  }", f"  {_VIEW} {{", _users(self.users.view), _list("imports", viewed)]
         for path, subjects in edges.items():
