@@ -69,8 +69,8 @@ async def send(log: FleetLog, axes: Mapping[str, Axis], firsts: range) -> None:
     """Publish the batches that begin at these numbers, for all axes."""
     for first in firsts:
         for number, key in enumerate(axes):
-            one = batch(number, first)
-            await log.append(f"{EDGE}.{key}", write_message(one), message_id(key, one))
+            message = write_message(batch(number, first))
+            await log.append(f"{EDGE}.{key}", message, message_id(key, message))
 
 
 def sent(settings: LogSection, axes: Mapping[str, Axis], batches: int, first: int = 0) -> None:

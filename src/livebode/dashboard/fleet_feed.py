@@ -49,7 +49,7 @@ class NatsFeed:
     url
         Address of nats-server; several are joined by commas.
     options
-        Of `nats.connect`: credentials and TLS.
+        Of the connection of nats-py: credentials and TLS.
     """
 
     def __init__(self, url: str, name: str, **options: Any) -> None:
@@ -69,13 +69,17 @@ class NatsFeed:
         """
         try:
             import nats
+            from nats.aio.client import Client
+
+            from livebode.fleet.encrypted_client import EncryptedClient
         except ImportError:
             raise not_installed(
                 "the page of a fleet needs nats-py, which is not installed", "nats-py", "fleet"
             ) from None
         self._errors = nats.errors.Error
+        connection: Any = EncryptedClient() if self._url.startswith("tls://") else Client()
         try:
-            connecting = nats.connect(
+            connecting = connection.connect(
                 self._url.split(","),
                 name="livebode fleet view",
                 connect_timeout=_CONNECT_S,
@@ -87,7 +91,8 @@ class NatsFeed:
                 **self._options,
             )
             # Without a limit of its own it would try for ever, as it does after the connection is lost.
-            self._connection = await asyncio.wait_for(connecting, _CONNECT_S)
+            await asyncio.wait_for(connecting, _CONNECT_S)
+            self._connection = connection
         except (TimeoutError, OSError, nats.errors.Error) as error:
             raise FleetError(
                 "log-unreachable",

@@ -16,6 +16,11 @@ from livebode.preparation.plan import live_follower
 from livebode.sources.live import LiveBlock, Sequencer
 from livebode.sources.live.source_events import SourceEvents
 
+RESPONSE_BYTES = 130
+"""Of a response at a line, in a message of results."""
+_OUTPUT_BYTES_MAX = 4 << 20
+"""Most bytes of the responses to one message: a message of results must have room for them."""
+_FAILURE_LETTERS_MAX = 1000
 _logger = logging.getLogger(__name__)
 
 
@@ -87,6 +92,11 @@ class AxisStream(StatefulBase):
                     responses += [found] if len(found) else []
             except Exception as error:  # a fault of one axis must not stop the others of its partition
                 self._fail(error, events)
+        if sum(found.value.size for found in responses) * RESPONSE_BYTES > _OUTPUT_BYTES_MAX:
+            what = f"message {position} of the log has too many samples: its responses were dropped"
+            sample, time_s = self._events.position
+            events.append(Event("malformed", sample, time_s, what))
+            responses = []
         self.responses += sum(map(len, responses))
         events += self._events.take()
         return Output(first, Responses.join(responses) if responses else None, events)
@@ -108,7 +118,7 @@ class AxisStream(StatefulBase):
     def _fail(self, error: Exception, events: list[Event]) -> None:
         if not isinstance(error, LivebodeError):
             _logger.exception("internal error at message %d of the log", self.position)
-        self.failure = str(error) or type(error).__name__
+        self.failure = (str(error) or type(error).__name__)[:_FAILURE_LETTERS_MAX]
         sample, time_s = self._events.position
         events.append(Event("axis-failed", sample, time_s, f"the axis is not tracked any more: {self.failure}"))
 

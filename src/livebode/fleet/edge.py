@@ -13,7 +13,7 @@ import numpy as np
 
 from livebode.fleet.edge_buffer import EdgeBuffer
 from livebode.fleet.log import FleetLog
-from livebode.fleet.message import message_id, read_message, write_message
+from livebode.fleet.message import message_id, write_message
 from livebode.fleet.settings import FleetSettings, LogSection
 from livebode.fleet.subjects import EDGE
 from livebode.sources.live import Batch, LiveBlock, LiveSource, SpectraBatch
@@ -54,8 +54,7 @@ class Edge:
             over = taking.done()
             message = self._buffer.first()
             if message is not None:
-                identity = message_id(self._key, read_message(message, 0.0))
-                await log.append(f"{EDGE}.{self._key}", message, identity)
+                await log.append(f"{EDGE}.{self._key}", message, message_id(self._key, message))
                 self._buffer.remove(message)
                 self.sent += 1
             elif over:
@@ -132,7 +131,8 @@ def _take_all(source: LiveSource, edge: Edge) -> None:
 async def send_edges(settings: LogSection, edges: list[tuple[Edge, Future[None]]], stop: threading.Event) -> None:
     """Send the messages of each edge until the thread that fills it has ended, or a second after `stop`."""
     async with FleetLog(settings, "livebode send") as log:
-        await log.create_streams()
+        if settings.credentials is None:  # a user of an edge may do nothing but send
+            await log.create_streams()
         sending = asyncio.gather(*(edge.send(log, taking) for edge, taking in edges))
         while not sending.done() and not stop.is_set():
             await asyncio.sleep(_IDLE_S)

@@ -11,15 +11,14 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from livebode.core.errors import FleetError
-from livebode.core.installing import not_installed
 from livebode.fleet import subjects
+from livebode.fleet.connecting import connected
 from livebode.fleet.settings import LogSection
 
 _logger = logging.getLogger(__name__)
 _EXPECTED, _WRITE = "Nats-Expected-Last-Subject-Sequence", "Livebode-Write"
 _WRONG_LAST_SEQUENCE = 10071
-_REQUEST_S, _CONNECT_S, _START_S, _RETRY_S, _RETRY_S_MAX = 2.0, 2.0, 4.0, 0.1, 1.0
+_REQUEST_S, _RETRY_S, _RETRY_S_MAX = 2.0, 0.1, 1.0
 _DUPLICATES_S = 120.0
 T = TypeVar("T")
 
@@ -72,40 +71,16 @@ class FleetLog:
 
         Raises
         ------
-        FleetError
-            If the server cannot be reached within some seconds.
-        ExtraError
-            If nats-py is not installed.
+        ConfigError, FleetError, ExtraError
+            As `connected`.
         """
-        try:
-            import nats
-        except ImportError:
-            raise not_installed(
-                "the log of a fleet needs nats-py, which is not installed", "nats-py", "fleet"
-            ) from None
+        self._connection = await connected(self.settings, self._name, self._report)
+        import nats
+
         self._nats = nats
-        try:
-            connecting = nats.connect(
-                self.settings.url.split(","),
-                name=self._name,
-                connect_timeout=_CONNECT_S,
-                max_reconnect_attempts=-1,
-                reconnect_time_wait=0.2,
-                ping_interval=2,
-                max_outstanding_pings=2,
-                error_cb=self._note,
-                allow_reconnect=True,
-            )
-            self._connection = await asyncio.wait_for(connecting, _START_S)
-        except (TimeoutError, OSError, nats.errors.Error) as error:
-            raise FleetError(
-                "log-unreachable",
-                f"the log at {self.settings.url} cannot be reached ({error or type(error).__name__})",
-                "check that nats-server runs there, and the url in [log]",
-                url=self.settings.url,
-            ) from None
         self.errors: type[Exception] = nats.errors.Error
-        self._js = self._connection.jetstream(timeout=_REQUEST_S)
+        viewer = {"prefix": subjects.VIEW_API} if self.settings.access == "view" else {}
+        self._js = self._connection.jetstream(timeout=_REQUEST_S, **viewer)
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -245,13 +220,15 @@ class FleetLog:
             await asyncio.sleep(pause_s)
             pause_s = min(2 * pause_s, _RETRY_S_MAX)
 
-    async def _note(self, error: Exception) -> None:
-        self._report(error)
-
     def _report(self, error: Exception) -> None:
+        from nats.js.errors import NoStreamResponseError
+
+        reason = str(error) or type(error).__name__
+        if isinstance(error, NoStreamResponseError):
+            reason = "nothing there takes this message: start `livebode fleet run`, and check that the key may send it"
         if not self.trouble:
-            _logger.warning("the log does not answer (%s); retrying", error or type(error).__name__)
-        self.trouble = str(error) or type(error).__name__
+            _logger.warning("the log does not answer (%s); retrying", reason)
+        self.trouble = reason
 
 
 def _stored(raw: Any) -> StoredMessage:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hashlib import blake2b
+
 import numpy as np
 
 from livebode.sources.live import (
@@ -14,6 +16,8 @@ from livebode.sources.live import (
 )
 from livebode.sources.live.framing import damaged_frame, read_header
 from livebode.sources.live.spectra_batch import AnyBatch
+
+_DIGEST_BYTES = 16
 
 
 def write_message(batch: AnyBatch) -> bytes:
@@ -43,9 +47,15 @@ def read_message(message: bytes, arrived_s: float) -> AnyBatch:
     return batch
 
 
-def message_id(key: str, batch: AnyBatch) -> str:
-    """The name by which the log detects a repeated message: axis, epoch and the sender's number of the first sample."""
-    return f"{key}:{batch.epoch}:{batch.first_sample}"
+def message_id(key: str, message: bytes) -> str:
+    """The name by which the log detects a repeated message: axis, epoch, number of the first sample, and a digest.
+
+    The names of all axes are in one list at the server. Without the digest, which nobody knows before the samples, a
+    hostile edge could store messages under the next names of another axis, and the log would drop its messages.
+    """
+    batch = read_message(message, 0.0)
+    digest = blake2b(message, digest_size=_DIGEST_BYTES).hexdigest()
+    return f"{key}:{batch.epoch}:{batch.first_sample}:{digest}"
 
 
 def _exact(values: np.ndarray, kind: type) -> bool:

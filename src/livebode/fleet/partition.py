@@ -11,7 +11,7 @@ import logging
 import os
 import socket
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from livebode.configuration.axis import Axis
@@ -21,6 +21,7 @@ from livebode.fleet.log import ClaimLostError, FleetLog, StoredMessage
 from livebode.fleet.page_status import PageStatus
 from livebode.fleet.reader import Reader
 from livebode.fleet.result_message import PendingResults, ResultMessage
+from livebode.fleet.server_config import PAYLOAD_BYTES_MAX
 from livebode.fleet.subjects import (
     LOG,
     LOG_STREAM,
@@ -42,6 +43,8 @@ STATE_SHARE = 0.08
 """Most bytes of states, as a share of the bytes of the machines' data."""
 _PENDING_BYTES_MAX = 1 << 20
 _READ_S = 0.1
+_UNKNOWN_MAX = 100
+"""Most axes that are not in the fleet and are reported."""
 
 _logger = logging.getLogger(__name__)
 
@@ -89,10 +92,13 @@ class PartitionOwner:
         reader = Reader(self._log, LOG_STREAM, f"{LOG}.{self._number}.>", await self._restore())
         try:
             while not stop.is_set():
-                messages = await reader.read(_READ_S)
-                # Never in the loop of the connection, which must answer the server's pings in time.
-                await asyncio.to_thread(self._process, messages)
-                await self._store(reader.pending)
+                messages: Sequence[StoredMessage] = await reader.read(_READ_S)
+                while True:
+                    # Never in the loop of the connection, which must answer the server's pings in time.
+                    messages = await asyncio.to_thread(self._process, messages)
+                    await self._store(reader.pending + len(messages))
+                    if not messages:
+                        break
             await self._store_results()
             await self._store_states(all_of_them=True)
         finally:
@@ -148,8 +154,11 @@ class PartitionOwner:
             self._pending.add_event(key, about | {"details": {}})
         return first
 
-    def _process(self, messages: list[StoredMessage]) -> None:
-        for message in messages:
+    def _process(self, messages: Sequence[StoredMessage]) -> Sequence[StoredMessage]:
+        """Process messages until their results are enough for a message of results; returns the others."""
+        for index, message in enumerate(messages):
+            if self._pending.nbytes > _PENDING_BYTES_MAX:
+                return messages[index:]
             self._newest_s = message.stored_s
             key = key_of(message.subject)
             stream = self._stream(key, message.number)
@@ -159,6 +168,7 @@ class PartitionOwner:
             self._stored.took(key, len(message.data))
             if message.number > self._through:  # else it is stored already
                 self._pending.add(key, stream, output)
+        return []
 
     def _stream(self, key: str, number: int) -> AxisStream | None:
         found = self._streams.get(key)
@@ -166,6 +176,8 @@ class PartitionOwner:
             found = self._streams[key] = AxisStream(self._axes[key], number)
         if found is None:
             if key not in self._unknown:
+                if len(self._unknown) >= _UNKNOWN_MAX:
+                    return None
                 _logger.warning("the fleet has no axis %s, whose data arrive", axis_path(key))
             self._unknown[key] = self._unknown.get(key, 0) + 1
         return found
@@ -191,7 +203,10 @@ class PartitionOwner:
         for key, stream in self._streams.items():
             if all_of_them or self._stored.due(key):
                 state = await asyncio.to_thread(stream.snapshot)
-                await self._log.append(self._state_subject(key), state)
+                if len(state) <= PAYLOAD_BYTES_MAX:
+                    await self._log.append(self._state_subject(key), state)
+                else:  # an older one remains, and a takeover computes more again
+                    _logger.warning("the state of %s is too large for the log: %d bytes", axis_path(key), len(state))
                 self._stored.stored(key, len(state))
 
     async def _append(self, message: ResultMessage) -> int:

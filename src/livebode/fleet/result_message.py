@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from livebode.arrow import from_numpy
 from livebode.core import Responses
-from livebode.fleet.axis_stream import AxisStream, Output
+from livebode.fleet.axis_stream import RESPONSE_BYTES, AxisStream, Output
 from livebode.records.response_table import SCHEMA as RESPONSE_SCHEMA
 from livebode.records.response_table import as_batch
 
@@ -20,8 +20,8 @@ SCHEMA = pa.schema([("axis", pa.string()), ("run", pa.int64()), ("number", pa.in
 """Columns: key of the axis, number in the log of the first message of its run, number of the response within that run,
 and those of responses.parquet."""
 _META = b"livebode"
-_BYTES = 130
-"""Of a response at a line, in memory."""
+_EVENT_BYTES = 500
+"""Of an event without its sentence."""
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,10 @@ class PendingResults:
     def add(self, key: str, stream: AxisStream, output: Output) -> None:
         """Append the output of a message of this axis."""
         self._events += [{"axis": key, "run": stream.run, **asdict(event)} for event in output.events]
+        self.nbytes += sum(_EVENT_BYTES + len(event.message) for event in output.events)
         if output.responses is not None:
             self._responses.setdefault((key, stream.run), []).append((output.number, output.responses))
-            self.nbytes += output.responses.value.size * _BYTES
+            self.nbytes += output.responses.value.size * RESPONSE_BYTES
         if output.responses is not None or output.events:
             self._recipes[key] = stream.recipe
 

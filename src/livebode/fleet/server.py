@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import shutil
+import signal
 import socket
 import subprocess
 import time
 from pathlib import Path
 
 from livebode.core.errors import FleetError
+from livebode.fleet.server_access import OPEN, ServerAccess
 from livebode.fleet.server_config import server_configuration
 
 _START_S, _STEP_S = 10.0, 0.02
@@ -26,6 +28,8 @@ class LogServer:
         Of the fleet.
     file_bytes_max
         Most bytes of all streams.
+    access
+        Who may do what. Default: everyone everything.
 
     Raises
     ------
@@ -33,9 +37,12 @@ class LogServer:
         At the start, if nats-server is not installed or ends at once.
     """
 
-    def __init__(self, directory: Path, partitions: int, file_bytes_max: int = 4 << 30) -> None:
+    def __init__(
+        self, directory: Path, partitions: int, file_bytes_max: int = 4 << 30, access: ServerAccess = OPEN
+    ) -> None:
         self._directory, self._port = directory, _free_port()
         self._process: subprocess.Popen[bytes] | None = None
+        self._scheme = "nats" if access.server.certificate is None else "tls"
         directory.mkdir(parents=True, exist_ok=True)
         self._configuration = directory / "nats.conf"
         self._configuration.write_text(
@@ -45,12 +52,13 @@ class LogServer:
                 port=self._port,
                 host="127.0.0.1",
                 file_bytes_max=file_bytes_max,
+                access=access,
             )
         )
 
     @property
     def url(self) -> str:
-        return f"nats://127.0.0.1:{self._port}"
+        return f"{self._scheme}://127.0.0.1:{self._port}"
 
     def start(self) -> None:
         """Start it and wait until it listens."""
@@ -74,6 +82,11 @@ class LogServer:
                     path=str(self._directory / "nats.log"),
                 )
             time.sleep(_STEP_S)
+
+    def reload(self) -> None:
+        """Let it read its configuration again."""
+        assert self._process is not None
+        self._process.send_signal(signal.SIGHUP)
 
     def kill(self) -> None:
         """End it at once, as a fault of its computer does; its store remains."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from livebode.fleet.server_access import OPEN, ServerAccess
 from livebode.fleet.subjects import EDGE, LEVELS, LOG
 
 PAYLOAD_BYTES_MAX = 8 << 20
@@ -12,7 +13,9 @@ PAYLOAD_BYTES_MAX = 8 << 20
 _MEMORY_BYTES = 64 << 20
 
 
-def server_configuration(store: Path, *, partitions: int, port: int, host: str, file_bytes_max: int) -> str:
+def server_configuration(
+    store: Path, *, partitions: int, port: int, host: str, file_bytes_max: int, access: ServerAccess = OPEN
+) -> str:
     """The text of nats-server's configuration.
 
     Parameters
@@ -25,6 +28,8 @@ def server_configuration(store: Path, *, partitions: int, port: int, host: str, 
         Where the server listens.
     file_bytes_max
         Most bytes of all streams. A full disk stops the server without a message, so this must be well below its size.
+    access
+        Who may do what. Default: everyone everything, for a server on the loopback.
     """
     places = ",".join(str(level + 1) for level in range(LEVELS))
     tokens = ".".join(f"{{{{wildcard({level + 1})}}}}" for level in range(LEVELS))
@@ -39,7 +44,7 @@ def server_configuration(store: Path, *, partitions: int, port: int, host: str, 
             f"  max_file_store: {file_bytes_max}",
             f"  max_memory_store: {_MEMORY_BYTES}",
             "}",
-            f"mappings = {{ {json.dumps(edge)}: {json.dumps(mapped)} }}",
+            *access.lines(f"mappings = {{ {json.dumps(edge)}: {json.dumps(mapped)} }}"),
             "",
         ]
     )

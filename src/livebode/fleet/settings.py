@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from glob import glob
+from ipaddress import ip_address
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, TypeVar
+from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.configuration.axes import ConfigurationFile
 from livebode.configuration.axis import Axis
+from livebode.configuration.section import File
 from livebode.configuration.toml_file import one_line, read_table
 from livebode.core import ConfigError
 from livebode.core.errors import FleetError
@@ -18,10 +21,14 @@ from livebode.fleet.subjects import axis_key
 
 PARTITIONS_MAX = 1024
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+PublicKey = Annotated[str, Field(pattern=r"^U[A-Z2-7]{55}$")]
 
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+AnySection = TypeVar("AnySection", bound=_Section)
 
 
 class LogSection(_Section):
@@ -30,7 +37,14 @@ class LogSection(_Section):
     Parameters
     ----------
     url
-        Address of nats-server; several of a cluster are joined by commas.
+        Address of nats-server; several of a cluster are joined by commas. Off the loopback it begins with tls://.
+    credentials
+        File with the secret key of this user, relative to this file; `livebode fleet credentials` writes it.
+    authority
+        Certificate of the authority that signed the server's certificate, in PEM, relative to this file. Default: the
+        authorities that this computer trusts.
+    access
+        "view" with the key of a viewer, which may read the status only.
     size_gb
         Most data of the machines in the log, in GB; the oldest are deleted then. It must be well below the disk.
     results_gb
@@ -42,10 +56,83 @@ class LogSection(_Section):
     """
 
     url: str = "nats://127.0.0.1:4222"
+    credentials: File | None = None
+    authority: File | None = None
+    access: Literal["full", "view"] = "full"
     size_gb: Positive = 50.0
     results_gb: Positive = 10.0
     age_days: Positive = 7.0
     replicas: Annotated[int, Field(ge=1, le=5)] = 1
+
+    @property
+    def encrypted(self) -> bool:
+        """Whether the connection uses TLS."""
+        return self.url.startswith("tls://")
+
+    def checked(self) -> None:
+        """ConfigError if the address is not one of nats-server, has a password, or is not encrypted on a network."""
+        for url in self.url.split(","):
+            parts = urlsplit(url)
+            if parts.username is not None:
+                raise ConfigError(
+                    "secret-in-url",
+                    "log.url contains a user or a password",
+                    "remove it, and set log.credentials to the file with the key",
+                    key="log.url",
+                )
+            if parts.scheme not in ("nats", "tls") or not parts.hostname:
+                raise ConfigError(
+                    "value-invalid",
+                    f"log.url = {url!r} is neither tls://HOST:PORT nor nats://HOST:PORT",
+                    "correct it",
+                    key="log.url",
+                    value=url,
+                )
+            if parts.scheme == "nats" and (self.encrypted or not on_loopback(parts.hostname)):
+                raise ConfigError(
+                    "log-open",
+                    f"the log at {url} is reached over a network without TLS",
+                    "write log.url as tls://HOST:PORT, and set log.credentials and log.authority",
+                    key="log.url",
+                    value=url,
+                )
+
+    def beside(self, folder: Path) -> LogSection:
+        """With files relative to a folder."""
+        return _beside(self, folder, "credentials", "authority")
+
+
+class ServerSection(_Section):
+    """[server]: what `livebode fleet server` writes into the configuration of nats-server.
+
+    Parameters
+    ----------
+    certificate
+        Certificate of the server in PEM, relative to this file. Required off the loopback.
+    key
+        Its private key in PEM, relative to this file.
+    """
+
+    certificate: File | None = None
+    key: File | None = None
+
+
+class UsersSection(_Section):
+    """[users]: public keys of those who may use the log. Without a key everyone on this computer may.
+
+    Parameters
+    ----------
+    fleet
+        Of workers and of commands that check or replay: everything.
+    view
+        Of viewers: the status.
+    edges
+        Of edges, by the path of their axes: "Graz" may send those of a site, "Graz/2/press 4/x" one axis.
+    """
+
+    fleet: list[PublicKey] = []
+    view: list[PublicKey] = []
+    edges: dict[str, list[PublicKey]] = {}
 
 
 class EdgeSection(_Section):
@@ -81,6 +168,8 @@ class FleetSettings(_Section):
     workers: Annotated[int, Field(ge=1, le=256)] = 2
     log: LogSection = LogSection()
     edge: EdgeSection = EdgeSection()
+    server: ServerSection = ServerSection()
+    users: UsersSection = UsersSection()
 
     @classmethod
     def read(cls, path: Path) -> FleetSettings:
@@ -97,14 +186,25 @@ class FleetSettings(_Section):
     def of(cls, data: dict[str, Any], origin: str) -> FleetSettings:
         """The settings in plain data; `origin` names it in messages."""
         try:
-            return cls.model_validate(data)
+            found = cls.model_validate(data)
+            found.log.checked()
         except ValidationError as error:
             raise _first_of(error).at(origin) from None
+        except ConfigError as error:
+            raise error.at(origin) from None
+        return found
 
     def beside(self, folder: Path) -> FleetSettings:
         """The same with relative paths from `folder`."""
         edge = self.edge.model_copy(update={"buffer": folder / self.edge.buffer})
-        return self.model_copy(update={"axes": [str(folder / pattern) for pattern in self.axes], "edge": edge})
+        return self.model_copy(
+            update={
+                "axes": [str(folder / pattern) for pattern in self.axes],
+                "edge": edge,
+                "log": self.log.beside(folder),
+                "server": _beside(self.server, folder, "certificate", "key"),
+            }
+        )
 
     def read_axes(self) -> dict[str, Axis]:
         """The axes by their key in the log.
@@ -136,6 +236,19 @@ def machine_key(axis: Axis, origin: str) -> str:
             key="machine",
         ).at(origin)
     return axis_key(axis.machine)
+
+
+def on_loopback(host: str) -> bool:
+    """Whether this name or address is this computer's own."""
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _beside(section: AnySection, folder: Path, *names: str) -> AnySection:
+    files = {name: getattr(section, name) for name in names}
+    return section.model_copy(update={name: folder / path for name, path in files.items() if path is not None})
 
 
 def _add(found: dict[str, Axis], axes: Mapping[str, Axis], path: str) -> None:

@@ -18,7 +18,12 @@ def server_command(
     port: Annotated[int, typer.Option(min=1, max=65535, help="Port at which the server listens.")] = 4222,
     as_json: Json = False,
 ) -> None:
-    """Print the configuration of nats-server for a fleet: store, limits, and the mapping of axes to partitions."""
+    """Print the configuration of nats-server for a fleet: store, limits, users, and the partitions of axes.
+
+    It has public keys and paths, no secrets. After a change of [users] or of the axes, write it again, and the server
+    reads it at `nats-server --signal reload`.
+    """
+    from livebode.fleet.server_access import server_access
     from livebode.fleet.server_config import server_configuration
     from livebode.fleet.settings import FleetSettings
     from livebode.records import to_json
@@ -26,6 +31,7 @@ def server_command(
     settings = FleetSettings.read(fleet)
     limit = round((settings.log.size_gb + settings.log.results_gb) * 1.1e9)
     text = server_configuration(
-        store.absolute(), partitions=settings.partitions, port=port, host=host, file_bytes_max=limit
-    )
+        store.absolute(), partitions=settings.partitions, port=port, host=host, file_bytes_max=limit,
+        access=server_access(settings, host),
+    )  # fmt: skip
     print(to_json({"configuration": text}) + "\n" if as_json else text, end="")

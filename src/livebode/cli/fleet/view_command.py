@@ -72,9 +72,11 @@ def _feed(fleet: Path | None, demo: int | None) -> StatusFeed:
 
         return DemoFeed(DemoFleet(demo or 1))
     from livebode.dashboard.fleet_feed import NatsFeed
+    from livebode.fleet.connecting import security
     from livebode.fleet.settings import FleetSettings
 
-    feed = NatsFeed(FleetSettings.read(fleet).log.url, fleet.stem)
+    log = FleetSettings.read(fleet).log
+    feed = NatsFeed(log.url, fleet.stem, **security(log))
     asyncio.run(_tried(feed))
     return feed
 

@@ -39,6 +39,7 @@ class ConfigError(LivebodeError):
         "key-unknown": "There is no such key.",
         "key-unused": "A key has no meaning for this kind of source.",
         "kind-needed": "A model needs the kind of a channel, which its unit does not show and no key declares.",
+        "log-open": "The log of a fleet is reached over a network without TLS.",
         "needs-even-samples": "A key needs samples at regular times, and the channels have clocks of their own.",
         "needs-samples": "A key needs samples, and the drive sends spectra.",
         "nested-too-deeply": "Values are nested deeper than any configuration has them.",

@@ -20,14 +20,19 @@ class FleetError(LivebodeError):
 
     area: ClassVar[str] = "fleet"
     codes: ClassVar[Mapping[str, str]] = {
+        "authority-unusable": "The certificate of the authority of the log cannot be used.",
         "axis-duplicated": "Two axes of the fleet have the same site, line, machine and axis.",
         "axis-unknown": "The fleet has no axis of this path.",
         "axis-unnamed": "An axis of the fleet has no [machine] section, so its place in the log is not defined.",
         "buffer-unusable": "The disk buffer of an edge cannot be read or written.",
+        "credentials-unusable": "A file with the key of a user of the log cannot be used, or can be by others.",
         "log-incomplete": "The log no longer has its beginning, so the results cannot be computed again.",
+        "log-refused": "The server of the log does not accept the key of the user.",
         "log-unreachable": "The server of the log cannot be reached, or rejects the connection.",
+        "log-untrusted": "The server of the log has no TLS, or a certificate that is not trusted.",
         "no-data": "The log has no data of this axis in the time that was asked for.",
         "not-exactly-once": "Stored responses are missing, doubled or different from one uninterrupted computation.",
         "server-ended": "The server of the log ended at its start.",
         "server-missing": "The program nats-server is not installed.",
+        "server-open": "The server of the log would be open to a network without TLS or keys.",
     }
