@@ -25,8 +25,8 @@ sys.dont_write_bytecode = False
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Of `-n auto`."""
-    return (os.cpu_count() or 1) + 1
+    """Of `-n auto`: more than cores, since many tests wait for servers, browsers and other processes."""
+    return (os.cpu_count() or 1) + 2
 
 
 def pytest_configure(config: pytest.Config) -> None:

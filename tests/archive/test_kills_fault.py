@@ -26,7 +26,7 @@ def test_kills_lose_nothing_and_double_nothing_and_bad_recordings_harm_no_other(
     archive = write_archive(tmp_path / "archive", 6 if SHORT else 40, workers=1 if SHORT else 2, memory_mb=350)
     bad = {path.name for path in write_damaged(archive.parent / "plant" / "machine-001")}
     wanted = stored(loop(archive, str(tmp_path / "loop")))
-    write_poison(archive.parent / "plant" / "machine-002" / POISON, 12_000_000)
+    write_poison(archive.parent / "plant" / "machine-002" / POISON, 40_000_000)
     rng, killed, round_ = np.random.default_rng(16), [], 0
     while len(killed) < KILLS and not (SHORT and round_):
         lake = archive.parent / f"lake-{round_}"
