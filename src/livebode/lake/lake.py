@@ -12,6 +12,8 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.dataset as ds
+from pyarrow.fs import LocalFileSystem, SubTreeFileSystem
 
 from livebode.core import ArchiveError
 from livebode.core.files import whole_file
@@ -66,7 +68,7 @@ class Lake:
             if table is None:
                 empty = TABLES[name].schema.empty_table()
                 return empty.select(columns) if columns else empty
-            return table.to_pyarrow_dataset().to_table(columns=columns, filter=where)
+            return self._dataset(name, table).to_table(columns=columns, filter=where)
 
     def quantities(self) -> pa.Table:
         """The quantities of the results that count, those with a row in `runs`."""
@@ -158,9 +160,18 @@ class Lake:
         version, found = self._known.get(name, (-1, set()))
         if version != table.version():
             key = list(TABLES[name].key)
-            found = set(_rows_of(table.to_pyarrow_dataset().to_table(columns=key), key))
+            found = set(_rows_of(self._dataset(name, table).to_table(columns=key), key))
             self._known[name] = (table.version(), found)
         return found
+
+    def _dataset(self, name: str, table: DeltaTable) -> ds.Dataset:
+        """The files of a table; those on this computer by Arrow's own file system.
+
+        deltalake's is written in Python: a thread of Arrow that closes a file while Python ends aborts the process.
+        """
+        place = self._place / name
+        own = SubTreeFileSystem(str(place), LocalFileSystem()) if isinstance(place, Path) else None
+        return table.to_pyarrow_dataset(filesystem=own)
 
     def opened(self, name: str) -> DeltaTable | None:
         """The table at its newest version; None if it does not exist."""
