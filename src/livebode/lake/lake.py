@@ -6,13 +6,14 @@ import hashlib
 import shutil
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.dataset as ds
+import pyarrow.parquet as pq
 from pyarrow.fs import LocalFileSystem, SubTreeFileSystem
 
 from livebode.core import ArchiveError
@@ -20,7 +21,7 @@ from livebode.core.files import whole_file
 from livebode.core.installing import not_installed
 from livebode.lake.data_file import DataFile, parquet_writer
 from livebode.lake.schemas import TABLES
-from livebode.locations import Location, delta_options, location, write_whole
+from livebode.locations import Location, delta_options, location, read_bytes, write_whole
 from livebode.locations.storage import make_parent, opened, reporting
 
 try:
@@ -31,6 +32,7 @@ except ImportError:
     raise not_installed("deltalake is not installed, and a lake needs it", "deltalake", "archive") from None
 
 Row = tuple[Any, ...]
+_DOWNLOADS = 8
 _ONCE = CommitProperties(max_commit_retries=0)
 
 
@@ -68,7 +70,7 @@ class Lake:
             if table is None:
                 empty = TABLES[name].schema.empty_table()
                 return empty.select(columns) if columns else empty
-            return self._dataset(name, table).to_table(columns=columns, filter=where)
+            return self._rows(name, table, columns, where)
 
     def quantities(self) -> pa.Table:
         """The quantities of the results that count, those with a row in `runs`."""
@@ -160,18 +162,29 @@ class Lake:
         version, found = self._known.get(name, (-1, set()))
         if version != table.version():
             key = list(TABLES[name].key)
-            found = set(_rows_of(self._dataset(name, table).to_table(columns=key), key))
+            found = set(_rows_of(self._rows(name, table, key), key))
             self._known[name] = (table.version(), found)
         return found
 
-    def _dataset(self, name: str, table: DeltaTable) -> ds.Dataset:
-        """The files of a table; those on this computer by Arrow's own file system.
+    def _rows(
+        self, name: str, table: DeltaTable, columns: Sequence[str] | None, where: pc.Expression | None = None
+    ) -> pa.Table:
+        """Rows of a table, read without deltalake's file system.
 
-        deltalake's is written in Python: a thread of Arrow that closes a file while Python ends aborts the process.
+        That one is written in Python: a thread of Arrow that closes a file while Python ends aborts the process.
         """
-        place = self._place / name
-        own = SubTreeFileSystem(str(place), LocalFileSystem()) if isinstance(place, Path) else None
-        return table.to_pyarrow_dataset(filesystem=own)
+        place, schema = self._place / name, TABLES[name].schema
+        if isinstance(place, Path):
+            own = SubTreeFileSystem(str(place), LocalFileSystem())
+            return table.to_pyarrow_dataset(filesystem=own).to_table(columns=columns, filter=where)
+
+        def part(uri: str) -> pa.Table:
+            source = pa.BufferReader(read_bytes(place / uri.rsplit("/", 1)[-1]))
+            return pq.read_table(source, columns=columns, filters=where, schema=schema)
+
+        with ThreadPoolExecutor(_DOWNLOADS) as pool:
+            empty = schema.empty_table()
+            return pa.concat_tables([empty.select(columns) if columns else empty, *pool.map(part, table.file_uris())])
 
     def opened(self, name: str) -> DeltaTable | None:
         """The table at its newest version; None if it does not exist."""
