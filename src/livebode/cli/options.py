@@ -56,6 +56,14 @@ Port = Annotated[
     int | None,
     typer.Option(metavar="PORT", min=0, max=65535, help="Port of the dashboard; 0: any free port. \\[default: 8765]"),
 ]
+ServeFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--axis",
+        metavar="AXIS.toml",
+        help="Read \\[serve] from this file, which may have nothing else: address, tokens, TLS.",
+    ),
+]
 Serve = Annotated[bool, typer.Option("--serve", help="Show the run in a browser while it is recorded.")]
 
 

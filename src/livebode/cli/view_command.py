@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.cli.options import Port
+from livebode.cli.options import Port, ServeFile
 from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
 from livebode.configuration.axis import ServeSection, serve_section
 from livebode.locations import location
@@ -23,13 +23,7 @@ def view_command(
         ),
     ],
     port: Port = None,
-    axis: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="AXIS.toml",
-            help="Read \\[serve] from this file, which may have nothing else: address, tokens, TLS.",
-        ),
-    ] = None,
+    axis: ServeFile = None,
 ) -> None:
     """Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still recording.
 

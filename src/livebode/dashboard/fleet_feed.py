@@ -90,7 +90,7 @@ class NatsFeed:
                 reconnected_cb=self._back,
                 **self._options,
             )
-            # Without a limit of its own it would try for ever, as it does after the connection is lost.
+            # Without a limit of its own it would try permanently, as it does after the connection is lost.
             await asyncio.wait_for(connecting, _CONNECT_S)
             self._connection = connection
         except (TimeoutError, OSError, nats.errors.Error) as error:

@@ -143,7 +143,7 @@ class PartitionOwner:
         return await self._log.following(LOG_STREAM, subject, stream.position + 1)
 
     async def _begin_again(self, subject: str, error: StateError) -> int | None:
-        """An axis whose state cannot be restored begins a new run after what is stored, and a person is told why."""
+        """An axis whose state cannot be restored begins a new run after what is stored, with an event that says why."""
         first = await self._log.following(LOG_STREAM, subject, self._through + 1)
         key = key_of(subject)
         if first is not None:

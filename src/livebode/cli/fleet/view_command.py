@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.options import Port
+from livebode.cli.options import Port, ServeFile
 from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
 from livebode.configuration.axis import ServeSection, serve_section
 from livebode.core import UsageError
@@ -35,13 +35,7 @@ def view_command(
         str, typer.Option(metavar="URL", help="Page of trends, such as that of `livebode view`; each axis links to it.")
     ] = "",
     port: Port = None,
-    axis: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="AXIS.toml",
-            help="Read \\[serve] from this file, which may have nothing else: address, tokens, TLS.",
-        ),
-    ] = None,
+    axis: ServeFile = None,
 ) -> None:
     """Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.
 

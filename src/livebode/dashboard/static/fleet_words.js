@@ -1,5 +1,5 @@
 // @ts-check
-// How an axis of a fleet looks, and what is said of it in words. The numbers of the looks are those of fleet_board.py.
+// How an axis of a fleet looks, and the words for it. The numbers of the looks are those of fleet_board.py.
 import { hourMinute } from "./clock.js";
 import { tr } from "./language.js";
 import { recognised } from "./recognition.js";
