@@ -16,6 +16,7 @@ from livebode import export
 from livebode.core import LivebodeError, Responses, ServerError
 from livebode.dashboard import queries
 from livebode.dashboard.access import COOKIE, SESSION_S
+from livebode.dashboard.admission import serve_browser
 from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
 from livebode.dashboard.client import Client
@@ -24,7 +25,6 @@ from livebode.dashboard.fleet_view import FleetView
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
 from livebode.dashboard.past import Past
-from livebode.dashboard.places import ClientPlace
 from livebode.dashboard.runs_pages import RunsPages
 from livebode.dashboard.saved import applied, listed
 from livebode.dashboard.settings import Serving
@@ -225,25 +225,7 @@ class _Pages:
         return data
 
     async def live(self, socket: WebSocket) -> None:
-        headers = socket.headers
-        address = socket.client.host if socket.client else ""
-        try:
-            role = self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
-        except ServerError:
-            role = None
-        if role is None:
-            await socket.close(1008)
-            return
-        client = Client(self._board, socket, role)
-        place = ClientPlace(role, address, client.displace)
-        if not self._board.places.take(place):
-            await socket.close(1013)
-            return
-        self._board.pulse_now()
-        try:
-            await client.run()
-        finally:
-            self._board.places.leave(place)
+        await serve_browser(self._board, socket, lambda role: Client(self._board, socket, role))
 
     def file(self, name: str) -> Response:
         """A static file."""

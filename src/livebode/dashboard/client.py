@@ -37,6 +37,11 @@ class Client(BrowserSocket):
         self._references: dict[int, Responses] = {}
         self._sent: dict[str, Any] = {}
 
+    async def run(self) -> None:
+        """Serve until the browser disconnects or exceeds a limit."""
+        self._board.pulse_now()
+        await super().run()
+
     async def heed(self, text: str) -> None:
         """Do what a message of the browser asks for."""
         await self._heed(client_message(text, len(self._board.states)))

@@ -53,6 +53,14 @@ class FleetClient(BrowserSocket):
         self._sent: dict[str, Any] = {}
         self._due_s = 0.0
 
+    async def run(self) -> None:
+        """Serve until the browser disconnects or exceeds a limit."""
+        self._view.browsers += 1
+        try:
+            await super().run()
+        finally:
+            self._view.browsers -= 1
+
     async def heed(self, text: str) -> None:
         """Show another list or axis."""
         self._watched, self._due_s = watched(text), 0.0

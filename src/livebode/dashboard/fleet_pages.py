@@ -12,11 +12,11 @@ from starlette.websockets import WebSocket
 
 from livebode.core import ServerError
 from livebode.dashboard.access import Role
+from livebode.dashboard.admission import serve_browser
 from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
 from livebode.dashboard.fleet_client import FleetClient
 from livebode.dashboard.fleet_view import FleetView
-from livebode.dashboard.places import ClientPlace
 
 Order = Callable[[Request], Awaitable[bytes | Response]]
 
@@ -84,25 +84,7 @@ class FleetPages:
         return await self._act(request, "unshelve")
 
     async def live(self, socket: WebSocket) -> None:
-        headers, address = socket.headers, socket.client.host if socket.client else ""
-        try:
-            role = self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
-        except ServerError:
-            role = None
-        if role is None:
-            await socket.close(1008)
-            return
-        client = FleetClient(self._view, socket, role)
-        place = ClientPlace(role, address, client.displace)
-        if not self._board.places.take(place):
-            await socket.close(1013)
-            return
-        self._view.browsers += 1
-        try:
-            await client.run()
-        finally:
-            self._view.browsers -= 1
-            self._board.places.leave(place)
+        await serve_browser(self._board, socket, lambda role: FleetClient(self._view, socket, role))
 
     async def _act(self, request: Request, act: Act) -> Response:
         data = await self._order(request)
