@@ -41,7 +41,7 @@ def run(*command: object) -> str:
 def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86) -> list[Path]:
     """All objects of the kernel."""
     switch = ["-DLB_DISPATCH"] if dispatch else []
-    jobs = [(name, name, []) for name in ("twiddle", "machine")]
+    jobs = [(name, name, []) for name in ("twiddle", "machine", "moments", "lines")]
     for bits in (32, 64):
         jobs += [(name, f"{name}{bits}", [f"-DLB_BITS={bits}"]) for name in TYPED]
         for name, isa in SETS.items() if dispatch else ():
