@@ -199,6 +199,6 @@ def test_added_windows_have_the_bits_of_the_twin(case):
 def test_arrays_of_another_shape_or_type_are_refused_and_nothing_changes(wrong):
     case = Case(2, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, (3,), 0)
     moments, windows = case.moments(), Numbers(case).windows(3, 0, 0.0)
-    with pytest.raises(ValueError, match="array|few|refused|contiguous"):
+    with pytest.raises(ValueError, match=r"array|few|refused|contiguous"):
         _lines.process_lines(case.settings, moments, windows._replace(**wrong))
     assert_same_bits(moments, case.moments())
