@@ -67,6 +67,7 @@ class LineStage(StatefulBase):
         self._places = max(1, lines.window // settings.step)
         self._moments = PeriodMoments(self._places, len(lines), settings.forgetting)
         self._kernel_settings = self._for_kernel()
+        self._unit: tuple[Sequence[Channel], str] = ((), "")  # of the newest channels
         self._converts = settings.method.through_loop or settings.quantity != "plant"
         self._movement = Movement(self._places)
         self._periodicity = None
@@ -163,9 +164,12 @@ class LineStage(StatefulBase):
             Windows that do not enter the moments of later ones, (rows,); None for none.
         """
         with np.errstate(all="ignore"):  # an incomplete window has no defined value, so it becomes NaN
-            return self._responses(
-                rows, place, centre, response_unit(channels, self._settings), repeating, ripple, aside
-            )
+            return self._responses(rows, place, centre, self._unit_of(channels), repeating, ripple, aside)
+
+    def _unit_of(self, channels: Sequence[Channel]) -> str:
+        if self._unit[0] != channels:
+            self._unit = channels, response_unit(channels, self._settings)
+        return self._unit[1]
 
     def _responses(
         self,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, log
@@ -129,7 +128,8 @@ class PeriodMoments(StatefulBase):
 
     def copy(self) -> PeriodMoments:
         """The same moments, which are updated on their own."""
-        other = copy(self)
+        other = PeriodMoments.__new__(PeriodMoments)  # copy.copy takes as long as a block's moments
+        other.weights = self.weights
         other._count, other._means = self._count.copy(), self._means.copy()
         other._scatter, other._moment = self._scatter.copy(), self._moment.copy()
         return other

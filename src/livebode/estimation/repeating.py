@@ -196,7 +196,7 @@ class RepeatingErrors(PeriodCutter):
         return list(accumulate(range(len(ends)), lambda now, number: changed.get(number, now), initial=begun))[1:]
 
     def _spectra(self, periods: Periods, use: NDArray[np.int64], start: int) -> _Spectra:
-        signals = periods.signals[:, use]
+        signals = periods.signals if use.size == len(periods.complete) else periods.signals[:, use]
         every = np.fft.rfft(signals)
         three = self._judge.spectra(every)[self._three]
         return _Spectra(every, three, signals[0], use, start + periods.stop[use] - 1)
