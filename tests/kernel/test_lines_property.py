@@ -129,7 +129,7 @@ def assert_same_bits(one: tuple, other: tuple) -> None:
         assert (both[0] == both[1]).all(), name
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(cases)
 def test_rows_and_moments_have_the_bits_of_the_twin(case):
     numbers, moments, of_twin, place, largest = Numbers(case), case.moments(), case.moments(), 0, 0.0
@@ -143,7 +143,7 @@ def test_rows_and_moments_have_the_bits_of_the_twin(case):
         place = (place + rows) % case.places
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(cases)
 def test_any_division_of_the_windows_gives_the_same_bits(case):
     whole, parts = case.moments(), case.moments()
@@ -166,7 +166,7 @@ def test_any_division_of_the_windows_gives_the_same_bits(case):
     assert_same_bits(whole, parts)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(cases)
 def test_added_windows_have_the_bits_of_the_twin(case):
     numbers, moments, of_twin, place = Numbers(case), case.moments(), case.moments(), 0

@@ -2,7 +2,7 @@
 #ifndef LB_MOMENTS_H
 #define LB_MOMENTS_H
 
-#include "lb_assert.h"
+#include "../lb_assert.h"
 #include "livebode/lines.h"
 
 /* Lines of a row that are processed together: what is known of them stays in the first-level cache. */
