@@ -217,7 +217,7 @@ class PartitionOwner:
         return f"{STATES}.{self._number}.{key}"
 
     async def _publish_status(self, waiting: int) -> None:
-        lag_s = max(0.0, time.time() - self._newest_s) if waiting else 0.0
+        lag_s = max(0.0, time.time() - (self._newest_s or self._since_s)) if waiting else 0.0
         for subject, message in self._page.messages(self._streams, time.time(), waiting, lag_s):
             await self._log.publish(subject, message)
         about = {
