@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import random
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -16,6 +15,7 @@ from typing import Any
 
 import psutil
 
+from livebode.core.errors import FleetError
 from livebode.fleet.check import CheckResult, check_results
 from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
@@ -44,6 +44,13 @@ class FaultyMachines(SimulatedMachines):
     swapped = 0
     """Pairs of messages that are still to be swapped."""
     _late: int | None = None
+
+    def _send(self) -> None:
+        while True:
+            try:
+                return super()._send()
+            except FleetError:  # the log did not answer in time; a service manager would start it again
+                time.sleep(_STEP_S)
 
     def _take_batches(self, number: int) -> None:
         if self._late is not None:
@@ -85,7 +92,7 @@ class FaultyFleet:
     def __exit__(self, *_: object) -> None:
         self._running.close()
         self._process.send_signal(signal.SIGINT)
-        with contextlib.suppress(subprocess.TimeoutExpired):
+        with contextlib.suppress(psutil.TimeoutExpired):
             self._process.wait(10)
         for process in [*self._children(), self._process, *self._workers]:
             with contextlib.suppress(psutil.Error):
@@ -120,7 +127,13 @@ class FaultyFleet:
             async with FleetLog(self._settings.log, "faults") as log:
                 return await question(log)
 
-        return asyncio.run(ask())
+        until = time.monotonic() + _RECOVERY_S_MAX
+        while True:
+            try:
+                return asyncio.run(ask())
+            except FleetError:
+                if time.monotonic() > until:
+                    raise
 
     def recovered(self) -> None:
         """Wait until each partition has stored the results of messages that were sent after now, twice in succession.

@@ -140,7 +140,7 @@ def alone_round(axes: int, seed: int) -> RoundResult:
     rng = random.Random(f"{seed}: alone")
     kinds = [kind for kind in TARGETS_S for _ in range(ALONE)]
     rng.shuffle(kinds)
-    return _round(0, [(kind,) for kind in kinds], axes, rng)
+    return fault_round(0, [(kind,) for kind in kinds], axes, rng)
 
 
 def overlapping_round(number: int, faults: int, kinds: Sequence[str], axes: int, seed: int) -> RoundResult:
@@ -154,10 +154,11 @@ def overlapping_round(number: int, faults: int, kinds: Sequence[str], axes: int,
         size = rng.randint(1, GROUP_MAX)
         groups.append(tuple(chosen[:size]))
         chosen = chosen[size:]
-    return _round(number, groups, axes, rng)
+    return fault_round(number, groups, axes, rng)
 
 
-def _round(number: int, groups: Sequence[Sequence[str]], axes: int, rng: random.Random) -> RoundResult:
+def fault_round(number: int, groups: Sequence[Sequence[str]], axes: int, rng: random.Random) -> RoundResult:
+    """A fleet, groups of faults, and the check; in round 0 the time without a result is measured."""
     folder, began_s = Path(tempfile.mkdtemp(prefix="fleet-faults-")), time.monotonic()
     kinds = Counter(kind for group in groups for kind in group)
     meetings: Counter[str] = Counter()

@@ -9,12 +9,15 @@ from urllib.parse import quote
 
 from livebode.core.errors import FleetError
 from livebode.fleet.page_status import NAMES, VIEW
-from livebode.fleet.settings import FleetSettings, LogSection, ServerSection, UsersSection, on_loopback
+from livebode.fleet.settings import FleetSettings, ServerSection, UsersSection, on_loopback
 from livebode.fleet.subjects import EDGE, VIEW_API, axis_path
+from livebode.sources.live.framing import FRAME_BYTES_MAX
 
 _FLEET, _VIEW = "FLEET", "VIEW"
 _JETSTREAM = "$JS.API"
 _CONNECTIONS_MORE, _SUBSCRIPTIONS = 4, 4
+_MESSAGE_BYTES_MAX = 2 * FRAME_BYTES_MAX
+"""Of an edge: a frame with the names of the channels, and one of samples."""
 _VIEWED = ("STREAM.INFO.*", "STREAM.MSG.GET.*")
 """Requests of a viewer. A consumer is not one of them: it could deliver to any subject of the log's account."""
 
@@ -31,14 +34,11 @@ class ServerAccess:
     ----------
     axes
         Keys of the axes of the fleet.
-    message_bytes_max
-        Size of the largest message of an edge.
     """
 
     server: ServerSection
     users: UsersSection
     axes: Sequence[str]
-    message_bytes_max: int = LogSection().message_bytes_max
 
     def lines(self, mappings: str) -> list[str]:
         """Lines of the configuration of nats-server; `mappings` belong to the account of the log."""
@@ -74,7 +74,7 @@ class ServerAccess:
         limits = {
             "max_connections": connections,
             "max_subscriptions": connections * _SUBSCRIPTIONS,
-            "max_payload": self.message_bytes_max,
+            "max_payload": _MESSAGE_BYTES_MAX,
         }
         return "    limits { " + ", ".join(f"{name}: {value}" for name, value in limits.items()) + " }"
 
@@ -111,8 +111,7 @@ def server_access(settings: FleetSettings, host: str) -> ServerAccess:
             "set server.certificate, server.key and users.fleet; `livebode fleet credentials` makes keys",
             host=host,
         )
-    axes = list(settings.read_axes()) if settings.users.edges else []
-    return ServerAccess(settings.server, settings.users, axes, settings.log.message_bytes_max)
+    return ServerAccess(settings.server, settings.users, list(settings.read_axes()) if settings.users.edges else [])
 
 
 def _account(path: str) -> str:

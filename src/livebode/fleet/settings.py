@@ -56,8 +56,6 @@ class LogSection(_Section):
     axis_messages
         Most messages of one axis in the log; its own oldest are deleted then, so that one edge cannot displace the data
         of the others. Default: ten per second for a week.
-    message_kb
-        Size of the largest message of an edge, in kB. A larger one is dropped.
     """
 
     url: str = "nats://127.0.0.1:4222"
@@ -69,17 +67,11 @@ class LogSection(_Section):
     age_days: Positive = 7.0
     replicas: Annotated[int, Field(ge=1, le=5)] = 1
     axis_messages: Annotated[int, Field(ge=1)] = 6_048_000
-    message_kb: Annotated[float, Field(gt=0, le=8192)] = 1024.0
 
     @property
     def encrypted(self) -> bool:
         """Whether the connection uses TLS."""
         return self.url.startswith("tls://")
-
-    @property
-    def message_bytes_max(self) -> int:
-        """Size of the largest message of an edge."""
-        return round(self.message_kb * 1e3)
 
     def checked(self) -> None:
         """ConfigError if the address is not one of nats-server, has a password, or is not encrypted on a network."""
