@@ -229,7 +229,9 @@ class FaultyFleet:
             self._process.wait()
             self._start()
         # They end when they notice it, and may store results until then; a frozen one when it continues.
-        psutil.wait_procs([worker for worker in workers if worker not in self._frozen], timeout=_WORKER_S_MAX)
+        until = time.monotonic() + _WORKER_S_MAX
+        while any(map(_alive, set(workers) - self._frozen)) and time.monotonic() < until:
+            time.sleep(_STEP_S)
 
     def _repeats(self) -> None:
         """Send messages again that the log has, without their identity: as later than it remembers them."""
@@ -254,3 +256,11 @@ class FaultyFleet:
             while self._machines.dropped == dropped:
                 time.sleep(BLOCK_S)
             self._server.start()
+
+
+def _alive(process: psutil.Process) -> bool:
+    """Whether it runs; one that has ended and that nobody waits for does not."""
+    try:
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False

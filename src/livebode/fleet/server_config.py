@@ -55,6 +55,7 @@ def server_configuration(
             f"  max_memory_store: {_MEMORY_BYTES}",
             "}",
             *(member.lines(host) if member else []),
+            *access.leaf_lines(host),
             *access.lines(f"mappings = {{ {json.dumps(edge)}: {json.dumps(mapped)} }}"),
             "",
         ]
