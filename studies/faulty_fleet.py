@@ -23,7 +23,7 @@ from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import FleetSettings
 from livebode.fleet.simulated import BLOCK_S, RATE_HZ, SimulatedMachines, write_simulated_fleet
-from livebode.fleet.status import fleet_status
+from livebode.fleet.status import fleet_status, status_of
 from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS, key_of
 
 PARTITIONS, WORKERS = 4, 2
@@ -150,6 +150,23 @@ class FaultyFleet:
                     raise TimeoutError(f"a partition is behind for {_RECOVERY_S_MAX:g} s")
                 time.sleep(_STEP_S)
 
+    def settled(self) -> None:
+        """Wait until all workers own partitions, so that the next fault happens alone."""
+        until = time.monotonic() + _RECOVERY_S_MAX
+        while len(self._owners()) < WORKERS:
+            if time.monotonic() > until:
+                raise TimeoutError(f"a worker owns nothing for {_RECOVERY_S_MAX:g} s")
+            time.sleep(_STEP_S)
+        self.recovered()
+
+    def _owners(self) -> set[str]:
+        async def owners(log: FleetLog) -> set[str]:
+            found = [await status_of(log, number) for number in range(PARTITIONS)]
+            return {about["owner"] for about in found if about is not None}
+
+        found: set[str] = self.asked(owners)
+        return {owner for owner in found if psutil.pid_exists(int(owner.rpartition(":")[2]))}
+
     def _sent(self) -> dict[int, int]:
         """Number of the newest message of each partition in the log."""
 
@@ -185,10 +202,12 @@ class FaultyFleet:
 
     def _children(self) -> list[psutil.Process]:
         """Workers of the coordinator that are alive."""
-        try:
-            found = [child for child in self._process.children() if _WORKER in " ".join(child.cmdline())]
-        except psutil.Error:
-            return []
+        found = []
+        with contextlib.suppress(psutil.NoSuchProcess):
+            for child in self._process.children():
+                with contextlib.suppress(psutil.NoSuchProcess):  # it has just ended
+                    if _WORKER in " ".join(child.cmdline()):
+                        found.append(child)
         self._workers.update(found)
         return found
 

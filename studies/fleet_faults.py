@@ -202,6 +202,7 @@ def _happen(fleet: FaultyFleet, kinds: Sequence[str], rng: random.Random) -> Cou
 
 
 def _silence_s(fleet: FaultyFleet, kind: str) -> float:
+    fleet.settled()
     began_s = time.time()
     fleet.fault(kind)
     fleet.recovered()
