@@ -78,7 +78,7 @@ def test_copies_need_servers_a_member_a_number_and_a_network_certificates() -> N
         cluster_member(_settings(log={"replicas": 3}), None)
     several = _settings(log={"replicas": 3}, server={"cluster": loopback})
     for number in (None, 4):
-        with pytest.raises(FleetError, match="give its number there, 1 to 3, with --member"):
+        with pytest.raises(FleetError, match="give its number there, member = 1 to 3"):
             cluster_member(several, number)
     with pytest.raises(FleetError, match=r"could join it; set server\.certificate"):
         cluster_member(_settings(server={"cluster": ["log1.plant:6222", *loopback[1:]]}), 1)

@@ -57,7 +57,7 @@ def cluster_member(settings: FleetSettings, number: int | None) -> ClusterMember
         raise FleetError(
             "member-unknown",
             f"server.cluster has {len(server.cluster)} servers, and it is not known which of them this one is",
-            f"give its number there, 1 to {len(server.cluster)}, with --member",
+            f"give its number there, member = 1 to {len(server.cluster)}",
             servers=len(server.cluster),
         )
     complete = server.certificate and server.key and server.authority
