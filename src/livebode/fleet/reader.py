@@ -106,10 +106,9 @@ async def stored_messages(
     log: FleetLog, stream: str, subject: str, through: int, first: int = 1
 ) -> AsyncIterator[StoredMessage]:
     """The messages of a subject from number `first` to `through`, which are in the stream already."""
-    last = await log.last(stream, subject)
     reader = Reader(log, stream, subject, first)
     try:
-        while last is not None and reader.next <= min(through, last.number):
+        while reader.pending and reader.next <= through:
             for message in await reader.read(_READ_S):
                 if message.number <= through:
                     yield message

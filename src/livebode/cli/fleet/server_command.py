@@ -23,7 +23,7 @@ def server_command(
 ) -> None:
     """Print the configuration of nats-server for a fleet: store, limits, users, and the partitions of axes.
 
-    It has public keys and paths, no secrets. After a change of [users] or of the axes, write it again, and the server
+    It has public keys and paths, no secrets. After a change of users or axes, write it again, and the server
     reads it at `nats-server --signal reload`.
     """
     from livebode.fleet.partition_count import check_store
