@@ -18,6 +18,7 @@ import psutil
 from livebode.core.errors import FleetError
 from livebode.fleet.check import CheckResult, check_results
 from livebode.fleet.log import FleetLog
+from livebode.fleet.message import read_message
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
@@ -31,9 +32,11 @@ _BUFFER_BYTES = 100_000
 _REPEATED = 100
 """Messages of the log that are sent again."""
 _SWAPPED = 5
+LATE_MAX = round(_SWAPPED * BLOCK_S * RATE_HZ)
+"""Samples of an axis that a reordering can make late: after a gap a message is not waited for any more."""
 _FROZEN_S = (1.0, 9.0)
 _BROKER_S = 0.3
-_STEP_S, _RECOVERY_S_MAX, _WORKER_S_MAX = 0.2, 180.0, 60.0
+_STEP_S, _RECOVERY_S_MAX, _WORKER_S_MAX = 0.2, 600.0, 120.0
 _COMMAND = "from livebode.cli import main; main()"
 _WORKER = "spawn_main"
 
@@ -101,13 +104,11 @@ class FaultyFleet:
         self._server.__exit__()
         self._output.close()
 
-    @property
-    def dropped(self) -> int:
-        """Samples that the buffers have dropped."""
-        return round(self._machines.dropped * BLOCK_S * RATE_HZ)
+    def finished(self) -> tuple[CheckResult, int, int]:
+        """Stop the machines; when everything is processed, the check, and the samples that were dropped and are lost.
 
-    def finished(self) -> tuple[CheckResult, int]:
-        """Stop the machines; when everything is processed, the check, and the samples that are reported as lost."""
+        Samples that were dropped before the log had the first ones of their axis are not counted: nobody misses them.
+        """
         self._running.close()
         while True:
             self._restart_if_ended()
@@ -118,7 +119,8 @@ class FaultyFleet:
         time.sleep(2.0)  # the last messages give no response, but the owners report what they know
         status = self.asked(lambda log: fleet_status(log, self._axes))
         lost = sum(axis["lost"] for axis in status["axes"])
-        return self.asked(lambda log: check_results(log, self._axes)), lost
+        dropped = round(self._machines.dropped * BLOCK_S * RATE_HZ) - self.asked(_before_the_log)
+        return self.asked(lambda log: check_results(log, self._axes)), dropped, lost
 
     def asked(self, question: Callable[[FleetLog], Any]) -> Any:
         """The answer of the log to a question."""
@@ -279,6 +281,17 @@ class FaultyFleet:
             while self._machines.dropped == dropped:
                 time.sleep(BLOCK_S)
             self._server.start()
+
+
+async def _before_the_log(log: FleetLog) -> int:
+    """Samples before the first ones that the log has, of all axes."""
+    first = 0
+    for subject in (await log.extent(LOG_STREAM, f"{LOG}.>")).subjects:
+        number = await log.following(LOG_STREAM, subject, 1)
+        assert number is not None
+        async for message in stored_messages(log, LOG_STREAM, subject, number, number):
+            first += read_message(message.data, message.stored_s).first_sample
+    return first
 
 
 def _alive(process: psutil.Process) -> bool:

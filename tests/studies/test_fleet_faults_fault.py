@@ -31,7 +31,7 @@ def _recorded(path: Path, rounds: list[RoundResult]) -> None:
 def test_recorded_rounds_are_not_repeated_and_count(tmp_path: Path) -> None:
     record = tmp_path / "faults.json"
     whole = {"responses": 900, "missing": 0, "doubled": 0, "different": 0, "unexpected": 0, "other_recipe": 0}
-    _recorded(record, [RoundResult(1, {"kill": ROUND}, check=whole, takeovers=80)])
+    _recorded(record, [RoundResult(1, 2, {"kill": ROUND}, check=whole, takeovers=80)])
     (found,) = campaign(ROUND, axes=2, kinds=["kill"], seed=1, at_once=1, alone=False, record=record)
     assert found.exact
     assert (found.faults, found.sum("takeovers"), found.total.responses) == (ROUND, 80, 900)
@@ -41,6 +41,6 @@ def test_recorded_rounds_are_not_repeated_and_count(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("wrong", [{"check": {"doubled": 1}}, {"dropped": 5}, {"failure": "a partition is behind"}])
 def test_a_doubled_response_an_uncounted_loss_or_a_round_without_an_end_is_not_exact(wrong: dict[str, object]) -> None:
-    good = RoundResult(1, {"kill": 2})
+    good = RoundResult(1, 2, {"kill": 2})
     assert Campaign([good]).exact
     assert not Campaign([good, RoundResult(**asdict(good) | wrong)]).exact
