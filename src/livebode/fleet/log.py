@@ -166,9 +166,9 @@ class FleetLog:
         This is the fence: of two processes that both own a partition, one is refused. A write whose outcome is not
         known, because the server did not answer, is looked up, and repeated only if it did not arrive.
 
-        Servers in a cluster compare `after` before they agree on the order of two writes, so both can pass (nats-server
-        issue 4320). Therefore `after` is the identity of the write too: of two with the same one, which are compared
-        when they are stored, the second is dropped as a repeat.
+        Servers in a cluster compare `after` before they agree on the order of two writes, so both can pass
+        (https://github.com/nats-io/nats-server/issues/4320). Therefore `after` is the identity of the write too: of two
+        with the same one, which are compared when they are stored, the second is dropped as a repeat.
 
         Raises
         ------
