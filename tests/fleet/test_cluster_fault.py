@@ -34,7 +34,7 @@ def test_the_loss_of_the_server_that_leads_costs_no_message_and_no_response(clus
         lost = cluster.leader(stream)
         lost.kill()
         sent(cluster.log, axes, 20, 20 * part)
-        owned_until_current(cluster.log, axes)
+        owned_until_current(cluster.log, axes, responses=3 * 20 * (part + 1) * 2)
         lost.start()
     result = checked(cluster.log, axes)
     assert result.exact
