@@ -14,7 +14,8 @@ import numpy as np
 import psutil
 
 PROGRAM = str(Path(sys.executable).with_name("livebode"))
-_LOOK_S, _LONGEST_S = 0.02, 300.0
+_LOOK_S, _LONGEST_S = 0.02, 180.0
+_WITHOUT_WORKERS = "has had no worker"
 
 
 def start(archive: Path) -> subprocess.Popen[str]:
@@ -36,30 +37,50 @@ def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
 def run_with_kills(archive: Path, lake: Path, kills: Sequence[str], rng: np.random.Generator) -> tuple[Any, list[str]]:
     """Run an archive to its end while a "worker" or the "coordinator" is killed; its last result, and what was killed.
 
-    A kill is at a random moment after one more result was written, or before the first.
+    A kill is at a random moment after one more result was written, or before the first. A run that has lost all workers
+    is started again: what starts a worker gives up if that is killed while it starts.
     """
     done: list[str] = []
     process = start(archive)
     for victim in kills:
-        wanted = len(list((lake / "responses").glob("*.parquet"))) + int(rng.integers(0, 3))
-        limit_s = time.monotonic() + _LONGEST_S
-        while process.poll() is None and len(list((lake / "responses").glob("*.parquet"))) < wanted:
-            assert time.monotonic() < limit_s
-            time.sleep(_LOOK_S)
+        if not _wrote(process, lake, int(rng.integers(0, 3))):
+            process = _restarted(process, archive)
         time.sleep(rng.uniform(0, 0.5))
         if process.poll() is not None:
             break
         if victim == "coordinator":
-            process.kill()
-            process.communicate()
-            process = start(archive)
+            process = _restarted(process, archive)
             done.append(victim)
         elif workers := workers_of(process):
             kill(workers[rng.integers(len(workers))])
             done.append(victim)
-    out, err = process.communicate(timeout=_LONGEST_S)
-    assert process.returncode == 0, err
-    return json.loads(out.splitlines()[-1]), done
+    while True:
+        try:
+            out, err = process.communicate(timeout=_LONGEST_S)
+        except subprocess.TimeoutExpired:
+            process = _restarted(process, archive)
+            continue
+        if process.returncode == 0:
+            return json.loads(out.splitlines()[-1]), done
+        assert _WITHOUT_WORKERS in err, err
+        process = start(archive)
+
+
+def _wrote(process: subprocess.Popen[str], lake: Path, more: int) -> bool:
+    """Wait for more results, or the end; whether one of them came."""
+    wanted = len(list((lake / "responses").glob("*.parquet"))) + more
+    limit_s = time.monotonic() + _LONGEST_S
+    while process.poll() is None and len(list((lake / "responses").glob("*.parquet"))) < wanted:
+        if time.monotonic() > limit_s:
+            return False
+        time.sleep(_LOOK_S)
+    return True
+
+
+def _restarted(process: subprocess.Popen[str], archive: Path) -> subprocess.Popen[str]:
+    process.kill()
+    process.communicate()
+    return start(archive)
 
 
 def kill(process: psutil.Process) -> None:

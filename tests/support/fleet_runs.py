@@ -111,13 +111,18 @@ def _own(settings: LogSection, axes: Mapping[str, Axis], kind: type[PartitionOwn
     own_partitions(settings, axes, range(PARTITIONS), threading.Event(), kind)
 
 
-def owned_until_current(settings: LogSection, axes: Mapping[str, Axis]) -> None:
-    """Own all partitions in a thread until everything in the log is processed, and stop in order."""
+def owned_until_current(settings: LogSection, axes: Mapping[str, Axis], responses: int = 0) -> None:
+    """Own all partitions in a thread until everything in the log is processed, and stop in order.
+
+    In a cluster a server that has just started may not know of everything yet: `responses` must be stored too.
+    """
     stop = threading.Event()
     thread = threading.Thread(target=own_partitions, args=(settings, axes, range(PARTITIONS), stop))
     thread.start()
     try:
         asyncio.run(_until_current(settings))
+        while responses and stored_responses(settings) < responses:
+            time.sleep(0.1)
     finally:
         stop.set()
         thread.join()

@@ -1,4 +1,4 @@
-"""A server of a log with TLS and keys: two edges, the workers and a viewer, each with a key of its own."""
+"""A server of a log with TLS and keys: two edges, the workers and a viewer, each with a key of its own, a leaf node."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ import trustme
 
 from livebode.configuration.axis import Axis
 from livebode.fleet.credentials import write_credentials
-from livebode.fleet.server import LogServer
+from livebode.fleet.server import LogServer, free_port
 from livebode.fleet.server_access import ServerAccess
 from livebode.fleet.settings import LogSection, ServerSection, UsersSection
 from livebode.fleet.subjects import axis_path
 from tests.support.fleet_runs import PARTITIONS, fleet_axes
+
+LEAF = "ulm.leaf"
+"""Name in the certificate of the leaf node, which may send the axis of the first edge."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class SecureFleet:
     folder: Path
     server: LogServer
     axes: dict[str, Axis]
+    access: ServerAccess
 
     @property
     def keys(self) -> tuple[str, str]:
@@ -53,13 +57,18 @@ def secure_fleet(folder: Path) -> Iterator[SecureFleet]:
     authority.cert_pem.write_to_path(folder / "authority.pem")
     own.cert_chain_pems[0].write_to_path(folder / "server.pem")
     own.private_key_pem.write_to_path(folder / "server-key.pem")
+    for name in (LEAF, "stranger.leaf"):
+        site = authority.issue_cert(name)
+        site.cert_chain_pems[0].write_to_path(folder / f"{name}.pem")
+        site.private_key_pem.write_to_path(folder / f"{name}-key.pem")
     axes = fleet_axes(2)
     public = {name: write_credentials(folder / name) for name in ("fleet", "view", "edge 0", "edge 1", "stranger")}
     edges = {axis_path(key): [public[f"edge {number}"]] for number, key in enumerate(axes)}
+    files = {"certificate": folder / "server.pem", "key": folder / "server-key.pem"}
     access = ServerAccess(
-        ServerSection(certificate=folder / "server.pem", key=folder / "server-key.pem"),
-        UsersSection(fleet=[public["fleet"]], view=[public["view"]], edges=edges),
+        ServerSection(**files, authority=folder / "authority.pem", leaf_port=free_port()),
+        UsersSection(fleet=[public["fleet"]], view=[public["view"]], edges=edges, leaves={next(iter(edges)): [LEAF]}),
         list(axes),
     )
     with LogServer(folder / "log", PARTITIONS, access=access) as server:
-        yield SecureFleet(folder, server, axes)
+        yield SecureFleet(folder, server, axes, access)

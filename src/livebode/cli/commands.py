@@ -59,6 +59,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "check": "Compute all responses of a fleet again from its log, and compare the stored ones bit for bit.",
         "replay": "Compute the responses of an axis again from the log, and write them as a table.",
         "server": "Write the configuration of nats-server for a fleet.",
+        "leaf": "Write the configuration of nats-server as a leaf node: the one way of a site to the log.",
         "credentials": "Make the key of a user of the log of a fleet.",
         "demo": "Start a log, three workers and 20 simulated axes, kill a worker, and check that nothing is lost.",
     },

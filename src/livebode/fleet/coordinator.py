@@ -19,6 +19,8 @@ WORKER_TTL_S = 5
 _SILENT_S = 4.0
 """Silence after which a worker gets no partitions and loses its own; a heartbeat comes each half second."""
 _AGAIN_S = 1.0
+_LOST_S = 1
+"""After which the cluster forgets a worker that its process has left."""
 _logger = logging.getLogger(__name__)
 
 
@@ -66,6 +68,7 @@ class FleetCoordinator:
                 "distributed.scheduler.allowed-failures": 1_000_000,
                 "distributed.scheduler.work-stealing": False,
                 "distributed.scheduler.worker-ttl": f"{WORKER_TTL_S}s",
+                "distributed.deploy.lost-worker-timeout": f"{_LOST_S}s",
             }
         )
         self._cluster = LocalCluster(
@@ -73,6 +76,7 @@ class FleetCoordinator:
             threads_per_worker=self._settings.partitions,
             host="127.0.0.1",
             dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else the port that other schedulers use too
             memory_limit=0,
             silence_logs=logging.CRITICAL,
         )
@@ -91,6 +95,9 @@ class FleetCoordinator:
 
     def step(self) -> None:
         """Give partitions without an owner to workers, and one from the most loaded worker to the least loaded one."""
+        if len(self._cluster.workers) < self._settings.workers:
+            # What starts the process of a worker again gives up if that is killed while it starts.
+            self._cluster.scale(self._settings.workers)
         workers = self.workers
         for number in range(self._settings.partitions):
             place = self._places.get(number)

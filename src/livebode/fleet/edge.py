@@ -131,7 +131,7 @@ def _take_all(source: LiveSource, edge: Edge) -> None:
 async def send_edges(settings: LogSection, edges: list[tuple[Edge, Future[None]]], stop: threading.Event) -> None:
     """Send the messages of each edge until the thread that fills it has ended, or a second after `stop`."""
     async with FleetLog(settings, "livebode send") as log:
-        if settings.credentials is None:  # a user of an edge may do nothing but send
+        if settings.credentials is None and settings.access == "full":  # a user of an edge may do nothing but send
             await log.create_streams()
         sending = asyncio.gather(*(edge.send(log, taking) for edge, taking in edges))
         while not sending.done() and not stop.is_set():

@@ -42,8 +42,8 @@ class Reader:
         self._log, self._stream, self._subject = log, stream, subject
         self.next = first
         """Number after the last message that was returned."""
-        self.pending = 0
-        """Messages that the server had beyond the last one returned."""
+        self.pending = 1
+        """Messages that the server had beyond the last one returned; at least one while the server was not asked."""
         self._subscription: Any = None
         self._delivered = 0
         self._heard_s = 0.0
@@ -99,13 +99,15 @@ class Reader:
                     await self.close()
             except (TimeoutError, self._log.errors):
                 await self.close()
+                self.pending = max(1, self.pending)
 
 
 async def stored_messages(
     log: FleetLog, stream: str, subject: str, through: int, first: int = 1
 ) -> AsyncIterator[StoredMessage]:
     """The messages of a subject from number `first` to `through`, which are in the stream already."""
-    last = await log.last(stream, subject)
+    # nats-server 2.9.10 can end at the request for the newest message of several subjects that have none.
+    last = await log.last(stream, subject) if (await log.extent(stream, subject)).subjects else None
     reader = Reader(log, stream, subject, first)
     try:
         while last is not None and reader.next <= min(through, last.number):

@@ -9,27 +9,27 @@ import socket
 import subprocess
 import time
 from pathlib import Path
+from typing import Self
 
 from livebode.core.errors import FleetError
 from livebode.fleet.server_access import OPEN, ServerAccess
+from livebode.fleet.server_cluster import ClusterMember
 from livebode.fleet.server_config import server_configuration
 
 _START_S, _STEP_S = 10.0, 0.02
 
 
-class LogServer:
-    """A nats-server on a free port of loopback, with its store in a directory; a context manager.
+class NatsServer:
+    """A nats-server with its configuration and its log in a directory; a context manager.
 
     Parameters
     ----------
     directory
-        Where configuration, store and log of the server are.
-    partitions
-        Of the fleet.
-    file_bytes_max
-        Most bytes of all streams.
-    access
-        Who may do what. Default: everyone everything.
+        Created if it is missing.
+    port
+        At which it listens on the loopback.
+    configuration
+        Its text.
 
     Raises
     ------
@@ -37,28 +37,12 @@ class LogServer:
         At the start, if nats-server is not installed or ends at once.
     """
 
-    def __init__(
-        self, directory: Path, partitions: int, file_bytes_max: int = 4 << 30, access: ServerAccess = OPEN
-    ) -> None:
-        self._directory, self._port = directory, _free_port()
+    def __init__(self, directory: Path, port: int, configuration: str) -> None:
+        self._directory, self._port = directory, port
         self._process: subprocess.Popen[bytes] | None = None
-        self._scheme = "nats" if access.server.certificate is None else "tls"
         directory.mkdir(parents=True, exist_ok=True)
         self._configuration = directory / "nats.conf"
-        self._configuration.write_text(
-            server_configuration(
-                directory / "store",
-                partitions=partitions,
-                port=self._port,
-                host="127.0.0.1",
-                file_bytes_max=file_bytes_max,
-                access=access,
-            )
-        )
-
-    @property
-    def url(self) -> str:
-        return f"{self._scheme}://127.0.0.1:{self._port}"
+        self._configuration.write_text(configuration)
 
     def start(self) -> None:
         """Start it and wait until it listens."""
@@ -95,7 +79,7 @@ class LogServer:
             self._process.wait()
             self._process = None
 
-    def __enter__(self) -> LogServer:
+    def __enter__(self) -> Self:
         self.start()
         return self
 
@@ -114,7 +98,50 @@ class LogServer:
         return True
 
 
-def _free_port() -> int:
+class LogServer(NatsServer):
+    """The server of a log on a free port of loopback, with its store in a directory.
+
+    Parameters
+    ----------
+    directory
+        Where configuration, store and log of the server are.
+    partitions
+        Of the fleet.
+    file_bytes_max
+        Most bytes of all streams.
+    access
+        Who may do what. Default: everyone everything.
+    member
+        Which server of a cluster it is. Default: the only one.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        partitions: int,
+        file_bytes_max: int = 4 << 30,
+        access: ServerAccess = OPEN,
+        member: ClusterMember | None = None,
+    ) -> None:
+        port, self._scheme = free_port(), "nats" if access.server.certificate is None else "tls"
+        text = server_configuration(
+            directory / "store",
+            partitions=partitions,
+            port=port,
+            host="127.0.0.1",
+            file_bytes_max=file_bytes_max,
+            access=access,
+            member=member,
+        )
+        super().__init__(directory, port, text)
+
+    @property
+    def url(self) -> str:
+        return f"{self._scheme}://127.0.0.1:{self._port}"
+
+
+def free_port() -> int:
+    """A port of the loopback at which nothing listens."""
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return int(found.getsockname()[1])

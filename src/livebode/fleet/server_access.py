@@ -11,9 +11,13 @@ from livebode.core.errors import FleetError
 from livebode.fleet.page_status import NAMES, VIEW
 from livebode.fleet.settings import FleetSettings, ServerSection, UsersSection, on_loopback
 from livebode.fleet.subjects import EDGE, VIEW_API, axis_path
+from livebode.sources.live.framing import FRAME_BYTES_MAX
 
 _FLEET, _VIEW = "FLEET", "VIEW"
 _JETSTREAM = "$JS.API"
+_CONNECTIONS_MORE, _SUBSCRIPTIONS = 4, 4
+_MESSAGE_BYTES_MAX = 2 * FRAME_BYTES_MAX
+"""Of an edge: a frame with the names of the channels, and one of samples."""
 _VIEWED = ("STREAM.INFO.*", "STREAM.MSG.GET.*")
 """Requests of a viewer. A consumer is not one of them: it could deliver to any subject of the log's account."""
 
@@ -44,8 +48,24 @@ class ServerAccess:
             tls = ["tls {", *(f"  {name}: {json.dumps(str(path.absolute()))}" for name, path in files), "}"]
         return [*tls, *(self._accounts(mappings) if self.users.fleet else [mappings])]
 
+    def leaf_lines(self, host: str) -> list[str]:
+        """Lines for leaf nodes, which prove by a certificate whose axes they may send."""
+        if self.server.leaf_port is None:
+            return []
+        files = {"cert_file": self.server.certificate, "key_file": self.server.key, "ca_file": self.server.authority}
+        return [
+            "leafnodes {",
+            f"  listen: {json.dumps(f'{host}:{self.server.leaf_port}')}",
+            "  no_advertise: true",
+            "  tls {",
+            *(f"    {name}: {json.dumps(str(path.absolute()))}" for name, path in files.items() if path is not None),
+            "    verify_and_map: true",
+            "  }",
+            "}",
+        ]
+
     def _accounts(self, mappings: str) -> list[str]:
-        edges = {path: self._allowed(path) for path in self.users.edges}
+        edges = {path: self._allowed(path) for path in {**self.users.edges, **self.users.leaves}}
         senders: dict[str, list[str]] = {}
         for path, subjects in edges.items():
             for subject in subjects:
@@ -59,9 +79,21 @@ class ServerAccess:
         text = ["accounts {", f"  {_FLEET} {{", "    jetstream: enabled", f"    {mappings}", _users(self.users.fleet)]
         text += [_list("exports", exports), "  }", f"  {_VIEW} {{", _users(self.users.view), _list("imports", viewed)]
         for path, subjects in edges.items():
-            text += ["  }", f"  {json.dumps(_account(path))} {{", _users(self.users.edges[path])]
+            keys, leaves = self.users.edges.get(path, ()), self.users.leaves.get(path, ())
+            text += ["  }", f"  {json.dumps(_account(path))} {{", _users(keys, leaves)]
+            text += [self._limits(len(subjects))]
             text += [_list("imports", map(_import, subjects))]
         return [*text, "  }", "}"]
+
+    def _limits(self, axes: int) -> str:
+        """What the account of an edge may use: a connection for each axis, twice because old ones may linger."""
+        connections = 2 * axes + _CONNECTIONS_MORE
+        limits = {
+            "max_connections": connections,
+            "max_subscriptions": connections * _SUBSCRIPTIONS,
+            "max_payload": _MESSAGE_BYTES_MAX,
+        }
+        return "    limits { " + ", ".join(f"{name}: {value}" for name, value in limits.items()) + " }"
 
     def _allowed(self, path: str) -> list[str]:
         """Subjects of the axes at or below a path; FleetError if there are none."""
@@ -89,6 +121,12 @@ def server_access(settings: FleetSettings, host: str) -> ServerAccess:
         If it would be open to the network: off the loopback it needs TLS and keys of users.
     """
     complete = settings.server.certificate and settings.server.key and settings.users.fleet
+    if settings.server.leaf_port is not None and not (complete and settings.server.authority):
+        raise FleetError(
+            "leaves-unknown",
+            "a leaf node proves by its certificate which axes it may send, and the server could not check it",
+            "set server.certificate, server.key, server.authority and users.fleet",
+        )
     if not on_loopback(host) and not complete:
         raise FleetError(
             "server-open",
@@ -96,15 +134,19 @@ def server_access(settings: FleetSettings, host: str) -> ServerAccess:
             "set server.certificate, server.key and users.fleet; `livebode fleet credentials` makes keys",
             host=host,
         )
-    return ServerAccess(settings.server, settings.users, list(settings.read_axes()) if settings.users.edges else [])
+    limited = settings.users.edges or settings.users.leaves
+    return ServerAccess(settings.server, settings.users, list(settings.read_axes()) if limited else [])
 
 
 def _account(path: str) -> str:
     return f"EDGE {quote(path, safe='')}"
 
 
-def _users(keys: Iterable[str]) -> str:
-    return "    users: [ " + ", ".join(f"{{nkey: {key}}}" for key in keys) + " ]"
+def _users(keys: Iterable[str], leaves: Iterable[str] = ()) -> str:
+    found = [f"{{nkey: {key}}}" for key in keys]
+    # A name without a password is enough only where a certificate proves it.
+    found += [f'{{user: {json.dumps(name)}, allowed_connection_types: ["LEAFNODE"]}}' for name in leaves]
+    return "    users: [ " + ", ".join(found) + " ]"
 
 
 def _service(subject: str, accounts: Sequence[str]) -> str:

@@ -44,7 +44,7 @@ class LogSection(_Section):
         Certificate of the authority that signed the server's certificate, in PEM, relative to this file. Default: the
         authorities that this computer trusts.
     access
-        "view" with the key of a viewer, which may read the status only.
+        "view" with the key of a viewer, which may read the status only; "send" for edges behind a leaf node.
     size_gb
         Most data of the machines in the log, in GB; the oldest are deleted then. It must be well below the disk.
     results_gb
@@ -53,16 +53,20 @@ class LogSection(_Section):
         Longest time that data of the machines are in the log.
     replicas
         Copies of the log in a cluster of servers: 3 survive the loss of one.
+    axis_messages
+        Most messages of one axis in the log; its own oldest are deleted then, so that one edge cannot displace the data
+        of the others. Default: ten per second for a week.
     """
 
     url: str = "nats://127.0.0.1:4222"
     credentials: File | None = None
     authority: File | None = None
-    access: Literal["full", "view"] = "full"
+    access: Literal["full", "view", "send"] = "full"
     size_gb: Positive = 50.0
     results_gb: Positive = 10.0
     age_days: Positive = 7.0
     replicas: Annotated[int, Field(ge=1, le=5)] = 1
+    axis_messages: Annotated[int, Field(ge=1)] = 6_048_000
 
     @property
     def encrypted(self) -> bool:
@@ -111,10 +115,46 @@ class ServerSection(_Section):
         Certificate of the server in PEM, relative to this file. Required off the loopback.
     key
         Its private key in PEM, relative to this file.
+    cluster
+        Addresses HOST:PORT at which the servers of a cluster reach each other, all of them in the same order.
+    authority
+        Certificate of the authority that signed those of the other servers of the cluster, in PEM, relative to this
+        file. Required off the loopback, and for leaf nodes.
+    leaf_port
+        Port at which the leaf nodes of sites connect. Default: none.
     """
 
     certificate: File | None = None
     key: File | None = None
+    cluster: list[Annotated[str, Field(pattern=r"^[^\s:/]+:\d{1,5}$")]] = []
+    authority: File | None = None
+    leaf_port: Annotated[int, Field(ge=1, le=65535)] | None = None
+
+
+class LeafSection(_Section):
+    """[leaf]: the server of a site, which `livebode fleet leaf` configures.
+
+    Parameters
+    ----------
+    url
+        Address of the log's server for leaf nodes, tls://HOST:PORT; several of a cluster are joined by commas.
+    certificate
+        Certificate of the site in PEM, relative to this file; its name is in users.leaves of the log's server.
+    key
+        Its private key in PEM, relative to this file.
+    authority
+        Certificate of the authority that signed the one of the log's server, in PEM, relative to this file.
+    """
+
+    url: str
+    certificate: File | None = None
+    key: File | None = None
+    authority: File | None = None
+
+    @property
+    def urls(self) -> list[str]:
+        """The addresses one by one."""
+        return self.url.split(",")
 
 
 class UsersSection(_Section):
@@ -128,11 +168,14 @@ class UsersSection(_Section):
         Of viewers: the status.
     edges
         Of edges, by the path of their axes: "Graz" may send those of a site, "Graz/2/press 4/x" one axis.
+    leaves
+        Of leaf nodes, by the path of their axes: the names in their certificates.
     """
 
     fleet: list[PublicKey] = []
     view: list[PublicKey] = []
     edges: dict[str, list[PublicKey]] = {}
+    leaves: dict[str, list[Annotated[str, Field(pattern=r"^[\w.-]+$")]]] = {}
 
 
 class EdgeSection(_Section):
@@ -169,6 +212,7 @@ class FleetSettings(_Section):
     log: LogSection = LogSection()
     edge: EdgeSection = EdgeSection()
     server: ServerSection = ServerSection()
+    leaf: LeafSection | None = None
     users: UsersSection = UsersSection()
 
     @classmethod
@@ -197,12 +241,14 @@ class FleetSettings(_Section):
     def beside(self, folder: Path) -> FleetSettings:
         """The same with relative paths from `folder`."""
         edge = self.edge.model_copy(update={"buffer": folder / self.edge.buffer})
+        leaf = self.leaf and _beside(self.leaf, folder, "certificate", "key", "authority")
         return self.model_copy(
             update={
+                "leaf": leaf,
                 "axes": [str(folder / pattern) for pattern in self.axes],
                 "edge": edge,
                 "log": self.log.beside(folder),
-                "server": _beside(self.server, folder, "certificate", "key"),
+                "server": _beside(self.server, folder, "certificate", "key", "authority"),
             }
         )
 

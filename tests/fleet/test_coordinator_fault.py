@@ -1,0 +1,43 @@
+"""Workers of a coordinator that are killed, and again while they start."""
+
+from __future__ import annotations
+
+import time
+
+import psutil
+
+from livebode.fleet.coordinator import FleetCoordinator
+from livebode.fleet.settings import FleetSettings
+
+
+def test_a_worker_that_is_killed_again_while_it_starts_is_replaced() -> None:
+    about = {"axes": ["a.toml"], "partitions": 1, "workers": 1, "log": {"url": "nats://127.0.0.1:1"}}
+    with FleetCoordinator(FleetSettings.of(about, "a test"), {}) as coordinator:
+        killed = set()
+        for pause_s in (0.0, 0.2):
+            (process,) = _new(killed)
+            time.sleep(pause_s)
+            process.kill()
+            killed.add(process.pid)
+        (third,) = _new(killed, coordinator)
+        while not coordinator.workers:
+            coordinator.step()
+            time.sleep(0.1)
+        assert third.is_running()
+
+
+def _new(killed: set[int], coordinator: FleetCoordinator | None = None) -> list[psutil.Process]:
+    """Processes of workers that were not killed yet, as soon as there are some."""
+    while True:
+        found = []
+        for child in psutil.Process().children():
+            try:
+                if child.pid not in killed and "spawn_main" in " ".join(child.cmdline()):
+                    found.append(child)
+            except psutil.NoSuchProcess:
+                continue
+        if found:
+            return found
+        if coordinator is not None:
+            coordinator.step()
+        time.sleep(0.02)
