@@ -11,6 +11,7 @@ import logging
 import os
 import socket
 import time
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -156,19 +157,32 @@ class PartitionOwner:
 
     def _process(self, messages: Sequence[StoredMessage]) -> Sequence[StoredMessage]:
         """Process messages until their results are enough for a message of results; returns the others."""
+        stored = bisect_right(messages, self._through, key=lambda message: message.number)
+        streams, taken = self._take(messages[:stored] or messages)
+        for key, stream in streams.items():
+            output = stream.output()
+            if not stored:
+                self._pending.add(key, stream, output)
+        return messages[taken:]
+
+    def _take(self, messages: Sequence[StoredMessage]) -> tuple[dict[str, AxisStream], int]:
+        """Hand messages to their axes until the results may be enough; returns these axes, and how many it took.
+
+        Messages that arrived together are tracked together, axis by axis.
+        """
+        streams: dict[str, AxisStream] = {}
+        size = self._pending.nbytes
         for index, message in enumerate(messages):
-            if self._pending.nbytes > _PENDING_BYTES_MAX:
-                return messages[index:]
+            if size > _PENDING_BYTES_MAX:
+                return streams, index
             self._newest_s = message.stored_s
             key = key_of(message.subject)
             stream = self._stream(key, message.number)
-            if stream is None or message.number <= stream.position:
-                continue
-            output = stream.process(message.data, message.number, message.stored_s)
-            self._stored.took(key, len(message.data))
-            if message.number > self._through:  # else it is stored already
-                self._pending.add(key, stream, output)
-        return []
+            if stream is not None and message.number > stream.position:
+                size += stream.take(message.data, message.number, message.stored_s)
+                self._stored.took(key, len(message.data))
+                streams[key] = stream
+        return streams, len(messages)
 
     def _stream(self, key: str, number: int) -> AxisStream | None:
         found = self._streams.get(key)
