@@ -1,6 +1,6 @@
 """What an axis of a fleet costs on the real path, by processor times: nats-server, owners and generator apart.
 
-    python -m bench.fleet_path [--seconds 20]
+    python -m bench.fleet_path [--seconds 20] [--only "100 ms"]
 
 A nats-server on loopback, an owner of all partitions in a process of its own, and a generator of messages in another.
 Each kind of message in turn: samples in blocks of 500 and 100 ms (4 kHz, three channels, 6 lines), the same with
@@ -346,13 +346,17 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m bench.fleet_path", description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--only", default="", help="part of the name of the messages")
     asked = parser.parse_args()
     print(HEADING)
     found = {}
     for load, axes in AXES.items():
+        if asked.only not in load.name:
+            continue
         costs = found[load.name] = measured(load, axes, asked.seconds)
         print(row(costs), flush=True)
-    print(*verdicts(found), sep="\n")
+    if not asked.only:
+        print(*verdicts(found), sep="\n")
 
 
 if __name__ == "__main__":
