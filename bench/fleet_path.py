@@ -29,12 +29,12 @@ import psutil
 from bench.fleet_generator import Generated, generate
 from bench.fleet_loads import MOTION, SAMPLES_100, SAMPLES_500, SPECTRA, AxisLoad
 from livebode.fleet.log import FleetLog
-from livebode.fleet.partition import STATE_S_MIN, STATE_SHARE
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import LogSection
 from livebode.fleet.status import status_of
+from livebode.fleet.stored_states import STATE_S_MIN, STATE_SHARE
 from livebode.fleet.subjects import LOG, LOG_STREAM, RESULT_STREAM, RESULTS, STATE_STREAM, key_of
 from livebode.fleet.worker import own_partitions
 from livebode.sources.live.framing import read_header

@@ -42,8 +42,8 @@ class Reader:
         self._log, self._stream, self._subject = log, stream, subject
         self.next = first
         """Number after the last message that was returned."""
-        self.pending = 0
-        """Messages that the server had beyond the last one returned."""
+        self.pending = 1
+        """Messages that the server had beyond the last one returned; at least one while the server was not asked."""
         self._consumer: Consumer | None = None
         self._delivered = 0
         self._heard_s = 0.0
@@ -59,6 +59,7 @@ class Reader:
                 await self._doubt(self._consumer)
         except (TimeoutError, self._log.errors):
             await self.close()
+            self.pending = max(1, self.pending)
             await asyncio.sleep(max(timeout_s, _READ_S))
             return []
         return await self._checked(found)
