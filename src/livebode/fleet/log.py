@@ -239,7 +239,7 @@ class FleetLog:
             mem_storage=True,
         )
         await self._js.add_consumer(stream, config)
-        consumer = Consumer(self._connection, self._js, stream, name, f"{self._api}.CONSUMER.MSG.NEXT.{stream}.{name}")
+        consumer = Consumer(self._connection, f"{self._api}.CONSUMER.MSG.NEXT.{stream}.{name}")
         await consumer.open()
         return consumer
 
