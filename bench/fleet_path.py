@@ -60,7 +60,7 @@ class PathCosts:
     stores
         Times that an owner stored results.
     owner_s, server_s, generator_s
-        Processor time.
+        Processor time; of owner and server as if the time after the start were all.
     idle_s
         Processor time of an owner per second and partition without data.
     dilation
@@ -145,8 +145,11 @@ class _Path:
             self._wait(processes, lambda: self._claims() >= self._partitions)
             assert answers.get(timeout=600) == "ready"
             idle_s = self._idle_s(processes)
-            before = [_used(one.pid) for one in (*processes, server)]
             go.set()
+            # The first message of an axis creates its tracker: the rest counts for all of the time.
+            warm_s = min(_WARM_S, seconds / 3)
+            time.sleep(warm_s)
+            before = [_used(one.pid) for one in (*processes, server)]
             killed_s = 0.0
             if takeover:
                 killed_s = self._take_over(processes, seconds)
@@ -155,7 +158,7 @@ class _Path:
             ended_s = time.time()
             self._wait(processes, lambda: self._current(ended_s))
             after = [_used(one.pid) for one in (*processes, server)]
-            spent = [now - then for now, then in zip(after, before)]
+            spent = [(now - then) * seconds / (seconds - warm_s) for now, then in zip(after, before)]
             return self._asked(lambda log: self._costs(log, sent, spent, idle_s, killed_s))
 
     @contextlib.contextmanager
@@ -191,7 +194,7 @@ class _Path:
         return float(sum(_used(one.pid)[0] for one in processes) - before) / _IDLE_S / self._partitions
 
     def _take_over(self, processes: list[Any], seconds: float) -> float:
-        time.sleep(seconds / 2)
+        time.sleep(seconds / 6)
         processes[0].kill()
         processes[0].join()
         killed_s = time.time()
