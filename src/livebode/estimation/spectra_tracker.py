@@ -134,7 +134,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
             ripple = ripple_power(self.settings.ripple, self.settings.lines, self._speed.at(schedule, sample))
         centre = np.stack([time_s, schedule])
         responses = self._lines.process(rows, place, centre, block.channels, ripple=ripple)
-        self._nothing = responses[0:0]
+        self._ends_with(responses)
         hand_over(self._events, emit)
         return responses
 
