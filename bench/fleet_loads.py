@@ -68,7 +68,7 @@ class AxisLoad:
         return write_message(self._spectrum(axis, number) if self.spectra else self._batch(axis, number))
 
     def _batch(self, axis: int, number: int) -> AnyBatch:
-        signals, channels = _signals(self.motion)
+        signals, channels = samples_of(self.motion)
         first = number * self.samples
         data = signals[:, np.arange(first, first + self.samples) % signals.shape[1]]
         noise = np.random.default_rng([axis, number]).standard_normal(self.samples)
@@ -91,7 +91,7 @@ MOTION = replace(SAMPLES_500, name="samples, 500 ms, [motion]", motion=True)
 
 
 @cache
-def _signals(moving: bool) -> tuple[np.ndarray, tuple[Channel, ...]]:
+def samples_of(moving: bool) -> tuple[np.ndarray, tuple[Channel, ...]]:
     excitation = multisine(Lines.parse(FREQUENCIES, RATE_HZ, WINDOW))
     motion = {"motion": _STROKES} if moving else {}
     axis = BeltAxis(excitation_n_m=excitation, sensor=Sensor(), seconds=_SIMULATED_S, run_in_s=0.5, **motion)
@@ -104,7 +104,7 @@ def _signals(moving: bool) -> tuple[np.ndarray, tuple[Channel, ...]]:
 @cache
 def _sums(hop: int) -> tuple[np.ndarray, SpectraLayout]:
     """Sums of one spectrum of the simulated axis, shape (signals, 1, lines)."""
-    signals, channels = _signals(False)
+    signals, channels = samples_of(moving=False)
     bins = Lines.parse(FREQUENCIES, RATE_HZ, WINDOW).bins
     layout = SpectraLayout(channels, (), window=WINDOW, hop=hop, lines=tuple(map(int, bins)))
     return np.fft.rfft(signals[:, :WINDOW])[:, np.newaxis, list(layout.lines)], layout

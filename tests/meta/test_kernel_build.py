@@ -41,7 +41,8 @@ def run(*command: object) -> str:
 def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86) -> list[Path]:
     """All objects of the kernel."""
     switch = ["-DLB_DISPATCH"] if dispatch else []
-    jobs = [(name, name, []) for name in ("twiddle", "machine")]
+    jobs: list[tuple[str, str, list[str]]] = [(name, name, []) for name in ("twiddle", "machine")]
+    jobs += [(f"lines/{name}", name, []) for name in ("moments", "lines")]
     for bits in (32, 64):
         jobs += [(name, f"{name}{bits}", [f"-DLB_BITS={bits}"]) for name in TYPED]
         for name, isa in SETS.items() if dispatch else ():
@@ -135,7 +136,7 @@ def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factor
     hashes = {}
     for name, (compiler, _, objects) in builds.items():
         (tmp_path / f"run {name}").mkdir()
-        hashes[name] = program(tmp_path / f"run {name}", compiler, objects, "bits")
+        hashes[name] = tuple(program(tmp_path / f"run {name}", compiler, objects, part) for part in ("bits", "lines"))
     assert len(set(hashes.values())) == 1, hashes
 
 
@@ -147,6 +148,7 @@ def test_sanitizers_find_nothing(tmp_path):
     objects = build(tmp_path / "objects", compiler, "-O0", "-DLB_DEBUG", "-DLB_INLINE=static inline", *sanitize)
     program(tmp_path, compiler, objects, "misuse", *sanitize)
     program(tmp_path, compiler, objects, "bits", *sanitize)
+    program(tmp_path, compiler, objects, "lines", *sanitize)
 
 
 VIOLATIONS = {
@@ -207,5 +209,5 @@ def test_the_documented_example_compiles_and_runs(built, tmp_path):
 
 def test_the_header_is_also_cpp(tmp_path):
     source = tmp_path / "header.cpp"
-    source.write_text('#include "livebode/sdft.h"\nint main() { return lb_best_instruction_set() == LB_BEST; }\n')
+    source.write_text('#include "livebode/lines.h"\nint main() { return lb_best_instruction_set() == LB_BEST; }\n')
     run(needed("g++"), "-Wall", "-Wextra", "-Werror", f"-I{KERNEL / 'include'}", "-c", source, "-o", tmp_path / "o")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import GridError, Lines
-from livebode.estimation.bounds import power
+from livebode.estimation.products import power, times
 from livebode.estimation.settings import DETECTION_LINES_MIN
 
 Floats = NDArray[np.float64]
@@ -44,14 +44,6 @@ class Interpolation:
         size = power(across)
         inverse = times(times(left, right), across.conj())
         return np.where(falls, _scaled(inverse, 1 / size), straight)
-
-
-def times(one: Complex, other: Complex) -> Complex:
-    """Product by real operations: NumPy's of complex numbers rounds otherwise in the last elements of an array."""
-    product = np.empty(np.broadcast_shapes(one.shape, other.shape), dtype=np.complex128)
-    product.real = one.real * other.real - one.imag * other.imag
-    product.imag = one.real * other.imag + one.imag * other.real
-    return product
 
 
 def _scaled(one: Complex, factor: Floats) -> Complex:

@@ -11,9 +11,9 @@ import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
 from livebode.core import Lines
-from livebode.estimation.bounds import power
-from livebode.estimation.detection import Groups, Interpolation, times
+from livebode.estimation.detection import Groups, Interpolation
 from livebode.estimation.moments import Moments
+from livebode.estimation.products import power, times
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -97,7 +97,7 @@ class Distortion:
         model = self._interpolation.at(ratio)
         mean = power(numerator[:, beside] - times(model, denominator[:, beside]))
         scatter = replace(moments, scatter=moments.scatter[:, :, beside]).unexplained(model)
-        noise = scatter / moments.unbiased[:, np.newaxis] * moments.of_mean[:, np.newaxis]
+        noise = scatter / moments.weights.unbiased[:, np.newaxis] * moments.weights.of_mean[:, np.newaxis]
         if instrument:
             reference = moments.power[0]
             excited = reference[:, beside] > _POWERLESS * _mean(reference[:, lines])
@@ -111,7 +111,7 @@ class Distortion:
         known = np.isfinite(mean) & np.isfinite(noise)
         over = _over_noise(mean, noise, known)
         variance = _share(over)[:, np.newaxis] * (found + coherent)
-        return Repeats(variance, over, np.count_nonzero(known, axis=1), moments.dof)
+        return Repeats(variance, over, np.count_nonzero(known, axis=1), moments.weights.dof)
 
 
 @dataclass(frozen=True, eq=False)

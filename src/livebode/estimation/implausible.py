@@ -28,9 +28,24 @@ class PlausibleRange(StatefulBase):
     def process(self, data: Floats) -> NDArray[np.intp]:
         """Positions in `data` (channels, samples), all finite, of samples that are too large in any channel."""
         size = np.abs(data)
-        starts = np.r_[0, np.arange(self._window - self._at, size.shape[1], self._window)]
+        starts = np.arange(self._window - self._at - self._window, size.shape[1], self._window)
+        starts[0] = 0
+        found = self._found(size, starts)
+        self._at = (self._at + size.shape[1]) % self._window
+        if self._at == 0:
+            self._end_period()
+        return np.concatenate(found) if found else np.zeros(0, dtype=np.intp)
+
+    def _found(self, size: Floats, starts: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+        """The same, in pieces that begin a period, or continue the one that has begun."""
+        every = np.maximum.reduceat(size, starts, axis=1)
+        every[:, 0] = np.maximum(self._largest, every[:, 0])
+        limits = np.concatenate([self._limit[:, np.newaxis], _limits(every)], axis=1)
+        if not (every > limits[:, :-1]).any():  # nearly always
+            self._largest, self._limit = every[:, -1].copy(), limits[:, -2].copy()
+            return []
         found: list[NDArray[np.intp]] = []
-        for i, largest in enumerate(np.maximum.reduceat(size, starts, axis=1).T):
+        for i, largest in enumerate(every.T):
             if i > 0:
                 self._end_period()
             if np.any(largest > self._limit):
@@ -39,12 +54,13 @@ class PlausibleRange(StatefulBase):
                 found.append(starts[i] + np.flatnonzero(wrong.any(axis=0)))
                 largest = np.max(piece, axis=1, where=~wrong, initial=0.0)
             self._largest = np.maximum(self._largest, largest)
-        self._at = (self._at + size.shape[1]) % self._window
-        if self._at == 0:
-            self._end_period()
-        return np.concatenate(found) if found else np.zeros(0, dtype=np.intp)
+        return found
 
     def _end_period(self) -> None:
-        # A signal that was zero gives no scale for what is too large.
-        self._limit = np.where(self._largest > 0, _FACTOR * self._largest, np.inf)
+        self._limit = _limits(self._largest)
         self._largest = np.zeros_like(self._largest)
+
+
+def _limits(largest: Floats) -> Floats:
+    """Of the next period. A signal that was zero gives no scale for what is too large."""
+    return np.where(largest > 0, _FACTOR * largest, np.inf)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from livebode.core import Lines, Stage, StatefulBase
 from livebode.core.mains import meets_mains
-from livebode.estimation.bounds import power
 from livebode.estimation.detection import Interpolation
+from livebode.estimation.products import power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
 

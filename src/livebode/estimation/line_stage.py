@@ -3,42 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Channel, Event, PlantKinds, Responses, Stage, StatefulBase
-from livebode.estimation.bounds import between_periods, contained, power, unbiased
 from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.estimators import Role
 from livebode.estimation.hann import Hann
-from livebode.estimation.moments import Moments, PeriodMoments
+from livebode.estimation.line_estimates import LineEstimates
+from livebode.estimation.moments import PeriodMoments
 from livebode.estimation.movement import Movement
 from livebode.estimation.periodicity import Periodicity
-from livebode.estimation.quantities import from_plant
+from livebode.estimation.products import power, times
 from livebode.estimation.repeating import Repeating
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows
+from livebode.kernel import (
+    NOISE_LARGER,
+    NOISE_MOVING,
+    NOISE_SCATTER,
+    LineSettings,
+    LineWindows,
+    process_lines,
+)
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-# A window counts as excited at a line down to this share of the largest power seen: above the rounding of the DFT,
-# below any intended excitation.
-_EXCITED = 1e-12
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """What is known of each line: shapes (rows, lines), of `dof` (rows,)."""
-
-    value: Complex
-    sigma: Floats
-    dof: Floats
-    distortion: Floats
-    weight: Complex
+Flags = NDArray[np.bool_]
 
 
 class LineStage(StatefulBase):
@@ -71,7 +65,10 @@ class LineStage(StatefulBase):
             outside = beyond(lines) if settings.method.reference == "excitation" else ()
             self._detection = DetectionNoise(lines, tuple(k for k in outside if sent is None or k in sent))
         self._places = max(1, lines.window // settings.step)
-        self._moments = PeriodMoments(self._places, len(lines), settings.forgetting, own=settings.average)
+        self._moments = PeriodMoments(self._places, len(lines), settings.forgetting)
+        self._kernel_settings = self._for_kernel()
+        self._unit: tuple[Sequence[Channel], str] = ((), "")  # of the newest channels
+        self._converts = settings.method.through_loop or settings.quantity != "plant"
         self._movement = Movement(self._places)
         self._periodicity = None
         if settings.method.reference == "input":
@@ -79,6 +76,14 @@ class LineStage(StatefulBase):
             self._periodicity = Periodicity(lines, self._places, name, self._events)
         self._moving = 0
         self._largest = 0.0
+
+    def _for_kernel(self) -> LineSettings:
+        s, weights = self._settings, self._moments.weights
+        noise, noise_dof = NOISE_SCATTER, np.inf
+        if self._detection is not None:
+            noise, noise_dof = NOISE_LARGER if s.noise == "quiet" else NOISE_MOVING, self._detection.dof
+        denominator, reference = (self._roles.index(role) for role in (s.method.denominator, s.method.reference))
+        return LineSettings(weights.forgetting, weights.table, s.average, denominator, reference, noise, noise_dof)
 
     def _state(self) -> dict[str, Any]:
         return super()._state() | ({"periodicity": self._periodicity} if self._periodicity else {})
@@ -122,11 +127,11 @@ class LineStage(StatefulBase):
         """
         now = self._moments.now
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(np.isfinite(now.dof)[:, np.newaxis], now.repeatability, np.nan)
+            share = np.where(np.isfinite(now.weights.dof)[:, np.newaxis], now.repeatability, np.nan)
         return self._over_places(share)
 
     def _over_places(self, values: Floats) -> Floats:
-        seen = self._moments.now.weight > 0
+        seen = self._moments.now.weights.one > 0
         return values[seen].mean(axis=0) if seen.any() else np.full(values.shape[1], np.nan)
 
     def process(
@@ -137,7 +142,7 @@ class LineStage(StatefulBase):
         channels: Sequence[Channel],
         repeating: Repeating | None = None,
         ripple: Floats | None = None,
-        aside: NDArray[np.bool_] | None = None,
+        aside: Flags | None = None,
     ) -> Responses:
         """Responses of consecutive spectra.
 
@@ -159,9 +164,12 @@ class LineStage(StatefulBase):
             Windows that do not enter the moments of later ones, (rows,); None for none.
         """
         with np.errstate(all="ignore"):  # an incomplete window has no defined value, so it becomes NaN
-            return self._responses(
-                rows, place, centre, response_unit(channels, self._settings), repeating, ripple, aside
-            )
+            return self._responses(rows, place, centre, self._unit_of(channels), repeating, ripple, aside)
+
+    def _unit_of(self, channels: Sequence[Channel]) -> str:
+        if self._unit[0] != channels:
+            self._unit = channels, response_unit(channels, self._settings)
+        return self._unit[1]
 
     def _responses(
         self,
@@ -171,81 +179,89 @@ class LineStage(StatefulBase):
         unit: str,
         repeating: Repeating | None,
         ripple: Floats | None,
-        aside: NDArray[np.bool_] | None,
+        aside: Flags | None,
     ) -> Responses:
-        s = self._settings
+        s, lines = self._settings, len(self._settings.lines)
         spectrum = self._hann.combine(rows.spectrum, place) if self._hann else rows.spectrum
         signals: dict[Role, Complex] = dict(zip(self._roles, spectrum))
-        pair, reference, powers = self._seen(signals)
-        excited = self._excited(powers[0], rows.whole)
-        usable = rows.clean & excited.any(axis=1)
-        if aside is not None:
-            usable &= ~aside
-        series = int(place[0] // s.step - 1) % self._places if usable.size else 0
-        moving = self._moves(series, centre, rows.sample) if usable.size else usable
+        series = int(place[0] // s.step - 1) % self._places if place.size else 0
+        moving = self._moves(series, centre, rows.sample)
         first = rows.sample - s.lines.window + 1
-        moment = np.concatenate([centre, first[np.newaxis]])
-        spectra = np.concatenate([pair, reference[np.newaxis]])
-        moments = self._moments.update(series, spectra, powers, moment, usable)
-        estimate = self._estimate(pair, powers, moments, moving, repeating, ripple)
-        if s.average:
-            begun = moments.weight > 0  # until then there is no mean, only the window's own time
-            first, moment = np.where(begun, moments.first, first), np.where(begun, moments.moment, moment)
-        # An average continues through windows that it excludes.
-        seen = rows.whole if s.average else rows.clean
-        valid = seen[:, np.newaxis] & excited & np.isfinite(estimate.value)
-        distortion = np.where(valid, estimate.distortion, np.nan)
+        noise = self._detected(signals)
+        distortion, invalid, dof_repeating = None, None, np.inf
         if repeating is not None:
-            against = repeating.invalid & ~moving[:, np.newaxis]
-            distortion, valid = np.where(valid & against, np.inf, distortion), valid & ~against
+            distortion, dof_repeating = np.ascontiguousarray(repeating.distortion), repeating.dof
+            invalid = None if self._converts else np.ascontiguousarray(repeating.invalid)
+        windows = LineWindows(
+            self._largest,
+            series,
+            np.ascontiguousarray(spectrum),
+            noise,
+            rows.whole,
+            rows.clean,
+            aside,
+            moving,
+            distortion,
+            invalid,
+            dof_repeating,
+            np.concatenate([centre, first[np.newaxis]]),
+        )
+        found, self._largest = process_lines(self._kernel_settings, self._moments.arrays, windows)
+        estimates = LineEstimates.of(found)
+        if ripple is not None:
+            estimates = estimates.with_ripple(ripple, power(signals[s.method.denominator][:, :lines]))
+        if self._converts:
+            estimates = estimates.converted(s)
+            if repeating is not None:
+                estimates = estimates.without(_where_not(repeating.invalid, moving))
         if self._periodicity is not None:
-            leaks = self._periodicity.process(reference, usable, rows.sample, centre[0])
-            valid = valid & (moving[:, np.newaxis] | ~leaks)
-        several = valid & np.isfinite(moments.dof)[:, np.newaxis]
+            input_ = signals["input"][:, :lines]
+            leaks = self._periodicity.process(input_, found.usable, rows.sample, centre[0])
+            estimates = estimates.only(estimates.valid & ~_where_not(leaks, moving))
         return Responses(
             lines=s.lines,
-            value=np.where(valid, estimate.value, complex(np.nan, np.nan)),
-            sigma=np.where(valid, estimate.sigma, np.nan),
-            dof=estimate.dof,
-            coherence=np.where(several, unbiased(moments.coherence, moments), np.nan),
-            valid=valid,
-            first=first,
+            value=estimates.value,
+            sigma=estimates.sigma,
+            dof=found.dof,
+            coherence=estimates.coherence,
+            valid=estimates.valid,
+            first=found.moment[2].astype(np.int64) if s.average else first,
             sample=rows.sample,
-            time_s=moment[0],
-            schedule=moment[1],
+            time_s=found.moment[0],
+            schedule=found.moment[1],
             quantity=s.quantity,
             unit=unit,
-            input_coherence=np.where(several, self._input_coherence(moments), np.nan),
-            weight=np.where(valid, estimate.weight, complex(np.nan, np.nan)),
-            distortion=distortion,
+            input_coherence=estimates.input_coherence,
+            weight=estimates.weight,
+            distortion=estimates.distortion,
         )
 
-    def _seen(self, signals: dict[Role, Complex]) -> tuple[Complex, Complex, Floats]:
-        """Numerator and denominator times conj(reference) (2, rows, lines), reference, and the powers of moments."""
-        method, lines = self._settings.method, slice(0, len(self._settings.lines))
-        reference, output = signals[method.reference][:, lines], signals["output"][:, lines]
-        denominator = signals[method.denominator][:, lines]
-        pair = np.stack([output, denominator]) * reference.conj()
-        noise = self._detected(signals, pair)
-        return pair, reference, np.stack([power(reference), power(output), noise, power(denominator)])
-
-    def _detected(self, signals: dict[Role, Complex], pair: Complex) -> Floats:
-        """Noise of one window by the detection lines, as a power of numerator·conj(reference); zero without them."""
+    def _detected(self, signals: dict[Role, Complex]) -> Floats | None:
+        """Noise of one window by the detection lines, as a power of numerator·conj(reference); None without them."""
         if self._detection is None:
-            return np.zeros(pair.shape[1:])
-        method, at, beside = self._settings.method, slice(0, pair.shape[2]), slice(pair.shape[2], None)
-        reference = power(signals[method.reference])
+            return None
+        method, lines = self._settings.method, len(self._settings.lines)
+        at, beside = slice(0, lines), slice(lines, None)
+        every = power(signals[method.reference])
         excited = None
         if method.reference == "excitation":
-            excited = reference[:, beside] / reference[:, at].mean(axis=1, keepdims=True)
-        output, denominator = signals["output"][:, beside], signals[method.denominator][:, beside]
-        return self._detection.power(pair[0] / pair[1], output, denominator, excited) * reference[:, at]
+            excited = every[:, beside] / every[:, at].mean(axis=1, keepdims=True)
+        output, denominator = signals["output"], signals[method.denominator]
+        conjugate = signals[method.reference][:, at].conj()
+        ratio = times(output[:, at], conjugate) / times(denominator[:, at], conjugate)
+        noise = self._detection.power(ratio, output[:, beside], denominator[:, beside], excited)
+        return np.ascontiguousarray(noise * every[:, at])
 
-    def _moves(self, series: int, centre: Floats, sample: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Windows in which the machine moves; an Event for the first one whose noise is estimated in another way."""
-        moving = self._movement.process(series, centre[1])
+    def _moves(self, series: int, centre: Floats, sample: NDArray[np.int64]) -> Flags | None:
+        """Windows in which the machine moves; an Event for the first one whose noise is estimated in another way.
+
+        None where noise is not taken from detection lines, so that it makes no difference.
+        """
         if self._detection is None:
-            return np.zeros(len(sample), dtype=np.bool_)
+            return None
+        if not sample.size:
+            return np.zeros(0, dtype=np.bool_)
+        moving = self._movement.process(series, centre[1])
         if self._moving == 0 and moving.any():
             at = int(np.argmax(moving))
             self._events.append(
@@ -260,69 +276,10 @@ class LineStage(StatefulBase):
         self._moving += int(np.count_nonzero(moving))
         return moving
 
-    def _input_coherence(self, moments: Moments) -> Floats:
-        """γ² of reference and input; NaN where the estimator has no input of its own."""
-        if self._settings.method.reference == self._settings.method.denominator:
-            return np.full(moments.means.shape[1:], np.nan)
-        return unbiased(moments.input_coherence, moments)
 
-    def _estimate(
-        self,
-        pair: Complex,
-        powers: Floats,
-        moments: Moments,
-        moving: NDArray[np.bool_],
-        repeating: Repeating | None,
-        ripple: Floats | None,
-    ) -> Estimate:
-        """Value, sigma, distortion and weight (rows, lines), and the degrees of freedom (rows,)."""
-        s, f = self._settings, self._settings.lines.frequency_hz
-        numerator, denominator = moments.pair if s.average else pair
-        excitation = moments.power[0] if s.average else powers[0]
-        value = numerator / denominator
-        share = moments.of_mean if s.average else np.ones(len(value))
-        noise, dof = self._noise(powers[2], moments, moving, share)
-        sigma = np.sqrt(noise * share[:, np.newaxis]) / np.abs(denominator)
-        distortion = np.full(value.shape, np.nan)
-        if repeating is not None:
-            distortion = np.where(moving[:, np.newaxis], np.nan, repeating.distortion)
-            sigma, dof = contained(sigma, dof, distortion, repeating.dof)
-        if ripple is not None:
-            sigma = np.hypot(sigma, np.abs(value) * np.sqrt(ripple / powers[3]))
-        slope = np.ones_like(value)
-        if s.method.through_loop:
-            value, slope = s.loop.plant(value, f)
-        # U/W is (Y/W)/G, whatever it is that was divided.
-        weight = powers[0] + 0j if s.method.reference == "input" else numerator / excitation / value
-        if s.quantity != "plant":
-            signals = numerator, denominator, excitation + 0j
-            value, by_plant = from_plant(s.quantity, value, s.loop, signals, f)
-            slope, weight = slope * by_plant, np.full_like(value, complex(np.nan, np.nan))
-        scale = np.abs(slope)
-        return Estimate(value, sigma * scale, dof, distortion * scale, weight)
-
-    def _noise(self, now: Floats, moments: Moments, moving: NDArray[np.bool_], share: Floats) -> tuple[Floats, Floats]:
-        """Variance of numerator − Ĝ·denominator for one window (rows, lines), and its degrees of freedom (rows,).
-
-        `now` is the power at the detection lines in this window. Where the machine moves, it is used alone, because the
-        scatter between periods contains the motion; else the scatter is used, or with "quiet" the larger of the two.
-        """
-        periods, dof = between_periods(moments), moments.dof
-        if self._detection is None:
-            return periods, dof
-        remembered = moments.power[2]
-        beside = remembered if self._settings.average else now
-        if self._settings.noise == "quiet":
-            periods = np.fmax(periods, np.where(np.isfinite(periods), remembered, beside))
-            dof = np.where(np.isfinite(dof), dof, self._detection.dof)
-        dof = np.where(moving, self._detection.dof / share, dof)
-        return np.where(moving[:, np.newaxis], beside, periods), dof
-
-    def _excited(self, power: Floats, whole: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which lines have a share of the largest excitation so far, shape of `power` (rows, lines)."""
-        largest = np.maximum.accumulate(np.r_[self._largest, np.where(whole, power.max(axis=1), 0.0)])
-        self._largest = float(largest[-1])
-        return np.asarray((power > _EXCITED * largest[1:, np.newaxis]) & (power > 0))
+def _where_not(these: Flags, moving: Flags | None) -> Flags:
+    """Only in windows in which the machine does not move."""
+    return these if moving is None else these & ~moving[:, np.newaxis]
 
 
 def response_unit(channels: Sequence[Channel], settings: Settings) -> str:

@@ -101,7 +101,7 @@ class NonPeriodicTracker(StreamEstimator[InputStatistics]):
             else:
                 self._restart()
         responses = self._lines.responses(rows, block.channels)
-        self._nothing = responses[0:0]
+        self._ends_with(responses)
         hand_over(self._events, emit)
         return responses
 

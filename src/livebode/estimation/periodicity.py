@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Event, Lines, Stage, StatefulBase
 from livebode.core.errors.signal import ANY_EXCITATION
-from livebode.estimation.bounds import power
-from livebode.estimation.detection import times
+from livebode.estimation.products import power, times
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

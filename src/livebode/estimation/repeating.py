@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, Event, QuantityKind, Stage
 from livebode.core.steps import step_of
-from livebode.estimation.bounds import power
 from livebode.estimation.levels import DistortionLevels
 from livebode.estimation.moments import Moments, PeriodMoments
 from livebode.estimation.movement import PLACES, Movement
 from livebode.estimation.periods import PeriodCutter, Periods
+from livebode.estimation.products import power
 from livebode.estimation.settings import Settings
 from livebode.estimation.silence import SilentHum
 from livebode.estimation.spectra import SpectraRows
@@ -105,7 +105,7 @@ class RepeatingErrors(PeriodCutter):
 
     def _forget(self) -> None:
         self.levels.end_stretch()
-        self._moments = PeriodMoments(1, len(self._judge.bins), 1.0, own=True)
+        self._moments = PeriodMoments(1, len(self._judge.bins), 1.0)
         self._output = np.zeros(self._judge.mains.bins.size, dtype=np.complex128)
         self._periods = 0
 
@@ -196,7 +196,7 @@ class RepeatingErrors(PeriodCutter):
         return list(accumulate(range(len(ends)), lambda now, number: changed.get(number, now), initial=begun))[1:]
 
     def _spectra(self, periods: Periods, use: NDArray[np.int64], start: int) -> _Spectra:
-        signals = periods.signals[:, use]
+        signals = periods.signals if use.size == len(periods.complete) else periods.signals[:, use]
         every = np.fft.rfft(signals)
         three = self._judge.spectra(every)[self._three]
         return _Spectra(every, three, signals[0], use, start + periods.stop[use] - 1)
@@ -232,7 +232,7 @@ class RepeatingErrors(PeriodCutter):
         while done < len(spectra):
             part = spectra[done : done + together]
             if moments := self._add(part):
-                count = len(moments.weight)
+                count = len(moments.weights.one)
                 yield from self._verdicts(part[:count], moments, block)
                 done, together = done + count, 2 * together
             else:  # another phase: compare the next ones with this one, of which there may be few
@@ -315,7 +315,7 @@ def _update(moments: PeriodMoments, spectra: _Spectra) -> Moments:
     output, _, reference = spectra.three
     powers = np.zeros((4, *output.shape))
     powers[:2] = power(reference), power(output)
-    return moments.update(0, spectra.three, powers, np.zeros((3, len(output))), np.ones(len(output), dtype=np.bool_))
+    return moments.add(0, spectra.three, powers)
 
 
 def _time_s(block: Block, sample: int) -> float:

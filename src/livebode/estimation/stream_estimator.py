@@ -84,6 +84,11 @@ class StreamEstimator(StatefulBase, Generic[W]):
         """Remaining responses at the end: always an empty batch; None where no samples came."""
         return self._nothing
 
+    def _ends_with(self, responses: Responses) -> None:
+        """What `finish` returns after these responses: an empty batch with their unit."""
+        if self._nothing is None or self._nothing.unit != responses.unit:
+            self._nothing = responses[0:0]
+
     def _state(self) -> dict[str, Any]:
         return dict(self._parts)
 

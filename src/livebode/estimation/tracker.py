@@ -149,7 +149,7 @@ class Tracker(StreamEstimator[InputStatistics]):
             ripple = ripple_power(s.ripple, s.lines, self._speed.at(schedule, rows.sample - block.start))
         aside = contains(self._aside, rows.sample - s.lines.window + 1, rows.sample) if len(self._aside) else None
         responses = self._lines.process(rows, place, centre, block.channels, repeating, ripple, aside)
-        self._nothing = responses[0:0]
+        self._ends_with(responses)
         self._end = block.stop - 1, block.origin_s + (block.stop - 1) / block.rate_hz
         hand_over(self._events, emit)
         return responses

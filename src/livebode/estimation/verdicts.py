@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Lines, QuantityKind
-from livebode.estimation.detection import times
 from livebode.estimation.distortion import Distortion, reached
 from livebode.estimation.mains import mains_of
 from livebode.estimation.moments import Moments
+from livebode.estimation.products import times
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
 
@@ -135,7 +135,7 @@ class Judge:
         exceeds = distortion > _DISTORTED * np.abs(numerator / denominator)
         counts = 2 * np.abs(numerator) / self._window / steps
         # Noise larger than the steps carries any amplitude over them.
-        quiet = moments.scatter[0, :, self.lines] / moments.unbiased[:, np.newaxis] < of_steps
+        quiet = moments.scatter[0, :, self.lines] / moments.weights.unbiased[:, np.newaxis] < of_steps
         coarse = (counts < _STEPS) & quiet
         against = np.stack([exceeds, silent | self.mains.seen(output), coarse], axis=1)
         for row in np.flatnonzero(exceeds.any(axis=1)).tolist():

@@ -6,7 +6,9 @@ nats-py's own `fetch` asks and waits for each message with a task and a timer, w
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from livebode.fleet.server_config import PAYLOAD_BYTES_MAX
@@ -14,13 +16,14 @@ from livebode.fleet.server_config import PAYLOAD_BYTES_MAX
 if TYPE_CHECKING:
     from nats.aio.client import Client
     from nats.aio.msg import Msg
-    from nats.js import JetStreamContext
 
 MESSAGES_MAX = 1024
 _BYTES_MAX = 2 * PAYLOAD_BYTES_MAX
 """More than any message, or the server would never deliver it."""
-_EXPIRES_S = 30.0
-_REQUEST = json.dumps({"batch": MESSAGES_MAX, "max_bytes": _BYTES_MAX, "expires": round(_EXPIRES_S * 1e9)}).encode()
+_REQUEST = json.dumps({"batch": MESSAGES_MAX, "max_bytes": _BYTES_MAX, "no_wait": True}).encode()
+_ANSWER_S, _LOOK_S = 5.0, 0.25
+_ENDS = {"404", "408", "409 Message Size Exceeds MaxBytes"}
+"""Status of a request that is answered: nothing more is there, or no more fits."""
 _ACK = "$JS.ACK."
 
 
@@ -58,32 +61,33 @@ class Delivery(NamedTuple):
         return cls(number, delivered, stored_ns / 1e9, pending)
 
 
-class Consumer:
-    """Asks the server for messages, some hundreds at a time, and collects what comes.
+class ConsumerLostError(Exception):
+    """The server no longer has the consumer, or may have delivered something that did not arrive."""
 
-    There is never more than one request at the server, and the next one is sent when the messages of the last one are
-    taken: this bounds the memory.
+
+class Consumer:
+    """Asks the server for what it has, and collects the answer.
+
+    A request whose answer comes in one piece costs little more with a thousand messages than with one. There is never
+    more than one at the server, which bounds the memory.
 
     Parameters
     ----------
-    connection, streams
-        Of the log.
-    stream, name
-        Of the consumer at the server.
+    connection
+        To the server.
     request_subject
-        To which its requests are sent.
+        To which the requests to the server's consumer are sent.
     """
 
-    def __init__(
-        self, connection: Client, streams: JetStreamContext, stream: str, name: str, request_subject: str
-    ) -> None:
-        self._connection, self._streams = connection, streams
-        self._stream, self._name, self._request_subject = stream, name, request_subject
+    def __init__(self, connection: Client, request_subject: str) -> None:
+        self._connection, self._request_subject = connection, request_subject
         self._inbox = connection.new_inbox()
+        self._connected = connection.stats["reconnects"]
         self._subscription: Any = None
-        self._due = 0
+        self._missing = 0
         self._arrived: list[Msg] = []
-        self._news = asyncio.Event()
+        self._end = ""
+        self._ended = asyncio.Event()
 
     async def open(self) -> None:
         """Begin to receive."""
@@ -93,43 +97,45 @@ class Consumer:
         """End receiving. The server removes a consumer that nobody asks."""
         await self._subscription.unsubscribe()
 
-    async def take(self, timeout_s: float) -> list[Msg]:
-        """What has arrived since the last call; if nothing has, wait at most `timeout_s` for it."""
-        await self._ask()
-        if not self._arrived and timeout_s > 0:
-            try:
-                await asyncio.wait_for(self._news.wait(), timeout_s)
-            except TimeoutError:
-                return []
-        found, self._arrived = self._arrived, []
-        self._news.clear()
-        await self._ask()
-        return found
+    async def ask(self) -> None:
+        """Send a request, if none is sent."""
+        if not self._missing:
+            self._missing = MESSAGES_MAX
+            self._end = ""
+            self._ended.clear()
+            await self._connection.publish(self._request_subject, _REQUEST, reply=self._inbox)
 
-    async def state(self) -> tuple[int, int]:
-        """Number of messages that the server has for it, and of its requests there.
+    async def answer(self) -> list[Msg]:
+        """What the server had when it received the request, at most `MESSAGES_MAX` messages.
 
         Raises
         ------
-        nats.errors.Error, TimeoutError
-            If it no longer exists, or the server does not answer.
+        ConsumerLostError
+            If the server does not answer, or no longer has the consumer.
         """
-        info = await self._streams.consumer_info(self._stream, self._name)
-        return info.num_pending or 0, info.num_waiting or 0
+        until_s = time.monotonic() + _ANSWER_S
+        while not self._ended.is_set() and time.monotonic() < until_s and self._unbroken:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._ended.wait(), _LOOK_S)
+        if self._end not in _ENDS or not self._unbroken:
+            raise ConsumerLostError(self._end)
+        found, self._arrived, self._missing = self._arrived, [], 0
+        return found
 
-    def ask_again(self) -> None:
-        """The request was lost: the next `take` sends another one."""
-        self._due = 0
-
-    async def _ask(self) -> None:
-        if self._due <= 0:
-            self._due = MESSAGES_MAX
-            await self._connection.publish(self._request_subject, _REQUEST, reply=self._inbox)
+    @property
+    def _unbroken(self) -> bool:
+        return self._connection.stats["reconnects"] == self._connected
 
     async def _receive(self, message: Msg) -> None:
         if message.reply.startswith(_ACK):
-            self._due -= 1
             self._arrived.append(message)
-            self._news.set()
+            self._missing -= 1
+            if self._missing:
+                return
+            self._end = "404"
         else:
-            self._due = 0  # the end of the request: its time or its bytes are used up, or there is no such consumer
+            status = message.headers or {}
+            self._end = status.get("Status", "")
+            if self._end == "409":
+                self._end += " " + status.get("Description", "")
+        self._ended.set()

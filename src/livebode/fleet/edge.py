@@ -33,17 +33,26 @@ class Edge:
         Of the axis.
     buffer
         To which the batches are appended.
+    message_bytes_max
+        Size of the largest message that the log accepts; a larger one is dropped.
     """
 
-    def __init__(self, key: str, buffer: EdgeBuffer) -> None:
-        self._key, self._buffer = key, buffer
+    def __init__(self, key: str, buffer: EdgeBuffer, message_bytes_max: int = LogSection().message_bytes_max) -> None:
+        self._key, self._buffer, self._message_bytes_max = key, buffer, message_bytes_max
         self._dropped = buffer.dropped
         self.sent = 0
         """Messages that the log has stored."""
 
     def take(self, batch: AnyBatch) -> None:
         """Append a batch to the buffer; may be called from any thread."""
-        self._buffer.append(write_message(batch))
+        message = write_message(batch)
+        if len(message) > self._message_bytes_max:
+            _logger.warning(
+                "a message of %d kB was dropped: log.message_kb is %g; send shorter blocks",
+                len(message) / 1e3, self._message_bytes_max / 1e3,
+            )  # fmt: skip
+            return
+        self._buffer.append(message)
         if self._buffer.dropped > self._dropped:
             lost, self._dropped = self._buffer.dropped - self._dropped, self._buffer.dropped
             _logger.warning("the buffer is full: the oldest %d messages were deleted", lost)
@@ -108,7 +117,7 @@ def send_sources(settings: FleetSettings, sources: Mapping[str, LiveSource], sto
     """
     bytes_max = round(settings.edge.buffer_gb * 1e9 / max(1, len(sources)))
     buffers = {key: EdgeBuffer(settings.edge.buffer / key, bytes_max) for key in sources}
-    edges = {key: Edge(key, buffer) for key, buffer in buffers.items()}
+    edges = {key: Edge(key, buffer, settings.log.message_bytes_max) for key, buffer in buffers.items()}
     with ThreadPoolExecutor(max(1, len(sources)), "livebode source") as threads:
         taking = [threads.submit(_take_all, source, edges[key]) for key, source in sources.items()]
         try:

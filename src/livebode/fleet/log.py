@@ -14,11 +14,13 @@ from typing import Any, TypeVar
 from livebode.fleet import subjects
 from livebode.fleet.connecting import connected
 from livebode.fleet.consumer import Consumer
+from livebode.fleet.partition_count import description_of, partitions_changed, partitions_of
 from livebode.fleet.settings import LogSection
 
 _logger = logging.getLogger(__name__)
-_EXPECTED, _WRITE = "Nats-Expected-Last-Subject-Sequence", "Livebode-Write"
+_EXPECTED, _IDENTITY, _WRITE = "Nats-Expected-Last-Subject-Sequence", "Nats-Msg-Id", "Livebode-Write"
 _WRONG_LAST_SEQUENCE = 10071
+_LIMITS = ("max_bytes", "max_age", "max_msgs_per_subject", "num_replicas")
 _REQUEST_S, _RETRY_S, _RETRY_S_MAX = 2.0, 0.1, 1.0
 _DUPLICATES_S = 120.0
 T = TypeVar("T")
@@ -88,8 +90,8 @@ class FleetLog:
         with contextlib.suppress(self._nats.errors.Error, asyncio.TimeoutError):
             await self._connection.close()
 
-    async def create_streams(self) -> None:
-        """Create the streams of a fleet where they are missing."""
+    async def create_streams(self, *, update: bool = False) -> None:
+        """Create the streams of a fleet where they are missing; `update`: give existing ones the limits of today."""
         from nats.js import api
 
         each = self.settings.replicas
@@ -101,6 +103,7 @@ class FleetLog:
                 subjects=[f"{subjects.LOG}.>"],
                 max_bytes=round(self.settings.size_gb * 1e9),
                 max_age=self.settings.age_days * 86400,
+                max_msgs_per_subject=self.settings.axis_messages,
                 duplicate_window=_DUPLICATES_S,
                 **common,
             ),
@@ -114,22 +117,42 @@ class FleetLog:
             api.StreamConfig(name=subjects.STATUS_STREAM, subjects=[f"{subjects.STATUS}.*"], **newest),
         ]
         for stream in streams:
-            await self._create(stream)
+            await self._create(stream, update)
 
-    async def _create(self, stream: Any) -> None:
+    async def _create(self, stream: Any, update: bool) -> None:
         from nats.js.errors import NotFoundError
 
         async def create() -> None:
             try:
-                await self._js.stream_info(stream.name)
+                found = (await self._js.stream_info(stream.name)).config
             except NotFoundError:
                 await self._js.add_stream(stream)
+                return
+            limits = {name: getattr(stream, name) for name in _LIMITS if getattr(stream, name) is not None}
+            if update and any(getattr(found, name) != value for name, value in limits.items()):
+                await self._js.update_stream(found.evolve(**limits))
 
         await self._repeated(create)
 
+    async def use_partitions(self, count: int) -> None:
+        """Record in the log how many partitions the fleet has.
+
+        Raises
+        ------
+        FleetError
+            If the log has data in another number of partitions.
+        """
+        info = await self._repeated(lambda: self._js.stream_info(subjects.LOG_STREAM))
+        before = partitions_of(info.config.description)
+        if before is not None and before != count and info.state.messages:
+            raise partitions_changed(before, count)
+        if before != count:
+            config = info.config.evolve(description=description_of(count))
+            await self._repeated(lambda: self._js.update_stream(config))
+
     async def append(self, subject: str, data: bytes, identity: str | None = None) -> int:
         """Store a message, and return its number; one with the `identity` of a recent one is stored only once."""
-        headers = {"Nats-Msg-Id": identity} if identity else None
+        headers = {_IDENTITY: identity} if identity else None
         ack = await self._repeated(lambda: self._js.publish(subject, data, headers=headers, timeout=_REQUEST_S))
         return int(ack.seq)
 
@@ -144,27 +167,33 @@ class FleetLog:
         This is the fence: of two processes that both own a partition, one is refused. A write whose outcome is not
         known, because the server did not answer, is looked up, and repeated only if it did not arrive.
 
+        Servers in a cluster compare `after` before they agree on the order of two writes, so both can pass (nats-server
+        issue 4320). Therefore `after` is the identity of the write too: of two with the same one, which are compared
+        when they are stored, the second is dropped as a repeat.
+
         Raises
         ------
         ClaimLostError
             If another process has stored a message there.
         """
         write = uuid.uuid4().hex
-        headers = {_EXPECTED: str(after), _WRITE: write}
+        headers = {_EXPECTED: str(after), _WRITE: write, _IDENTITY: f"{subject}:{after}"}
         pause_s = _RETRY_S
         while True:
             try:
-                return int((await self._js.publish(subject, data, headers=headers, timeout=_REQUEST_S)).seq)
+                ack = await self._js.publish(subject, data, headers=headers, timeout=_REQUEST_S)
+                if not ack.duplicate:
+                    return int(ack.seq)
             except (TimeoutError, self._nats.errors.Error) as error:
                 if getattr(error, "err_code", None) != _WRONG_LAST_SEQUENCE:
                     self._report(error)
-                    await asyncio.sleep(pause_s)
-                    pause_s = min(2 * pause_s, _RETRY_S_MAX)
             last = await self.last(stream, subject)
             if last is not None and last.write == write:
                 return last.number
             if (0 if last is None else last.number) != after:
                 raise ClaimLostError(subject)
+            await asyncio.sleep(pause_s)
+            pause_s = min(2 * pause_s, _RETRY_S_MAX)
 
     async def last(self, stream: str, subject: str) -> StoredMessage | None:
         """The newest message of a subject."""
@@ -210,7 +239,7 @@ class FleetLog:
             mem_storage=True,
         )
         await self._js.add_consumer(stream, config)
-        consumer = Consumer(self._connection, self._js, stream, name, f"{self._api}.CONSUMER.MSG.NEXT.{stream}.{name}")
+        consumer = Consumer(self._connection, f"{self._api}.CONSUMER.MSG.NEXT.{stream}.{name}")
         await consumer.open()
         return consumer
 

@@ -23,6 +23,7 @@ from livebode.fleet.page_status import PageStatus
 from livebode.fleet.reader import Reader
 from livebode.fleet.result_message import PendingResults, ResultMessage
 from livebode.fleet.server_config import PAYLOAD_BYTES_MAX
+from livebode.fleet.stored_states import StoredStates
 from livebode.fleet.subjects import (
     LOG,
     LOG_STREAM,
@@ -39,10 +40,6 @@ RESULTS_S = 0.4
 """Time between two messages of results. What arrives meanwhile is processed together."""
 STATUS_S = 1.0
 _READ_S = 0.1
-STATE_S_MIN = 2.0
-"""Least time between two states of an axis."""
-STATE_SHARE = 0.08
-"""Most bytes of states, as a share of the bytes of the machines' data."""
 _PENDING_BYTES_MAX = 1 << 20
 _GOLDEN = 0.618
 """Multiples of it, without their whole part, are far from each other."""
@@ -75,7 +72,7 @@ class PartitionOwner:
         self._pending = PendingResults()
         self._result = 0
         self._through = 0
-        self._stored = _StoredStates()
+        self._stored = StoredStates()
         self._status_due_s = 0.0
         self._since_s = time.time()
         self._newest_s = 0.0
@@ -162,7 +159,11 @@ class PartitionOwner:
         """Process messages until their results are enough for a message of results; returns the others."""
         stored = bisect_right(messages, self._through, key=lambda message: message.number)
         streams, taken = self._take(messages[:stored] or messages)
-        for (key, stream), output in zip(streams.items(), outputs_together([*streams.values()])):
+        began_s = time.thread_time()
+        outputs = outputs_together([*streams.values()])
+        each_s = (time.thread_time() - began_s) / max(1, len(streams))
+        for (key, stream), output in zip(streams.items(), outputs):
+            self._stored.took(key, 0, each_s)
             if not stored:
                 self._pending.add(key, stream, output)
         return messages[taken:]
@@ -181,8 +182,9 @@ class PartitionOwner:
             key = key_of(message.subject)
             stream = self._stream(key, message.number)
             if stream is not None and message.number > stream.position:
+                began_s = time.thread_time()
                 size += stream.take(message.data, message.number, message.stored_s)
-                self._stored.took(key, len(message.data))
+                self._stored.took(key, len(message.data), time.thread_time() - began_s)
                 streams[key] = stream
         return streams, len(messages)
 
@@ -218,14 +220,13 @@ class PartitionOwner:
 
     async def _store_states(self, *, all_of_them: bool = False) -> None:
         """Store states that are due. Nothing is pending, so the results that they depend on are stored."""
-        for key, stream in self._streams.items():
-            if all_of_them or self._stored.due(key):
-                state = await asyncio.to_thread(stream.snapshot)
-                if len(state) <= PAYLOAD_BYTES_MAX:
-                    await self._log.append(self._state_subject(key), state)
-                else:  # an older one remains, and a takeover computes more again
-                    _logger.warning("the state of %s is too large for the log: %d bytes", axis_path(key), len(state))
-                self._stored.stored(key, len(state))
+        for key in list(self._streams) if all_of_them else self._stored.due():
+            state = await asyncio.to_thread(self._streams[key].snapshot)
+            if len(state) <= PAYLOAD_BYTES_MAX:
+                await self._log.append(self._state_subject(key), state)
+            else:  # an older one remains, and a takeover computes more again
+                _logger.warning("the state of %s is too large for the log: %d bytes", axis_path(key), len(state))
+            self._stored.stored(key, len(state))
 
     async def _append(self, message: ResultMessage) -> int:
         return await self._log.append_after(RESULT_STREAM, self._subject, message.to_bytes(), self._result)
@@ -238,7 +239,7 @@ class PartitionOwner:
         return f"{STATES}.{self._number}.{key}"
 
     async def _publish_status(self, waiting: int) -> None:
-        lag_s = max(0.0, time.time() - self._newest_s) if waiting else 0.0
+        lag_s = max(0.0, time.time() - (self._newest_s or self._since_s)) if waiting else 0.0
         for subject, message in self._page.messages(self._streams, time.time(), waiting, lag_s):
             await self._log.publish(subject, message)
         about = {
@@ -253,33 +254,6 @@ class PartitionOwner:
             "axes": {key: _axis_status(stream) for key, stream in self._streams.items()},
         }
         await self._log.append(f"{STATUS}.{self._number}", json.dumps(about).encode())
-
-
-class _StoredStates:
-    """When the state of each axis is stored again: when its data since then are many times as large.
-
-    A takeover computes again what came since the last state, so a large state costs a longer takeover instead of more
-    bytes.
-    """
-
-    def __init__(self) -> None:
-        self._since: dict[str, int] = {}
-        self._sizes: dict[str, int] = {}
-        self._stored_s: dict[str, float] = {}
-
-    def took(self, key: str, size_bytes: int) -> None:
-        self._since[key] = self._since.get(key, 0) + size_bytes
-
-    def restored(self, key: str, size_bytes: int) -> None:
-        self._sizes[key] = size_bytes
-
-    def stored(self, key: str, size_bytes: int) -> None:
-        self._sizes[key], self._since[key], self._stored_s[key] = size_bytes, 0, time.monotonic()
-
-    def due(self, key: str) -> bool:
-        since = self._since.get(key, 0)
-        rested = time.monotonic() - self._stored_s.get(key, -STATE_S_MIN) >= STATE_S_MIN
-        return since > 0 and rested and STATE_SHARE * since >= self._sizes.get(key, 0)
 
 
 def _axis_status(stream: AxisStream) -> dict[str, Any]:

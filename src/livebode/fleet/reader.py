@@ -5,11 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import time
 from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING
 
-from livebode.fleet.consumer import Consumer, Delivery
+from livebode.fleet.consumer import Consumer, ConsumerLostError, Delivery
 from livebode.fleet.log import FleetLog, StoredMessage
 
 if TYPE_CHECKING:
@@ -18,8 +17,6 @@ if TYPE_CHECKING:
 _logger = logging.getLogger(__name__)
 _INACTIVE_S = 60.0
 _READ_S = 0.2
-_DOUBT_S = 1.0
-"""Silence after which the server is asked whether it still has the consumer."""
 
 
 class Reader:
@@ -42,41 +39,40 @@ class Reader:
         self._log, self._stream, self._subject = log, stream, subject
         self.next = first
         """Number after the last message that was returned."""
-        self.pending = 0
-        """Messages that the server had beyond the last one returned."""
+        self.pending = 1
+        """Messages that the server had beyond the last one returned; at least one while the server was not asked."""
         self._consumer: Consumer | None = None
         self._delivered = 0
-        self._heard_s = 0.0
 
     async def read(self, timeout_s: float) -> list[StoredMessage]:
-        """The next messages, all that have arrived; if none have, wait at most `timeout_s` for them."""
+        """The next messages; if there are none, nothing after `timeout_s`."""
         try:
             if self._consumer is None:
-                await self._subscribe()
-            assert self._consumer is not None
-            found = await self._consumer.take(timeout_s)
-            if not found and time.monotonic() - self._heard_s > _DOUBT_S:
-                await self._doubt(self._consumer)
-        except (TimeoutError, self._log.errors):
+                self._consumer = await self._log.consumer(self._stream, self._subject, self.next, _INACTIVE_S)
+                self._delivered = 0
+            await self._consumer.ask()
+            found = await self._checked(await self._consumer.answer())
+            if self.pending and self._consumer is not None:
+                await self._consumer.ask()  # the server answers while these are processed
+        except (TimeoutError, ConsumerLostError, self._log.errors):
             await self.close()
             await asyncio.sleep(max(timeout_s, _READ_S))
             return []
-        return await self._checked(found)
+        if not found:
+            await asyncio.sleep(timeout_s)
+        return found
 
     async def close(self) -> None:
         """End reading."""
         consumer, self._consumer = self._consumer, None
+        self.pending = max(1, self.pending)
         if consumer is not None:
             with contextlib.suppress(self._log.errors, asyncio.TimeoutError):
                 await consumer.close()
 
-    async def _subscribe(self) -> None:
-        self._consumer = await self._log.consumer(self._stream, self._subject, self.next, _INACTIVE_S)
-        self._delivered, self._heard_s = 0, time.monotonic()
-        self.pending, _ = await self._consumer.state()
-
     async def _checked(self, found: list[Msg]) -> list[StoredMessage]:
-        messages = []
+        messages: list[StoredMessage] = []
+        self.pending = 0
         for message in found:
             about = Delivery.of(message.reply)
             if about.delivered != self._delivered + 1:
@@ -86,18 +82,7 @@ class Reader:
             self._delivered += 1
             messages.append(StoredMessage(message.subject, about.number, message.data, "", about.stored_s))
             self.next, self.pending = about.number + 1, about.pending
-        if messages:
-            self._heard_s = time.monotonic()
         return messages
-
-    async def _doubt(self, consumer: Consumer) -> None:
-        """After a silence, find out whether there is nothing to read or nothing to read it with."""
-        pending, requests = await consumer.state()
-        self._heard_s = time.monotonic()
-        if pending:
-            await self.close()
-        elif not requests:
-            consumer.ask_again()
 
 
 async def stored_messages(

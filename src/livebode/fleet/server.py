@@ -12,6 +12,7 @@ from pathlib import Path
 
 from livebode.core.errors import FleetError
 from livebode.fleet.server_access import OPEN, ServerAccess
+from livebode.fleet.server_cluster import ClusterMember
 from livebode.fleet.server_config import server_configuration
 
 _START_S, _STEP_S = 10.0, 0.02
@@ -30,6 +31,8 @@ class LogServer:
         Most bytes of all streams.
     access
         Who may do what. Default: everyone everything.
+    member
+        Which server of a cluster it is. Default: the only one.
 
     Raises
     ------
@@ -38,9 +41,14 @@ class LogServer:
     """
 
     def __init__(
-        self, directory: Path, partitions: int, file_bytes_max: int = 4 << 30, access: ServerAccess = OPEN
+        self,
+        directory: Path,
+        partitions: int,
+        file_bytes_max: int = 4 << 30,
+        access: ServerAccess = OPEN,
+        member: ClusterMember | None = None,
     ) -> None:
-        self._directory, self._port = directory, _free_port()
+        self._directory, self._port = directory, free_port()
         self._process: subprocess.Popen[bytes] | None = None
         self._scheme = "nats" if access.server.certificate is None else "tls"
         directory.mkdir(parents=True, exist_ok=True)
@@ -53,6 +61,7 @@ class LogServer:
                 host="127.0.0.1",
                 file_bytes_max=file_bytes_max,
                 access=access,
+                member=member,
             )
         )
 
@@ -114,7 +123,8 @@ class LogServer:
         return True
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port of the loopback at which nothing listens."""
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return int(found.getsockname()[1])

@@ -9,10 +9,11 @@ from urllib.parse import quote
 
 from livebode.core.errors import FleetError
 from livebode.fleet.page_status import NAMES, VIEW
-from livebode.fleet.settings import FleetSettings, ServerSection, UsersSection, on_loopback
+from livebode.fleet.settings import FleetSettings, LogSection, ServerSection, UsersSection, on_loopback
 from livebode.fleet.subjects import API, EDGE, VIEW_API, axis_path
 
 _FLEET, _VIEW = "FLEET", "VIEW"
+_CONNECTIONS_MORE, _SUBSCRIPTIONS = 4, 4
 _VIEWED = ("STREAM.INFO.*", "STREAM.MSG.GET.*")
 """Requests of a viewer. A consumer is not one of them: it could deliver to any subject of the log's account."""
 
@@ -29,11 +30,14 @@ class ServerAccess:
     ----------
     axes
         Keys of the axes of the fleet.
+    message_bytes_max
+        Size of the largest message of an edge.
     """
 
     server: ServerSection
     users: UsersSection
     axes: Sequence[str]
+    message_bytes_max: int = LogSection().message_bytes_max
 
     def lines(self, mappings: str) -> list[str]:
         """Lines of the configuration of nats-server; `mappings` belong to the account of the log."""
@@ -59,8 +63,19 @@ class ServerAccess:
         text += [_list("exports", exports), "  }", f"  {_VIEW} {{", _users(self.users.view), _list("imports", viewed)]
         for path, subjects in edges.items():
             text += ["  }", f"  {json.dumps(_account(path))} {{", _users(self.users.edges[path])]
+            text += [self._limits(len(subjects))]
             text += [_list("imports", map(_import, subjects))]
         return [*text, "  }", "}"]
+
+    def _limits(self, axes: int) -> str:
+        """What the account of an edge may use: a connection for each axis, twice because old ones may linger."""
+        connections = 2 * axes + _CONNECTIONS_MORE
+        limits = {
+            "max_connections": connections,
+            "max_subscriptions": connections * _SUBSCRIPTIONS,
+            "max_payload": self.message_bytes_max,
+        }
+        return "    limits { " + ", ".join(f"{name}: {value}" for name, value in limits.items()) + " }"
 
     def _allowed(self, path: str) -> list[str]:
         """Subjects of the axes at or below a path; FleetError if there are none."""
@@ -95,7 +110,8 @@ def server_access(settings: FleetSettings, host: str) -> ServerAccess:
             "set server.certificate, server.key and users.fleet; `livebode fleet credentials` makes keys",
             host=host,
         )
-    return ServerAccess(settings.server, settings.users, list(settings.read_axes()) if settings.users.edges else [])
+    axes = list(settings.read_axes()) if settings.users.edges else []
+    return ServerAccess(settings.server, settings.users, axes, settings.log.message_bytes_max)
 
 
 def _account(path: str) -> str:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from livebode.fleet.server_access import OPEN, ServerAccess
+from livebode.fleet.server_cluster import ClusterMember
 from livebode.fleet.subjects import EDGE, LEVELS, LOG
 
 PAYLOAD_BYTES_MAX = 8 << 20
@@ -14,7 +15,14 @@ _MEMORY_BYTES = 64 << 20
 
 
 def server_configuration(
-    store: Path, *, partitions: int, port: int, host: str, file_bytes_max: int, access: ServerAccess = OPEN
+    store: Path,
+    *,
+    partitions: int,
+    port: int,
+    host: str,
+    file_bytes_max: int,
+    access: ServerAccess = OPEN,
+    member: ClusterMember | None = None,
 ) -> str:
     """The text of nats-server's configuration.
 
@@ -30,6 +38,8 @@ def server_configuration(
         Most bytes of all streams. A full disk stops the server without a message, so this must be well below its size.
     access
         Who may do what. Default: everyone everything, for a server on the loopback.
+    member
+        Which server of a cluster it is. Default: the only one.
     """
     places = ",".join(str(level + 1) for level in range(LEVELS))
     tokens = ".".join(f"{{{{wildcard({level + 1})}}}}" for level in range(LEVELS))
@@ -44,6 +54,7 @@ def server_configuration(
             f"  max_file_store: {file_bytes_max}",
             f"  max_memory_store: {_MEMORY_BYTES}",
             "}",
+            *(member.lines(host) if member else []),
             *access.lines(f"mappings = {{ {json.dumps(edge)}: {json.dumps(mapped)} }}"),
             "",
         ]

@@ -53,6 +53,11 @@ class LogSection(_Section):
         Longest time that data of the machines are in the log.
     replicas
         Copies of the log in a cluster of servers: 3 survive the loss of one.
+    axis_messages
+        Most messages of one axis in the log; its own oldest are deleted then, so that one edge cannot displace the data
+        of the others. Default: ten per second for a week.
+    message_kb
+        Size of the largest message of an edge, in kB. A larger one is dropped.
     """
 
     url: str = "nats://127.0.0.1:4222"
@@ -63,11 +68,18 @@ class LogSection(_Section):
     results_gb: Positive = 10.0
     age_days: Positive = 7.0
     replicas: Annotated[int, Field(ge=1, le=5)] = 1
+    axis_messages: Annotated[int, Field(ge=1)] = 6_048_000
+    message_kb: Annotated[float, Field(gt=0, le=8192)] = 1024.0
 
     @property
     def encrypted(self) -> bool:
         """Whether the connection uses TLS."""
         return self.url.startswith("tls://")
+
+    @property
+    def message_bytes_max(self) -> int:
+        """Size of the largest message of an edge."""
+        return round(self.message_kb * 1e3)
 
     def checked(self) -> None:
         """ConfigError if the address is not one of nats-server, has a password, or is not encrypted on a network."""
@@ -111,10 +123,17 @@ class ServerSection(_Section):
         Certificate of the server in PEM, relative to this file. Required off the loopback.
     key
         Its private key in PEM, relative to this file.
+    cluster
+        Addresses HOST:PORT at which the servers of a cluster reach each other, all of them in the same order.
+    authority
+        Certificate of the authority that signed those of the other servers of the cluster, in PEM, relative to this
+        file. Required off the loopback.
     """
 
     certificate: File | None = None
     key: File | None = None
+    cluster: list[Annotated[str, Field(pattern=r"^[^\s:/]+:\d{1,5}$")]] = []
+    authority: File | None = None
 
 
 class UsersSection(_Section):
@@ -202,7 +221,7 @@ class FleetSettings(_Section):
                 "axes": [str(folder / pattern) for pattern in self.axes],
                 "edge": edge,
                 "log": self.log.beside(folder),
-                "server": _beside(self.server, folder, "certificate", "key"),
+                "server": _beside(self.server, folder, "certificate", "key", "authority"),
             }
         )
 

@@ -19,6 +19,7 @@ from livebode.fleet.subjects import (
     STATUS,
     STATUS_STREAM,
     axis_path,
+    key_of,
 )
 
 SILENT_S = 10.0
@@ -46,13 +47,22 @@ async def fleet_status(log: FleetLog, axes: Mapping[str, Axis]) -> dict[str, Any
     full = extent.size_bytes / (log.settings.size_gb * 1e9)
     share = full * waiting / max(1, sum(extent.subjects.values()))
     about_log = {"messages": sum(extent.subjects.values()), "bytes": extent.size_bytes, "full_share": full}
+    quota = log.settings.axis_messages
+    full_axes = [axis_path(key_of(subject)) for subject, count in sorted(extent.subjects.items()) if count >= quota]
     silent = [axis_path(key) for key in axes if key not in found]
     return {
         "partitions": partitions,
         "axes": sorted(found.values(), key=lambda axis: str(axis["axis"])),
         "without_data": silent,
-        "log": about_log | {"waiting": waiting, "backlog_share": share},
-        "alarms": _alarms(partitions, list(found.values()), share),
+        "log": about_log | {"waiting": waiting, "backlog_share": share, "full_axes": full_axes},
+        "alarms": [
+            *_alarms(partitions, list(found.values()), share),
+            *(
+                f"{path} has log.axis_messages = {quota} messages in the log: its oldest are deleted, those of others "
+                "are not; check its edge"
+                for path in full_axes
+            ),
+        ],
     }
 
 

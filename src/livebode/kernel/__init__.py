@@ -1,7 +1,41 @@
-"""The sliding DFT in C, and its NumPy twin (`livebode.kernel.twin`), the readable definition."""
+"""The sliding DFT and the line stage in C, and their NumPy twins, the readable definitions.
+
+The twins are `livebode.kernel.twin` and `livebode.kernel.line_twin`.
+"""
 
 from livebode.kernel._instructions import VARIABLE as INSTRUCTION_SET_VARIABLE
 from livebode.kernel._instructions import instruction_set, instruction_sets
+from livebode.kernel._lines import (
+    MEANS,
+    NOISE_LARGER,
+    NOISE_MOVING,
+    NOISE_SCATTER,
+    SCATTER,
+    LineMoments,
+    LineRows,
+    LineSettings,
+    LineWindows,
+    WeightSums,
+    add_windows,
+    process_lines,
+)
 from livebode.kernel._sliding import SlidingDFT
 
-__all__ = ["INSTRUCTION_SET_VARIABLE", "SlidingDFT", "instruction_set", "instruction_sets"]
+__all__ = [
+    "INSTRUCTION_SET_VARIABLE",
+    "MEANS",
+    "NOISE_LARGER",
+    "NOISE_MOVING",
+    "NOISE_SCATTER",
+    "SCATTER",
+    "LineMoments",
+    "LineRows",
+    "LineSettings",
+    "LineWindows",
+    "SlidingDFT",
+    "WeightSums",
+    "add_windows",
+    "instruction_set",
+    "instruction_sets",
+    "process_lines",
+]

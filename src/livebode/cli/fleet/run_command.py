@@ -23,11 +23,12 @@ def run_command(fleet: Fleet, as_json: Json = False) -> None:
     settings = FleetSettings.read(fleet)
     axes = settings.read_axes()
 
-    async def create_streams() -> None:
+    async def prepare() -> None:
         async with FleetLog(settings.log, "livebode run") as log:
-            await log.create_streams()
+            await log.create_streams(update=True)
+            await log.use_partitions(settings.partitions)
 
-    asyncio.run(create_streams())
+    asyncio.run(prepare())
     with FleetCoordinator(settings, axes) as coordinator:
         if not as_json:
             print(f"{settings.workers} workers share {settings.partitions} partitions of {len(axes)} axes; Ctrl-C ends")

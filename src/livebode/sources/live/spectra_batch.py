@@ -109,10 +109,13 @@ class SpectraBatch:
         """Spectra from sample `start` of the sender, which gets the number `number`."""
         skipped = (start - self.first_sample) // self.layout.hop
         layout, sums = self.layout, self.sums[:, skipped:]
-        shown = dict(zip((c.name for c in layout.signals), rms(sums, layout)))
-        shown |= dict(zip((c.name for c in layout.values), self.values[:, skipped:]))
+        data = rms(sums, layout)
+        if layout.values:
+            shown = dict(zip((c.name for c in layout.signals), data))
+            shown |= dict(zip((c.name for c in layout.values), self.values[:, skipped:]))
+            data = np.stack([shown[channel.name] for channel in self.channels])
         return LiveSpectra(
-            np.stack([shown[channel.name] for channel in self.channels]),
+            data,
             self.channels,
             self.rate_hz,
             start=number,

@@ -1,0 +1,105 @@
+/* From spectra at lines to frequency responses with their scatter: what follows the sliding DFT.
+ *
+ * Numerator and denominator of an estimate are the output's spectrum and another, each times conj(reference). Windows
+ * one period apart are a series: a period has `places`, each with its own moments. All arrays belong to the caller;
+ * arrays of spectra are pairs of re and im. The NumPy equivalent, with the same bits, is livebode.kernel.line_twin;
+ * where a result is not a number, its sign and payload are not specified.
+ */
+#ifndef LIVEBODE_LINES_H
+#define LIVEBODE_LINES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "livebode/sdft.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define LB_LINE_MEANS 10u
+#define LB_LINE_SCATTER 4u
+
+/* Sums of the forgetting weights over c windows, c = 0 … length − 1, the last ones for more: Σλ^i, Σλ^2i, Σλ^3i for
+ * i < c. All three are c itself where λ = 1; then there is no table. */
+typedef struct {
+    double forgetting;   /* λ per period, 0 < λ ≤ 1 */
+    const double *table; /* [3][length] */
+    size_t length;
+} lb_line_weights;
+
+/* Running moments: zeros before the first window. */
+typedef struct {
+    size_t places, lines;
+    int64_t *count;  /* [places], windows that were added */
+    double *means;   /* [LB_LINE_MEANS][places][lines]: re and im of numerator, denominator, reference; the powers of
+                        reference, output, noise at detection lines, denominator's signal */
+    double *scatter; /* [LB_LINE_SCATTER][places][lines]: Σλ^i·|δnum|², |δden|², re and im of δnum·conj(δden) */
+    double *moment;  /* [3][places]: means of time and schedule, number of the oldest sample; updated with averages */
+} lb_line_moments;
+
+/* Adds windows at consecutive places, from `place` on, and gives the moments after each.
+ *
+ * spectra[3][rows][lines][2]: numerator, denominator, reference; powers[4][rows][lines]; usable[rows], 0 for a window
+ * that changes nothing; after[rows] receives the count, means[LB_LINE_MEANS][rows][lines] and
+ * scatter[LB_LINE_SCATTER][rows][lines] the moments. LB_ERROR_NULL for a missing pointer, LB_ERROR_SIZE for a place
+ * that the period does not have, or no places. */
+lb_status lb_lines_add(const lb_line_weights *weights, const lb_line_moments *moments, size_t place, size_t rows,
+                       const double *spectra, const double *powers, const uint8_t *usable, int64_t *after,
+                       double *means, double *scatter);
+
+/* Where the variance of numerator − Ĝ·denominator is from. */
+typedef enum {
+    LB_NOISE_SCATTER = 0, /* the scatter between periods */
+    LB_NOISE_MOVING,      /* detection lines, in windows in which the machine moves; else the scatter */
+    LB_NOISE_LARGER       /* also without motion the detection lines, where they have more */
+} lb_line_noise;
+
+typedef struct {
+    int averages; /* the value is that of all windows so far, and not of one */
+    int direct;   /* the reference is the denominator's signal: the weight is its power */
+    lb_line_noise noise;
+    double noise_dof;     /* degrees of freedom of the noise at detection lines */
+    double dof_repeating; /* and of the errors that repeat */
+} lb_line_settings;
+
+/* Windows at consecutive places, from `place` on. Rows of spectra are `stride` complex numbers apart. */
+typedef struct {
+    size_t place, rows, stride;
+    const double *output, *denominator, *reference; /* [rows][stride][2] */
+    const double *noise;                            /* [rows][lines], power at the detection lines; NULL without */
+    const uint8_t *whole;                           /* [rows], no gap and no invalid sample */
+    const uint8_t *clean;                           /* [rows], and no spike */
+    const uint8_t *aside;                           /* [rows], nothing is learned from it; NULL without */
+    const uint8_t *moving;                          /* [rows], the machine moves; NULL if never */
+    const double *distortion; /* [rows][lines], errors that repeat, NaN where not known; NULL without */
+    const uint8_t *invalid;   /* [rows][lines], the line is invalid because of them; NULL without */
+    const double *moment;     /* [3][rows]: time, schedule, oldest sample */
+} lb_line_windows;
+
+/* For each row and line, and for each row. NaN where a value is not known. */
+typedef struct {
+    double *value;           /* [rows][lines][2] */
+    double *variance;        /* [rows][lines], of the value */
+    double *coherence;       /* [rows][lines], of reference and output, without its bias */
+    double *input_coherence; /* [rows][lines], of reference and denominator; NaN for `direct` */
+    double *weight;          /* [rows][lines][2], of the row in a mean */
+    double *distortion;      /* [rows][lines] */
+    uint8_t *valid;          /* [rows][lines] */
+    double *dof;             /* [rows] */
+    double *moment;          /* [3][rows], of what the value is of */
+    uint8_t *usable;         /* [rows], whether the window entered the moments */
+} lb_line_rows;
+
+/* Responses of the windows, whose moments are updated, and so is the largest power of the reference so far.
+ *
+ * LB_ERROR_NULL for a missing pointer, LB_ERROR_SIZE for a place that the period does not have, no places or lines, or
+ * rows that are closer than their lines. */
+lb_status lb_lines_process(const lb_line_weights *weights, const lb_line_moments *moments, double *largest,
+                           const lb_line_settings *settings, const lb_line_windows *in, const lb_line_rows *out);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,223 @@
+"""From spectra at lines to frequency responses with their scatter, in C; `livebode.kernel.line_twin` defines it.
+
+Numerator and denominator of an estimate are the spectra of the output and of another signal, each times
+conj(reference). Windows one period apart are one series: every place in the period has moments of its own.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from livebode.kernel import _native
+
+Floats = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Flags = npt.NDArray[np.bool_]
+Integers = npt.NDArray[np.int64]
+
+MEANS, SCATTER = 10, 4
+NOISE_SCATTER, NOISE_MOVING, NOISE_LARGER = range(3)
+"""Noise from the scatter between periods; where the machine moves, from detection lines; also elsewhere, if larger."""
+
+
+_SEVERAL = 1e-9  # Σv − Σv²/Σv is exactly 0 for one window, except for rounding
+
+
+class WeightSums(NamedTuple):
+    """Σλ^i, Σλ^2i and Σλ^3i over the windows of each row, shape (rows,)."""
+
+    one: Floats
+    two: Floats
+    three: Floats
+
+    @classmethod
+    def after(cls, count: Integers, forgetting: float, table: Floats) -> WeightSums:
+        """Those over so many windows, from their table (`LineSettings.weights`)."""
+        if forgetting == 1:
+            windows = count.astype(np.float64)
+            return cls(windows, windows, windows)
+        return cls(*table[:, np.minimum(count, table.shape[1] - 1)])
+
+    @property
+    def unbiased(self) -> Floats:
+        """Scatter over this is the variance of one window; NaN for fewer than two windows."""
+        with np.errstate(invalid="ignore"):
+            rest = self.one - self.two / self.one
+            return np.where(rest > _SEVERAL, rest, np.nan)
+
+    @property
+    def of_mean(self) -> Floats:
+        """Variance of the weighted mean over that of one window."""
+        with np.errstate(invalid="ignore"):
+            return self.two / (self.one * self.one)
+
+    @property
+    def dof(self) -> Floats:
+        """Complex degrees of freedom of a scatter; NaN for fewer than two windows.
+
+        Exactly m − 1 for m windows of equal weight; else matched in two moments, tr(M)²/tr(M²) with
+        M = diag(v) − vvᵀ/Σv, v = λ^i (Satterthwaite 1946).
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            unbiased, ratio = self.unbiased, self.two / self.one
+            return unbiased * unbiased / (self.two - 2 * self.three / self.one + ratio * ratio)
+
+
+class LineMoments(NamedTuple):
+    """Running moments, zeros before the first window; functions change them in place.
+
+    Attributes
+    ----------
+    windows
+        Number of windows that were added, shape (places,).
+    means
+        Means of the real and imaginary parts of numerator, denominator and reference (6) and of four powers (4), shape
+        (10, places, lines). The powers are those of reference and output, of the noise at detection lines, and of
+        the denominator's signal.
+    scatter
+        Σλ^i|δnum|², Σλ^i|δden|² and the real and imaginary part of Σλ^i·δnum·conj(δden) with δ the deviation from the
+        mean, shape (4, places, lines).
+    moment
+        Means of time and schedule of the windows' centres, and the oldest sample, shape (3, places).
+    """
+
+    windows: Integers
+    means: Floats
+    scatter: Floats
+    moment: Floats
+
+
+class LineSettings(NamedTuple):
+    """What all windows have in common.
+
+    Attributes
+    ----------
+    forgetting
+        λ per period.
+    weights
+        Σλ^i, Σλ^2i and Σλ^3i over 0, 1, 2 … windows, the last ones also for more, shape (3, any); ignored for λ = 1.
+    averages
+        Whether a value is that of all windows so far; otherwise it is that of one, whose scatter excludes it.
+    denominator, reference
+        Their places among the signals; the output is the first one.
+    noise
+        NOISE_SCATTER, NOISE_MOVING or NOISE_LARGER.
+    noise_dof
+        Degrees of freedom of the noise at detection lines.
+    """
+
+    forgetting: float
+    weights: Floats
+    averages: bool
+    denominator: int
+    reference: int
+    noise: int
+    noise_dof: float
+
+
+class LineWindows(NamedTuple):
+    """Windows at consecutive places.
+
+    Attributes
+    ----------
+    largest
+        Largest power of the reference before them.
+    place
+        Of the first one in the period.
+    spectrum
+        Shape (signals, rows, bins); the lines are the first bins.
+    noise
+        Power at the detection lines as one of numerator·conj(reference), shape (rows, lines); None without.
+    whole, clean, aside
+        Windows without a gap; also without a spike; and those from which nothing is learned, shape (rows,).
+    moving
+        Windows in which the machine moves, shape (rows,); None if never.
+    distortion, invalid
+        Errors that repeat with the excitation, and lines that are invalid because of them, shape (rows, lines).
+    dof_repeating
+        Degrees of freedom of `distortion`.
+    moment
+        Time, schedule and oldest sample, shape (3, rows).
+    """
+
+    largest: float
+    place: int
+    spectrum: Complex
+    noise: Floats | None
+    whole: Flags
+    clean: Flags
+    aside: Flags | None
+    moving: Flags | None
+    distortion: Floats | None
+    invalid: Flags | None
+    dof_repeating: float
+    moment: Floats
+
+
+class LineRows(NamedTuple):
+    """Results: shape (rows, lines), of `dof` and `usable` (rows,), of `moment` (3, rows); NaN where not known.
+
+    `variance` is that of the value, `coherence` that of reference and output and `input_coherence` that of reference
+    and denominator (NaN where they are one signal), `usable` tells which windows entered the moments.
+    """
+
+    value: Complex
+    variance: Floats
+    coherence: Floats
+    input_coherence: Floats
+    weight: Complex
+    distortion: Floats
+    valid: Flags
+    dof: Floats
+    moment: Floats
+    usable: Flags
+
+
+class MomentRows(NamedTuple):
+    """Windows so far (rows,), means (10, rows, lines) and scatter (4, rows, lines) after each window."""
+
+    windows: Integers
+    means: Floats
+    scatter: Floats
+
+
+def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWindows) -> tuple[LineRows, float]:
+    """Results of the windows, which are added to the moments, and the largest power of the reference so far."""
+    rows, lines = len(windows.whole), moments.means.shape[2]
+    shape = rows, lines
+    found = LineRows(
+        np.empty(shape, np.complex128),
+        np.empty(shape),
+        np.empty(shape),
+        np.empty(shape),
+        np.empty(shape, np.complex128),
+        np.empty(shape),
+        np.empty(shape, np.bool_),
+        np.empty(rows),
+        np.empty((3, rows)),
+        np.empty(rows, np.bool_),
+    )
+    return found, _native.process_lines(settings, moments, windows, found)
+
+
+def add_windows(
+    moments: LineMoments, forgetting: float, weights: Floats, place: int, spectra: Complex, powers: Floats, used: Flags
+) -> MomentRows:
+    """Add windows at consecutive places, from `place` on, and return the moments after each.
+
+    Parameters
+    ----------
+    moments, forgetting, weights
+        As those of `process_lines`.
+    spectra, powers
+        Numerator, denominator and reference, shape (3, rows, lines), and the four powers, shape (4, rows, lines).
+    used
+        Windows that are added; others change nothing, shape (rows,).
+    """
+    _, rows, lines = spectra.shape
+    found = MomentRows(np.empty(rows, np.int64), np.empty((MEANS, rows, lines)), np.empty((SCATTER, rows, lines)))
+    _native.add_windows(moments, forgetting, weights, place, spectra, powers, used, found)
+    return found

@@ -1,0 +1,175 @@
+// The line stage in C for livebode.kernel._lines, whose tuples are read here: their order is that of the classes there.
+#include "native_lines.h"
+
+#include <nanobind/nanobind.h>
+
+#include <cstring>
+#include <initializer_list>
+#include <stdexcept>
+#include <string>
+
+#include "livebode/lines.h"
+
+namespace nb = nanobind;
+
+namespace {
+
+enum Access { READ = 0, WRITE = PyBUF_WRITABLE };
+
+// A contiguous array of a type and shape, or None where that is permitted.
+class Array {
+  public:
+    Array(nb::handle object, const char *formats, std::initializer_list<size_t> shape, Access access = READ,
+          bool is_optional = false)
+    {
+        if (is_optional && object.is_none()) return;
+        if (PyObject_GetBuffer(object.ptr(), &buffer_, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | access) != 0)
+            throw nb::python_error();
+        held_ = true;
+        bool fits = buffer_.format && std::strlen(buffer_.format) <= 2 && is_one_of(formats, buffer_.format) &&
+                    buffer_.ndim == static_cast<int>(shape.size());
+        const Py_ssize_t *length = buffer_.shape;
+        for (const size_t wanted : shape) fits = fits && *length++ == static_cast<Py_ssize_t>(wanted);
+        if (!fits) {
+            PyBuffer_Release(&buffer_);
+            held_ = false;
+            throw nb::value_error("an array of the line stage has another type or shape");
+        }
+    }
+    ~Array()
+    {
+        if (held_) PyBuffer_Release(&buffer_);
+    }
+    Array(const Array &) = delete;
+    Array &operator=(const Array &) = delete;
+
+    template <typename T> T *data() const { return static_cast<T *>(held_ ? buffer_.buf : nullptr); }
+    operator double *() const { return data<double>(); }
+    operator uint8_t *() const { return data<uint8_t>(); }
+    operator int64_t *() const { return data<int64_t>(); }
+
+  private:
+    Py_buffer buffer_{};
+    bool held_ = false;
+
+    // `formats` are separated by spaces.
+    static bool is_one_of(const char *formats, const char *format)
+    {
+        const size_t length = std::strlen(format);
+        for (const char *at = formats; (at = std::strstr(at, format)); at += length)
+            if ((at == formats || at[-1] == ' ') && (at[length] == ' ' || at[length] == '\0')) return true;
+        return false;
+    }
+};
+
+const char *const REAL = "d", *const COMPLEX = "Zd", *const FLAG = "?", *const INTEGER = "l q";
+
+size_t length_of(nb::handle array, size_t axis) { return nb::cast<size_t>(array.attr("shape")[nb::int_(axis)]); }
+
+void expect(lb_status status)
+{
+    if (status != LB_OK) throw nb::value_error("the line stage refused its arguments");
+}
+
+// Rows × lines from which other threads may run meanwhile.
+constexpr size_t long_work = 5'000;
+
+template <typename Work> void call(size_t size, Work work)
+{
+    lb_status status = LB_OK;
+    if (size < long_work) {
+        status = work();
+    } else {
+        nb::gil_scoped_release release;
+        status = work();
+    }
+    expect(status);
+}
+
+// LineMoments: windows, means, scatter, moment; and the weights of LineSettings.
+struct Moments {
+    size_t places, lines;
+    Array count, means, scatter, moment, table;
+    lb_line_weights weights;
+    lb_line_moments moments;
+
+    Moments(nb::tuple of, double forgetting, nb::handle sums)
+        : places(length_of(of[1], 1)), lines(length_of(of[1], 2)), count(of[0], INTEGER, {places}, WRITE),
+          means(of[1], REAL, {LB_LINE_MEANS, places, lines}, WRITE),
+          scatter(of[2], REAL, {LB_LINE_SCATTER, places, lines}, WRITE), moment(of[3], REAL, {3, places}, WRITE),
+          table(sums, REAL, {3, length_of(sums, 1)}), weights{forgetting, table, length_of(sums, 1)},
+          moments{places, lines, count, means, scatter, moment}
+    {
+    }
+};
+
+void add(nb::tuple moments, double forgetting, nb::handle table, size_t place, nb::handle spectra, nb::handle powers,
+         nb::handle usable, nb::tuple out)
+{
+    const Moments m(moments, forgetting, table);
+    const size_t rows = length_of(spectra, 1);
+    const Array three(spectra, COMPLEX, {3, rows, m.lines}), four(powers, REAL, {4, rows, m.lines});
+    const Array used(usable, FLAG, {rows}), after(out[0], INTEGER, {rows}, WRITE);
+    const Array means(out[1], REAL, {LB_LINE_MEANS, rows, m.lines}, WRITE);
+    const Array scatter(out[2], REAL, {LB_LINE_SCATTER, rows, m.lines}, WRITE);
+    call(rows * m.lines, [&] {
+        return lb_lines_add(&m.weights, &m.moments, place, rows, three.data<double>(), four, used, after, means,
+                            scatter);
+    });
+}
+
+double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tuple out)
+{
+    const Moments m(moments, nb::cast<double>(settings[0]), settings[1]);
+    const nb::handle spectrum = windows[2];
+    const size_t signals = length_of(spectrum, 0), rows = length_of(spectrum, 1), bins = length_of(spectrum, 2);
+    const size_t lines = m.lines, denominator = nb::cast<size_t>(settings[3]),
+                 reference = nb::cast<size_t>(settings[4]);
+    if (denominator >= signals || reference >= signals || bins < lines)
+        throw nb::value_error("the spectra have too few signals or lines");
+    const lb_line_settings set = {nb::cast<bool>(settings[2]), denominator == reference,
+                                  static_cast<lb_line_noise>(nb::cast<int>(settings[5])), nb::cast<double>(settings[6]),
+                                  nb::cast<double>(windows[10])};
+
+    const Array spectra(spectrum, COMPLEX, {signals, rows, bins});
+    const Array noise(windows[3], REAL, {rows, lines}, READ, true);
+    const Array whole(windows[4], FLAG, {rows}), clean(windows[5], FLAG, {rows});
+    const Array aside(windows[6], FLAG, {rows}, READ, true), moving(windows[7], FLAG, {rows}, READ, true);
+    const Array distortion(windows[8], REAL, {rows, lines}, READ, true);
+    const Array invalid(windows[9], FLAG, {rows, lines}, READ, true), moment(windows[11], REAL, {3, rows});
+    const double *first = spectra.data<double>();
+    const size_t signal = 2 * rows * bins;
+    const lb_line_windows in = {nb::cast<size_t>(windows[1]),
+                                rows,
+                                bins,
+                                first,
+                                first + denominator * signal,
+                                first + reference * signal,
+                                noise,
+                                whole,
+                                clean,
+                                aside,
+                                moving,
+                                distortion,
+                                invalid,
+                                moment};
+
+    const Array value(out[0], COMPLEX, {rows, lines}, WRITE), variance(out[1], REAL, {rows, lines}, WRITE);
+    const Array coherence(out[2], REAL, {rows, lines}, WRITE), of_input(out[3], REAL, {rows, lines}, WRITE);
+    const Array weight(out[4], COMPLEX, {rows, lines}, WRITE), errors(out[5], REAL, {rows, lines}, WRITE);
+    const Array valid(out[6], FLAG, {rows, lines}, WRITE), dof(out[7], REAL, {rows}, WRITE);
+    const Array centre(out[8], REAL, {3, rows}, WRITE), usable(out[9], FLAG, {rows}, WRITE);
+    const lb_line_rows rows_out = {
+        value.data<double>(), variance, coherence, of_input, weight.data<double>(), errors, valid, dof, centre, usable};
+    double largest = nb::cast<double>(windows[0]);
+    call(rows * lines, [&] { return lb_lines_process(&m.weights, &m.moments, &largest, &set, &in, &rows_out); });
+    return largest;
+}
+
+} // namespace
+
+void bind_lines(nb::module_ &m)
+{
+    m.def("add_windows", &add);
+    m.def("process_lines", &process);
+}

@@ -1,0 +1,243 @@
+"""FaultyFleet: log, coordinator, workers and simulated axes that can be killed, frozen or disturbed."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from livebode.fleet.check import CheckResult, check_results
+from livebode.fleet.log import FleetLog
+from livebode.fleet.reader import stored_messages
+from livebode.fleet.result_message import ResultMessage
+from livebode.fleet.server import LogServer
+from livebode.fleet.settings import FleetSettings
+from livebode.fleet.simulated import BLOCK_S, RATE_HZ, SimulatedMachines, write_simulated_fleet
+from livebode.fleet.status import fleet_status
+from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS, key_of
+
+PARTITIONS, WORKERS = 4, 2
+_BUFFER_BYTES = 100_000
+_REPEATED = 100
+"""Messages of the log that are sent again."""
+_SWAPPED = 5
+_FROZEN_S = (1.0, 9.0)
+_BROKER_S = 0.3
+_STEP_S, _RECOVERY_S_MAX, _WORKER_S_MAX = 0.2, 180.0, 60.0
+_COMMAND = "from livebode.cli import main; main()"
+_WORKER = "spawn_main"
+
+
+class FaultyMachines(SimulatedMachines):
+    """Machines whose messages can be sent in another order."""
+
+    swapped = 0
+    """Pairs of messages that are still to be swapped."""
+    _late: int | None = None
+
+    def _take_batches(self, number: int) -> None:
+        if self._late is not None:
+            super()._take_batches(number)
+            super()._take_batches(self._late)
+            self._late = None
+        elif self.swapped > 0:
+            self.swapped, self._late = self.swapped - 1, number
+        else:
+            super()._take_batches(number)
+
+
+class FaultyFleet:
+    """A fleet in a directory; a context manager. Several faults may happen at once, each in a thread.
+
+    As a service manager does, it restarts the coordinator if that ends by itself.
+    """
+
+    def __init__(self, folder: Path, axes: int, rng: random.Random) -> None:
+        self._rng = rng
+        self._server = LogServer(folder / "log", PARTITIONS)
+        self._path = write_simulated_fleet(folder, self._server.url, axes=axes, partitions=PARTITIONS, workers=WORKERS)
+        self._settings = FleetSettings.read(self._path)
+        self._axes = self._settings.read_axes()
+        self._machines = FaultyMachines(self._settings, _BUFFER_BYTES)
+        self._output = (folder / "fleet.log").open("ab")
+        self._serving, self._coordinating, self._choosing = threading.Lock(), threading.Lock(), threading.Lock()
+        self._frozen: set[psutil.Process] = set()
+        self._workers: set[psutil.Process] = set()
+
+    def __enter__(self) -> FaultyFleet:
+        self._server.start()
+        self._start()
+        self._running = contextlib.ExitStack()
+        self._running.enter_context(self._machines)
+        self.recovered()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._running.close()
+        self._process.send_signal(signal.SIGINT)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(10)
+        for process in [*self._children(), self._process, *self._workers]:
+            with contextlib.suppress(psutil.Error):
+                process.kill()
+        self._process.wait()
+        self._server.__exit__()
+        self._output.close()
+
+    @property
+    def dropped(self) -> int:
+        """Samples that the buffers have dropped."""
+        return round(self._machines.dropped * BLOCK_S * RATE_HZ)
+
+    def finished(self) -> tuple[CheckResult, int]:
+        """Stop the machines; when everything is processed, the check, and the samples that are reported as lost."""
+        self._running.close()
+        while True:
+            self._restart_if_ended()
+            status: dict[str, Any] = self.asked(lambda log: fleet_status(log, self._axes))
+            if not status["log"]["waiting"] and self._stored(self._sent()):
+                break
+            time.sleep(_STEP_S)
+        time.sleep(2.0)  # the last messages give no response, but the owners report what they know
+        status = self.asked(lambda log: fleet_status(log, self._axes))
+        lost = sum(axis["lost"] for axis in status["axes"])
+        return self.asked(lambda log: check_results(log, self._axes)), lost
+
+    def asked(self, question: Callable[[FleetLog], Any]) -> Any:
+        """The answer of the log to a question."""
+
+        async def ask() -> Any:
+            async with FleetLog(self._settings.log, "faults") as log:
+                return await question(log)
+
+        return asyncio.run(ask())
+
+    def recovered(self) -> None:
+        """Wait until each partition has stored the results of messages that were sent after now, twice in succession.
+
+        Twice, because a worker that was frozen may store results for a moment before it is replaced.
+        """
+        until = time.monotonic() + _RECOVERY_S_MAX
+        for _ in range(2):
+            sent: dict[int, int] = {}
+            while not sent or not self._stored(sent):
+                sent = sent or self._sent()
+                self._restart_if_ended()
+                if time.monotonic() > until:
+                    raise TimeoutError(f"a partition is behind for {_RECOVERY_S_MAX:g} s")
+                time.sleep(_STEP_S)
+
+    def _sent(self) -> dict[int, int]:
+        """Number of the newest message of each partition in the log."""
+
+        async def newest(log: FleetLog) -> dict[int, int]:
+            found = [await log.last(LOG_STREAM, f"{LOG}.{number}.>") for number in range(PARTITIONS)]
+            return {number: last.number for number, last in enumerate(found) if last is not None}
+
+        found: dict[int, int] = self.asked(newest)
+        return found
+
+    def _stored(self, sent: dict[int, int]) -> bool:
+        async def stored(log: FleetLog) -> bool:
+            for number, wanted in sent.items():
+                last = await log.last(RESULT_STREAM, f"{RESULTS}.{number}")
+                if last is None or ResultMessage.from_bytes(last.data).through < wanted:
+                    return False
+            return True
+
+        return bool(self.asked(stored))
+
+    def _start(self) -> None:
+        words = [sys.executable, "-c", _COMMAND, "fleet", "run", str(self._path)]
+        self._process = psutil.Popen(words, stdout=self._output, stderr=self._output)
+
+    def _restart_if_ended(self) -> None:
+        with self._coordinating:
+            if self._process.poll() is not None:
+                self._start()
+
+    def _children(self) -> list[psutil.Process]:
+        """Workers of the coordinator that are alive."""
+        try:
+            found = [child for child in self._process.children() if _WORKER in " ".join(child.cmdline())]
+        except psutil.Error:
+            return []
+        self._workers.update(found)
+        return found
+
+    def _victim(self, *, but: Sequence[psutil.Process] = ()) -> psutil.Process:
+        until = time.monotonic() + _WORKER_S_MAX
+        while not (found := [worker for worker in self._children() if worker not in but]):
+            if time.monotonic() > until:
+                raise TimeoutError(f"there is no worker for {_WORKER_S_MAX:g} s")
+            self._restart_if_ended()
+            time.sleep(_STEP_S)
+        return self._rng.choice(found)
+
+    def fault(self, kind: str) -> None:
+        """Make a fault happen; returns when it is over."""
+        getattr(self, f"_{kind}")()
+
+    def _kill(self) -> None:
+        while True:
+            with contextlib.suppress(psutil.NoSuchProcess):  # it has just ended: another one
+                return self._victim().kill()
+
+    def _freeze(self) -> None:
+        with self._choosing:
+            worker = self._victim(but=list(self._frozen))
+            self._frozen.add(worker)
+        with contextlib.suppress(psutil.NoSuchProcess):
+            worker.suspend()
+            time.sleep(self._rng.uniform(*_FROZEN_S))
+            worker.resume()
+        self._frozen.discard(worker)
+
+    def _broker(self) -> None:
+        with self._serving:
+            self._server.kill()
+            time.sleep(_BROKER_S)
+            self._server.start()
+
+    def _coordinator(self) -> None:
+        with self._coordinating:
+            workers = self._children()
+            self._process.kill()
+            self._process.wait()
+            self._start()
+        # They end when they notice it, and may store results until then; a frozen one when it continues.
+        psutil.wait_procs([worker for worker in workers if worker not in self._frozen], timeout=_WORKER_S_MAX)
+
+    def _repeats(self) -> None:
+        """Send messages again that the log has, without their identity: as later than it remembers them."""
+
+        async def repeat(log: FleetLog) -> None:
+            last = (await log.extent(LOG_STREAM)).last
+            async for message in stored_messages(log, LOG_STREAM, f"{LOG}.>", last, max(1, last - _REPEATED)):
+                await log.append(f"{EDGE}.{key_of(message.subject)}", message.data)
+
+        with self._serving:
+            pass  # a new connection needs a server; from here on it may be killed again
+        self.asked(repeat)
+
+    def _reordering(self) -> None:
+        self._machines.swapped += _SWAPPED
+        time.sleep(2 * (_SWAPPED + 1) * BLOCK_S)
+
+    def _buffer(self) -> None:
+        with self._serving:
+            dropped = self._machines.dropped
+            self._server.kill()
+            while self._machines.dropped == dropped:
+                time.sleep(BLOCK_S)
+            self._server.start()
