@@ -17,6 +17,7 @@ from livebode.core.state import Stage, StatefulBase, restore_parts
 from livebode.fleet.event_limits import EventLimits
 from livebode.fleet.main_quantity import MainQuantity, main_quantity, newest_of
 from livebode.fleet.message import read_message
+from livebode.monitoring.rows import places
 from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection
 from livebode.runtime.fits_together import Fitted, process_together
@@ -32,7 +33,7 @@ _OUTPUT_BYTES_MAX = 4 << 20
 _EVENT_BYTES = 1000
 _FAILURE_LETTERS_MAX = 1000
 FITS_PER_S = 2.0
-"""Fits of an axis; which responses are fitted follows from their numbers alone."""
+"""Fits of an axis."""
 _NO_ROWS = np.zeros(0, dtype=np.int64)
 _logger = logging.getLogger(__name__)
 
@@ -96,7 +97,7 @@ class AxisStream(StatefulBase):
     """
 
     _stage = Stage("fleet-axis", 2)
-    _STATE = ("run", "position", "responses", "failure", "changes", "changed_s", "log_s", "_limits")
+    _STATE = ("run", "position", "responses", "failure", "changes", "changed_s", "log_s", "_fit_period", "_limits")
 
     def __init__(self, axis: Axis, run: int) -> None:
         self._axis = axis
@@ -115,6 +116,7 @@ class AxisStream(StatefulBase):
         """The newest value of the quantity that a page shows first; None until a fit is valid."""
         self._events = SourceEvents(clock=lambda: self.log_s)
         self._limits = EventLimits()
+        self._fit_period = 0
         settings = axis.source
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
         self._pipeline: Pipeline | None = None
@@ -167,7 +169,7 @@ class AxisStream(StatefulBase):
         self._responses, self._tracked_events = [], []
         self.responses += sum(map(len, responses))
         joined_responses = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
-        return Tracked(first, joined_responses, self._to_fit(first, joined_responses), events)
+        return Tracked(first, joined_responses, self._to_fit(joined_responses), events)
 
     @property
     def pipeline(self) -> Pipeline:
@@ -202,13 +204,22 @@ class AxisStream(StatefulBase):
             name = main_quantity(parameters, () if detection is None else detection.watched)
             self.main = newest_of(parameters, name, detection) or self.main
 
-    def _to_fit(self, first: int, responses: Responses | None) -> NDArray[np.int64]:
-        """Which responses are fitted: by number, so that another owner fits the same ones."""
+    def _to_fit(self, responses: Responses | None) -> NDArray[np.int64]:
+        """Which responses are fitted: the first one of each half second by the sender's sample numbers.
+
+        So another owner fits the same ones, however it takes the messages. Half a second is a whole number of windows,
+        and begins where monitoring expects its rows.
+        """
         if self._pipeline is None or self._pipeline.fits is None or responses is None or self.failure:
             return _NO_ROWS
         settings = self._pipeline.follower.settings
-        every = max(1, round(settings.lines.rate_hz / settings.step / FITS_PER_S))
-        return np.flatnonzero(((first + np.arange(len(responses))) % every == 0) & responses.ready)
+        window, rate_hz = settings.lines.window, settings.lines.rate_hz
+        apart = max(window, settings.step)
+        period = apart * max(1, round(rate_hz / FITS_PER_S / apart))
+        begun = (responses.sample + 1 - places(window, settings.step)[0]) // period
+        first = np.diff(begun, prepend=self._fit_period) != 0
+        self._fit_period = int(begun[-1])
+        return np.flatnonzero(first & responses.ready)
 
     def _blocks(self, message: bytes) -> list[LiveBlock]:
         blocks = self._sequencer.poll(self.log_s)
