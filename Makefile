@@ -67,6 +67,7 @@ $(VENV)/.bench: $(BUILT) requirements-bench.lock
 bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench --job
+	$(BIN)/python -m bench.tracking
 	$(BIN)/python -m bench.fits
 	$(BIN)/python -m bench.bandwidth
 	$(BIN)/python -m bench.repeating

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from itertools import pairwise
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.tracking import with_twin
 from livebode.core import Block, Lines, Loop, Responses
-from livebode.estimation import RippleOrder, Settings, Tracker
+from livebode.estimation import RippleOrder, Settings, Tracker, line_stage, moments
 from livebode.excitation import multisine
+from livebode.kernel import line_twin
 
 WINDOW, RATE_HZ, SAMPLES = 60, 1000.0, 500
 LINES = Lines((4, 8, 13), WINDOW, RATE_HZ, quiet=(5, 6, 7, 9, 10, 11, 12))
@@ -83,6 +84,7 @@ def responses(made: Settings, pieces: list[Block]) -> Responses:
 def test_a_tracker_gives_the_bits_of_its_twin(drawn, seed, faults, edges, missing):
     made, pieces = possible(drawn), blocks(seed, faults, edges, missing)
     found = responses(made, pieces)
-    with with_twin():
+    process = patch.object(line_stage, "process_lines", line_twin.process_lines)
+    with process, patch.object(moments, "add_windows", line_twin.add_windows):
         expected = responses(made, pieces)
     assert found.equals(expected)

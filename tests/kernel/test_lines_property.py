@@ -17,8 +17,9 @@ from livebode.kernel import (
     LineMoments,
     LineSettings,
     LineWindows,
-    _lines,
+    add_windows,
     line_twin,
+    process_lines,
 )
 
 SPECIAL = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, 1e-300, 1e160, -1e5])
@@ -135,7 +136,7 @@ def test_rows_and_moments_have_the_bits_of_the_twin(case):
     numbers, moments, of_twin, place, largest = Numbers(case), case.moments(), case.moments(), 0, 0.0
     for rows in case.pieces:
         windows = numbers.windows(rows, place, largest)
-        found, largest = _lines.process_lines(case.settings, moments, windows)
+        found, largest = process_lines(case.settings, moments, windows)
         expected, expected_largest = line_twin.process_lines(case.settings, of_twin, windows)
         assert_same_bits(found, expected)
         assert_same_bits(moments, of_twin)
@@ -148,7 +149,7 @@ def test_rows_and_moments_have_the_bits_of_the_twin(case):
 def test_any_division_of_the_windows_gives_the_same_bits(case):
     whole, parts = case.moments(), case.moments()
     every = Numbers(case).windows(sum(case.pieces), 0, 0.0)
-    expected, _ = _lines.process_lines(case.settings, whole, every)
+    expected, _ = process_lines(case.settings, whole, every)
     begun, largest, found = 0, 0.0, []
     for rows in case.pieces:
         at = slice(begun, begun + rows)
@@ -157,7 +158,7 @@ def test_any_division_of_the_windows_gives_the_same_bits(case):
         spectrum, moment = np.ascontiguousarray(every.spectrum[:, at]), np.ascontiguousarray(every.moment[:, at])
         place = begun % case.places
         windows = LineWindows(largest, place, spectrum, *part, *more, every.dof_repeating, moment)
-        one, largest = _lines.process_lines(case.settings, parts, windows)
+        one, largest = process_lines(case.settings, parts, windows)
         found.append(one)
         begun += rows
     axis = dict.fromkeys(expected._fields, 0) | {"moment": 1}
@@ -174,7 +175,7 @@ def test_added_windows_have_the_bits_of_the_twin(case):
     for rows in case.pieces:
         spectra, powers = numbers.complex_(3, rows, case.lines), numbers.reals(4, rows, case.lines)
         about = case.forgetting, weights, place, spectra, powers, numbers.flags(0.7, rows)
-        assert_same_bits(_lines.add_windows(moments, *about), line_twin.add_windows(of_twin, *about))
+        assert_same_bits(add_windows(moments, *about), line_twin.add_windows(of_twin, *about))
         assert_same_bits(moments, of_twin)
         place = (place + rows) % case.places
 
@@ -200,5 +201,5 @@ def test_arrays_of_another_shape_or_type_are_refused_and_nothing_changes(wrong):
     case = Case(2, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, (3,), 0)
     moments, windows = case.moments(), Numbers(case).windows(3, 0, 0.0)
     with pytest.raises(ValueError, match=r"array|few|refused|contiguous"):
-        _lines.process_lines(case.settings, moments, windows._replace(**wrong))
+        process_lines(case.settings, moments, windows._replace(**wrong))
     assert_same_bits(moments, case.moments())
