@@ -151,6 +151,7 @@ fleet-faults: $(BUILT) ## kill, freeze and disturb a fleet 1,000 times, and comp
 
 fleet-scale: $(BUILT) ## costs of an axis of a fleet on this computer, and what 100,000 axes need (docs/explanation/fleet-scale.md; 5 min)
 	$(BIN)/python -m bench.fleet_path
+	$(BIN)/python -m bench.fleet_parts
 	$(BIN)/python -m bench.fleet_load
 	$(BIN)/python -m studies.fleet_scale
 

@@ -1,8 +1,8 @@
 """Simulation of a worker of a fleet: messages arrive, are read in batches, tracked, and their results are stored.
 
-One core computes for all partitions of the worker, in the order in which their reads return. A read returns what waits,
-at most a batch; if nothing waits, it collects for a while. Results are stored with the first batch that ends after they
-are due. Times are in seconds.
+One core computes for all partitions of the worker, in the order of their reads. A partition reads in its turn, at equal
+intervals, and at once where a batch did not hold all that waited; the results of what was read are stored together.
+Times are in seconds.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+_GOLDEN = 0.618
 
 
 @dataclass(frozen=True)
@@ -34,32 +35,30 @@ class WorkerCosts:
     message_s: float
     batch_s: float = 0.0
     store_s: float = 0.0
-    batch: int = 64
-    read_s: float = 0.1
-    results_s: float = 0.5
+    batch: int = 1024
+    results_s: float = 0.4
 
     def slower(self, factor: float) -> WorkerCosts:
         """The same on a core that other programs use too."""
         times_s = (self.message_s * factor, self.batch_s * factor, self.store_s * factor)
-        return WorkerCosts(*times_s, self.batch, self.read_s, self.results_s)
+        return WorkerCosts(*times_s, self.batch, self.results_s)
 
 
 class _Partition:
-    """Messages of a partition, those before `next` are tracked, those before `kept` are stored."""
+    """Messages of a partition, stored up to `next`; it reads `turn_s` after each multiple of the interval."""
 
-    def __init__(self, arrivals: Floats, due_s: float) -> None:
-        self.arrivals = arrivals
+    def __init__(self, arrivals: Floats, turn_s: float) -> None:
+        self.arrivals, self._turn_s = arrivals, turn_s
         self.stored = np.full(len(arrivals), np.nan)
-        self.next = self.kept = 0
-        self.due_s = due_s
+        self.next = 0
 
-    def returned(self, costs: WorkerCosts, now_s: float) -> float:
-        """When a read that begins now returns."""
-        if self.next < len(self.arrivals) and self.arrivals[self.next] <= now_s:
-            return now_s
-        full = self.next + costs.batch - 1
-        full_s = self.arrivals[full] if full < len(self.arrivals) else np.inf
-        return float(min(now_s + costs.read_s, full_s))
+    def read_s(self, costs: WorkerCosts, now_s: float, *, full: bool = False) -> float:
+        """When it reads the next time, if there is something, after a read that was `full` or not."""
+        earliest_s = max(now_s, float(self.arrivals[self.next]))
+        if full or not costs.results_s:
+            return earliest_s
+        turns = np.ceil((earliest_s - self._turn_s) / costs.results_s)
+        return float(turns * costs.results_s + self._turn_s)
 
 
 def stored_times(costs: WorkerCosts, partitions: Sequence[Floats], open_s: float = 0.0) -> list[Floats]:
@@ -67,24 +66,20 @@ def stored_times(costs: WorkerCosts, partitions: Sequence[Floats], open_s: float
 
     Nothing is read before `open_s`: what arrived until then waits, as after the death of the previous owner.
     """
-    rng = np.random.default_rng(0)
-    parts = [_Partition(arrivals, open_s + rng.uniform(0.0, costs.results_s)) for arrivals in partitions]
-    reads = [(part.returned(costs, open_s), number) for number, part in enumerate(parts) if len(part.arrivals)]
+    parts = [_Partition(arrivals, number * _GOLDEN % 1 * costs.results_s) for number, arrivals in enumerate(partitions)]
+    reads = [(part.read_s(costs, open_s), number) for number, part in enumerate(parts) if len(part.arrivals)]
     heapq.heapify(reads)
     free_s = open_s
     while reads:
-        returned_s, number = heapq.heappop(reads)
+        read_s, number = heapq.heappop(reads)
         part = parts[number]
-        arrived = int(np.searchsorted(part.arrivals, returned_s, side="right"))
-        count = min(costs.batch, arrived - part.next)
-        free_s = max(free_s, returned_s) + costs.batch_s + count * costs.message_s
+        free_s = max(free_s, read_s)
+        count = min(costs.batch, int(np.searchsorted(part.arrivals, free_s, side="right")) - part.next)
+        free_s += costs.batch_s + count * costs.message_s + costs.store_s
+        part.stored[part.next : part.next + count] = free_s
         part.next += count
-        if free_s >= part.due_s and part.kept < part.next:
-            free_s += costs.store_s
-            part.stored[part.kept : part.next] = free_s
-            part.kept, part.due_s = part.next, free_s + costs.results_s
-        if part.kept < len(part.arrivals):
-            heapq.heappush(reads, (part.returned(costs, free_s), number))
+        if part.next < len(part.arrivals):
+            heapq.heappush(reads, (part.read_s(costs, free_s, full=count == costs.batch), number))
     return [part.stored for part in parts]
 
 

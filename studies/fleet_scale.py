@@ -196,14 +196,14 @@ def tracking_s(load: AxisLoad, axes: int) -> float:
 
 
 def worker_costs(costs: PathCosts, message_s: float) -> WorkerCosts:
-    """Service times from a measurement: what a partition costs without data is that of its reads, ten a second.
+    """Service times from a measurement: what a partition costs without data is that of its reads.
 
     What is neither reading nor tracking is that of storing.
     """
     usual = WorkerCosts(message_s)
     seconds = costs.axis_seconds / costs.axes
     rest_s = costs.owner_s - costs.idle_s * PARTITIONS * seconds - costs.messages * message_s
-    return replace(usual, batch_s=costs.idle_s * usual.read_s, store_s=max(0.0, rest_s) / costs.stores)
+    return replace(usual, batch_s=costs.idle_s * usual.results_s, store_s=max(0.0, rest_s) / costs.stores)
 
 
 def predicted_lags_s(

@@ -28,7 +28,7 @@ def test_a_worker_without_batches_waits_as_an_m_d_1_queue(load: float) -> None:
     count, service_s = 60_000, 0.001
     rng = np.random.default_rng(5)
     times = np.cumsum(rng.exponential(service_s / load, count))
-    found = stored_times(WorkerCosts(service_s, batch=1, read_s=np.inf, results_s=0.0), [times])[0]
+    found = stored_times(WorkerCosts(service_s, batch=1, results_s=0.0), [times])[0]
     waits_s = found - times - service_s
     expected_s = load * service_s / 2 / (1 - load)
     # Means of 60 parts scatter by their own standard deviation: four of the mean's are one in 15,000.
@@ -37,7 +37,7 @@ def test_a_worker_without_batches_waits_as_an_m_d_1_queue(load: float) -> None:
 
 
 def test_results_of_an_idle_worker_are_stored_after_half_a_period_on_average() -> None:
-    costs = WorkerCosts(1e-6, read_s=1e-3)
+    costs = WorkerCosts(1e-6)
     times = arrivals(50, 1, 0.5, 60.0)
     lags_s = stored_times(costs, times)[0] - times[0]
     assert np.mean(lags_s) == pytest.approx(costs.results_s / 2, rel=0.05)

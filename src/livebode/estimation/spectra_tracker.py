@@ -112,24 +112,26 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
                 "make another tracker",
             )
         hop, window = self._layout.hop, self._layout.window
-        sums = block.sums[self._signals][:, :, self._columns]
+        sums, sample = block.sums.take(self._signals, axis=0).take(self._columns, axis=2), block.sample
         finite = np.asarray(np.isfinite(sums).all(axis=(0, 2)))
         with np.errstate(over="ignore", invalid="ignore"):  # responses from implausible numbers are excluded
-            spectrum = np.where(finite[:, np.newaxis], sums, 0.0) * self._after
-            size = np.nan_to_num(np.abs(spectrum).max(axis=2))
+            spectrum = (sums if finite.all() else np.where(finite[:, np.newaxis], sums, 0.0)) * self._after
+            size = np.abs(spectrum).max(axis=2)
+        if not np.isfinite(size).all():
+            size = np.nan_to_num(size)
         implausible = np.zeros(len(block), dtype=np.bool_)
         implausible[self._range.process(size)] = True
         not_whole, spike = (block.state & NOT_WHOLE != 0) | ~finite, block.state & SPIKE != 0
         left_out = block.state & LEFT_OUT != 0
         self._watch.take(block, {"not-whole": not_whole, "implausible": implausible, "spike": spike})
         whole = ~(not_whole | implausible)
-        rows = SpectraRows(spectrum, block.sample, whole, whole & ~(spike | left_out), _NONE, _NONE, _NONE)
+        rows = SpectraRows(spectrum, sample, whole, whole & ~(spike | left_out), _NONE, _NONE, _NONE)
         place = (block.place + hop * np.arange(len(block))) % window
-        time_s = block.origin_s + (block.sample - (window - 1) / 2) / block.rate_hz
+        time_s = block.origin_s + (sample - (window - 1) / 2) / block.rate_hz
         schedule = block[self.settings.schedule] if self.settings.schedule else np.full(len(block), np.nan)
         ripple = None
         if self._speed is not None:
-            ripple = ripple_power(self.settings.ripple, self.settings.lines, self._speed.at(schedule, block.sample))
+            ripple = ripple_power(self.settings.ripple, self.settings.lines, self._speed.at(schedule, sample))
         centre = np.stack([time_s, schedule])
         responses = self._lines.process(rows, place, centre, block.channels, ripple=ripple)
         self._ends_with(responses)

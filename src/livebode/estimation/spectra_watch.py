@@ -52,11 +52,12 @@ class SpectraInputStatistics(StreamCounters):
         self._next = block.stop
         begins: list[tuple[int, str]] = []
         for kind, those in marked.items():
-            sample = block.sample[those]
-            apart = np.diff(sample, prepend=self._last[kind]) >= max(self._window, block.layout.hop + 1)
-            begins += [(int(n), kind) for n in sample[apart]]
-            self.counts[kind] += sample.size
-            self._last[kind] = int(sample[-1]) if sample.size else self._last[kind]
+            if those.any():
+                sample = block.sample[those]
+                apart = np.diff(sample, prepend=self._last[kind]) >= max(self._window, block.layout.hop + 1)
+                begins += [(int(n), kind) for n in sample[apart]]
+                self.counts[kind] += sample.size
+                self._last[kind] = int(sample[-1])
         for number, kind in sorted(begins):
             self._report(kind, block, number, f"{self._sentences[kind]}; its response is not valid")
 

@@ -5,21 +5,18 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import time
 from collections.abc import AsyncIterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from livebode.fleet.consumer import Consumer, ConsumerLostError, Delivery
 from livebode.fleet.log import FleetLog, StoredMessage
 
 if TYPE_CHECKING:
     from nats.aio.msg import Msg
 
 _logger = logging.getLogger(__name__)
-_BATCH = 64
 _INACTIVE_S = 60.0
 _READ_S = 0.2
-_DOUBT_S = 1.0
-"""Silence after which the server is asked whether it still has the consumer."""
 
 
 class Reader:
@@ -44,62 +41,48 @@ class Reader:
         """Number after the last message that was returned."""
         self.pending = 1
         """Messages that the server had beyond the last one returned; at least one while the server was not asked."""
-        self._subscription: Any = None
+        self._consumer: Consumer | None = None
         self._delivered = 0
-        self._heard_s = 0.0
 
     async def read(self, timeout_s: float) -> list[StoredMessage]:
-        """The next messages; none if none come in time."""
+        """The next messages; if there are none, nothing after `timeout_s`."""
         try:
-            if self._subscription is None:
-                await self._subscribe()
-            found: list[Msg] = await self._subscription.fetch(_BATCH, timeout=timeout_s)
-        except (TimeoutError, self._log.errors) as error:
-            await self._doubt(error, timeout_s)
+            if self._consumer is None:
+                self._consumer = await self._log.consumer(self._stream, self._subject, self.next, _INACTIVE_S)
+                self._delivered = 0
+            await self._consumer.ask()
+            found = await self._checked(await self._consumer.answer())
+            if self.pending and self._consumer is not None:
+                await self._consumer.ask()  # the server answers while these are processed
+        except (TimeoutError, ConsumerLostError, self._log.errors):
+            await self.close()
+            await asyncio.sleep(max(timeout_s, _READ_S))
             return []
-        self._heard_s = time.monotonic()
-        return await self._checked(found)
+        if not found:
+            await asyncio.sleep(timeout_s)
+        return found
 
     async def close(self) -> None:
-        """Remove the consumer."""
-        subscription, self._subscription = self._subscription, None
-        if subscription is not None:
+        """End reading."""
+        consumer, self._consumer = self._consumer, None
+        self.pending = max(1, self.pending)
+        if consumer is not None:
             with contextlib.suppress(self._log.errors, asyncio.TimeoutError):
-                await subscription.unsubscribe()
-
-    async def _subscribe(self) -> None:
-        self._subscription = await self._log.subscription(self._stream, self._subject, self.next, _INACTIVE_S)
-        self._delivered, self._heard_s = 0, time.monotonic()
-        self.pending = (await self._subscription.consumer_info()).num_pending
+                await consumer.close()
 
     async def _checked(self, found: list[Msg]) -> list[StoredMessage]:
-        messages = []
+        messages: list[StoredMessage] = []
+        self.pending = 0
         for message in found:
-            about = message.metadata
-            if about.sequence.consumer != self._delivered + 1:
+            about = Delivery.of(message.reply)
+            if about.delivered != self._delivered + 1:
                 _logger.warning("%s: messages were lost on the way; reading again from %d", self._subject, self.next)
                 await self.close()
                 break
             self._delivered += 1
-            self.pending = about.num_pending
-            stored_s = about.timestamp.timestamp()
-            messages.append(StoredMessage(message.subject, about.sequence.stream, message.data, "", stored_s))
-            self.next = about.sequence.stream + 1
+            messages.append(StoredMessage(message.subject, about.number, message.data, "", about.stored_s))
+            self.next, self.pending = about.number + 1, about.pending
         return messages
-
-    async def _doubt(self, error: Exception, timeout_s: float) -> None:
-        """After a silence, find out whether there is nothing to read or nothing to read it with."""
-        if self._subscription is None:
-            await asyncio.sleep(timeout_s)
-        elif time.monotonic() - self._heard_s > _DOUBT_S or not isinstance(error, asyncio.TimeoutError):
-            try:
-                waiting = (await self._subscription.consumer_info()).num_pending
-                self._heard_s = time.monotonic()
-                if waiting:
-                    await self.close()
-            except (TimeoutError, self._log.errors):
-                await self.close()
-                self.pending = max(1, self.pending)
 
 
 async def stored_messages(

@@ -10,11 +10,10 @@ from urllib.parse import quote
 from livebode.core.errors import FleetError
 from livebode.fleet.page_status import NAMES, VIEW
 from livebode.fleet.settings import FleetSettings, ServerSection, UsersSection, on_loopback
-from livebode.fleet.subjects import EDGE, VIEW_API, axis_path
+from livebode.fleet.subjects import API, EDGE, VIEW_API, axis_path
 from livebode.sources.live.framing import FRAME_BYTES_MAX
 
 _FLEET, _VIEW = "FLEET", "VIEW"
-_JETSTREAM = "$JS.API"
 _CONNECTIONS_MORE, _SUBSCRIPTIONS = 4, 4
 _MESSAGE_BYTES_MAX = 2 * FRAME_BYTES_MAX
 """Of an edge: a frame with the names of the channels, and one of samples."""
@@ -71,8 +70,8 @@ class ServerAccess:
             for subject in subjects:
                 senders.setdefault(subject, []).append(_account(path))
         exports = [_service(subject, accounts) for subject, accounts in sorted(senders.items())]
-        exports += [_service(f"{_JETSTREAM}.{request}", [_VIEW]) for request in _VIEWED]
-        viewed = [_import(f"{_JETSTREAM}.{request}", f', to: "{VIEW_API}.{request}"') for request in _VIEWED]
+        exports += [_service(f"{API}.{request}", [_VIEW]) for request in _VIEWED]
+        viewed = [_import(f"{API}.{request}", f', to: "{VIEW_API}.{request}"') for request in _VIEWED]
         for subject in (f"{VIEW}.*", f"{NAMES}.*"):  # what workers publish for the page of the fleet
             exports.append(f"{{stream: {json.dumps(subject)}, accounts: {json.dumps([_VIEW])}}}")
             viewed.append(f"{{stream: {{account: {_FLEET}, subject: {json.dumps(subject)}}}}}")

@@ -12,8 +12,9 @@ LEVELS: Final = 4
 EDGE, LOG, RESULTS, STATES, STATUS = "edge", "in", "res", "state", "status"
 """First tokens: what an edge publishes, the same after the server's mapping, results, states, and the status."""
 LOG_STREAM, RESULT_STREAM, STATE_STREAM, STATUS_STREAM = "LOG", "RESULTS", "STATES", "STATUS"
+API: Final = "$JS.API"
 VIEW_API: Final = "viewer"
-"""First token of the requests of a viewer, instead of JetStream's own."""
+"""First tokens of requests to JetStream: its own, and those of a viewer."""
 _EMPTY = "_"
 
 

@@ -100,6 +100,8 @@ class SpectraBatch:
 
     def with_kinds(self, kinds: Mapping[str, QuantityKind]) -> SpectraBatch:
         """The same with the declared kinds of its channels."""
+        if not kinds:
+            return self
         signals, values = (with_kinds(part, kinds) for part in (self.layout.signals, self.layout.values))
         return replace(self, layout=replace(self.layout, signals=signals, values=values))
 
@@ -107,10 +109,13 @@ class SpectraBatch:
         """Spectra from sample `start` of the sender, which gets the number `number`."""
         skipped = (start - self.first_sample) // self.layout.hop
         layout, sums = self.layout, self.sums[:, skipped:]
-        shown = dict(zip((c.name for c in layout.signals), rms(sums, layout)))
-        shown |= dict(zip((c.name for c in layout.values), self.values[:, skipped:]))
+        data = rms(sums, layout)
+        if layout.values:
+            shown = dict(zip((c.name for c in layout.signals), data))
+            shown |= dict(zip((c.name for c in layout.values), self.values[:, skipped:]))
+            data = np.stack([shown[channel.name] for channel in self.channels])
         return LiveSpectra(
-            np.stack([shown[channel.name] for channel in self.channels]),
+            data,
             self.channels,
             self.rate_hz,
             start=number,

@@ -1,0 +1,135 @@
+"""Where the time of a message goes in the owner of a partition: each part alone.
+
+    python -m bench.fleet_parts
+
+For each kind of messages: read from the log in one read of many, decode, sequence, track alone and together with 4 or
+16 messages of the axis, and its share of a message of results and of a state. Processor time in µs a message, the
+least of some rounds.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from bench.fleet_loads import SAMPLES_100, SAMPLES_500, SPECTRA, AxisLoad
+from bench.fleet_path import state_every_s
+from livebode.fleet.axis_stream import AxisStream
+from livebode.fleet.log import FleetLog
+from livebode.fleet.message import read_message
+from livebode.fleet.reader import Reader
+from livebode.fleet.result_message import PendingResults
+from livebode.fleet.server import LogServer
+from livebode.fleet.settings import LogSection
+from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM
+from livebode.sources.live import Sequencer
+from livebode.sources.live.source_events import SourceEvents
+
+_MESSAGES, _ROUNDS, _AXES, _WARM = 96, 5, 50, 16
+_TOGETHER = (1, 4, 16)
+HEADING = "| messages | read | decode | sequence | track 1 | 4 | 16 | results | state |\n" + "|---" * 9 + "|"
+
+
+class MessageCosts:
+    """What a message of a kind costs, µs."""
+
+    def __init__(self, load: AxisLoad) -> None:
+        self._load = load
+        self._axes = load.axes(_AXES)
+        self._axis = next(iter(self._axes.values()))
+        self._messages = [load.message(0, number) for number in range(_MESSAGES)]
+        self._batches = [read_message(message, 0.0) for message in self._messages]
+
+    def row(self) -> str:
+        """A line of the table, as Markdown."""
+        tracked = [min(self._track_s(together) for _ in range(_ROUNDS)) for together in _TOGETHER]
+        spent_s = [
+            asyncio.run(self._read_s()),
+            least_s(lambda: [read_message(message, 0.0) for message in self._messages]) / _MESSAGES,
+            least_s(self._sequence) / _MESSAGES,
+            *tracked,
+            self._results_s(),
+            self._state_s(),
+        ]
+        return f"| {self._load.name} | " + " | ".join(f"{one * 1e6:.0f}" for one in spent_s) + " |"
+
+    async def _read_s(self) -> float:
+        with tempfile.TemporaryDirectory() as folder, LogServer(Path(folder), 1) as server:
+            async with FleetLog(LogSection(url=server.url, size_gb=1.0, results_gb=1.0), "bench") as log:
+                await log.create_streams()
+                for number, message in enumerate(self._messages * _ROUNDS):
+                    await log.append(f"{EDGE}.hall._.machine.x", message, str(number))
+                times_s = [await self._read_all_s(log) for _ in range(_ROUNDS)]
+        return min(times_s) / (_MESSAGES * _ROUNDS)
+
+    async def _read_all_s(self, log: FleetLog) -> float:
+        reader, read = Reader(log, LOG_STREAM, f"{LOG}.0.>", 1), 0
+        began_s = time.thread_time()
+        while read < _MESSAGES * _ROUNDS:
+            read += len(await reader.read(1.0))
+        spent_s = time.thread_time() - began_s
+        await reader.close()
+        return spent_s
+
+    def _sequence(self) -> None:
+        sequencer = Sequencer(SourceEvents())
+        for batch in self._batches:
+            sequencer.push(batch)
+
+    def _track_s(self, together: int) -> float:
+        stream, spent_s = AxisStream(self._axis, 1), 0.0
+        for number, message in enumerate(self._messages, 1):
+            stream.take(message, number, 0.0)
+            if number % together == 0:
+                began_s = time.thread_time()
+                stream.output()
+                spent_s += (time.thread_time() - began_s) * (number > _WARM)
+        return spent_s / (_MESSAGES - _WARM)
+
+    def _results_s(self) -> float:
+        outputs = []
+        for key, axis in self._axes.items():
+            stream = AxisStream(axis, 1)
+            for number, message in enumerate(self._messages[:_WARM], 1):
+                output = stream.process(message, number, 0.0)
+            outputs.append((key, stream, output))
+
+        def store() -> None:
+            pending = PendingResults()
+            for key, stream, output in outputs:
+                pending.add(key, stream, output)
+            pending.message(1, "owner").to_bytes()
+
+        return least_s(store) / len(outputs)
+
+    def _state_s(self) -> float:
+        stream = AxisStream(self._axis, 1)
+        for number, message in enumerate(self._messages, 1):
+            stream.process(message, number, 0.0)
+        bytes_per_s = len(self._messages[0]) / self._load.period_s
+        every_s = state_every_s(len(stream.snapshot()), bytes_per_s)
+        return least_s(stream.snapshot) * self._load.period_s / every_s
+
+
+def least_s(run: Callable[[], object]) -> float:
+    """Processor time, the least of some rounds."""
+    times_s = []
+    for _ in range(_ROUNDS):
+        began_s = time.thread_time()
+        run()
+        times_s.append(time.thread_time() - began_s)
+    return min(times_s)
+
+
+def main() -> None:
+    """Print the table."""
+    print(HEADING)
+    for load in (SAMPLES_500, SAMPLES_100, SPECTRA):
+        print(MessageCosts(load).row(), flush=True)
+
+
+if __name__ == "__main__":
+    main()
