@@ -30,5 +30,10 @@ class ArchiveError(LivebodeError):
         "process-ended": "The process that tracked a recording was ended by a signal, or ended itself.",
         "quantity-ambiguous": "Several models have a quantity of that name.",
         "quantity-unknown": "No run of the lake has a quantity of that name.",
+        "machine-unknown": "No run of the lake is of that machine.",
+        "not-healthy": "Runs that a baseline is to be learned from contain alarms or a jump.",
         "recipe-unknown": "No run was tracked with these settings.",
+        "recording-absent": "A recording that a baseline needs is at none of its places any more, or has changed.",
+        "run-unknown": "A run that is excluded is not among those to learn from.",
+        "run-without-summary": "A run was tracked by an earlier livebode, which did not store its configuration.",
     }
