@@ -112,8 +112,9 @@ def _means(name: str, content: str, url: str) -> bool:
 
 def _selected(lake: Lake, of: Selection) -> tuple[dict[str, list[LakeRun]], dict[str, list[str]]]:
     """The runs of each axis in the order of their dates, and a remark on those that are left out."""
-    every, _, _ = one_recipe(lake.read("runs", where=where_of(of)), of.recipe)
-    rows = every.sort_by([("recorded_from", "ascending"), ("content", "ascending")]).to_pylist()
+    every = lake.read("runs", where=where_of(of))
+    own = one_recipe(every, of.recipe)[0] if every.num_rows else every
+    rows = own.sort_by([("recorded_from", "ascending"), ("content", "ascending")]).to_pylist()
     names = {path_of(row) or UNNAMED for row in rows}
     axes: dict[str, list[LakeRun]] = {}
     undated: dict[str, int] = {}
@@ -126,10 +127,10 @@ def _selected(lake: Lake, of: Selection) -> tuple[dict[str, list[LakeRun]], dict
             continue
         axes.setdefault(axis, []).append(LakeRun(lake, row))
     if not axes:
-        below = f"of {of.below} " if of.below else ""
+        below = f" of {of.below}" if of.below else ""
         raise ArchiveError(
             "machine-unknown",
-            f"the lake has no run {below}with these dates and settings",
+            f"the lake has no run{below} with these dates and settings",
             nearest_name(of.below, sorted(names), "Axes") if of.below else "track recordings first",
             argument="machine",
             value=of.below,
