@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +12,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.archive.options import LakeOf
-from livebode.cli.archive.selection import Below, By, Recipe, Since, Until, selection
+from livebode.cli.archive.selection import SelectionOptions, with_selection
 from livebode.cli.learned_baseline import check_replaceable, sentences, written
 from livebode.cli.options import Json
 from livebode.core import ConfigError, LivebodeError, UsageError, counted
@@ -24,9 +25,10 @@ if TYPE_CHECKING:
 _REFUSED = 2
 
 
+@with_selection("below", "since", "until", "recipe")
 def learn_command(
     archive: LakeOf,
-    below: Below = "",
+    chosen: SelectionOptions,
     each: Annotated[bool, typer.Option("--each", help="A baseline for each of several axes.")] = False,
     out: Annotated[
         str | None,
@@ -36,14 +38,11 @@ def learn_command(
             "\\[default: baselines in archive.toml]",
         ),
     ] = None,
-    since: Since = None,
-    until: Until = None,
     exclude: Annotated[
         list[str] | None,
         typer.Option(metavar="RECORDING", help="Recording to leave out, by content, URL or name; repeat for several."),
     ] = None,
     accept: Annotated[bool, typer.Option("--accept", help="Learn from runs with alarms or jumps, too.")] = False,
-    recipe: Recipe = None,
     reason: Annotated[
         str | None,
         typer.Option(
@@ -68,8 +67,8 @@ def learn_command(
 
     settings = _settings(archive)
     lake = Lake(settings.lake if settings else lake_url(archive))
-    chosen = selection(By.axis, below, since, until, None, recipe or _recipe(settings))
-    found = healthy_runs(lake, chosen.without(contents_of(lake, exclude or ())))
+    of = replace(chosen, recipe=chosen.recipe or _recipe(settings)).selection()
+    found = healthy_runs(lake, of.without(contents_of(lake, exclude or ())))
     files = _files(found, out or (settings.baselines if settings else None), each=each)
     for file in files:
         check_replaceable(file, reason, force=force)
