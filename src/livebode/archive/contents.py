@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -66,7 +67,7 @@ def quarantine(lake: Lake) -> list[dict[str, Any]]:
     return sorted(newest.values(), key=lambda row: (row["url"], row["recipe"]))
 
 
-def path_of(row: dict[str, Any]) -> str:
+def path_of(row: Mapping[str, Any]) -> str:
     """The machine as site/line/machine/axis; levels that are not known are left out.
 
     >>> path_of({"site": "Graz", "line": None, "machine": "press 4", "axis": "x"})

@@ -120,7 +120,7 @@ def _selected(lake: Lake, of: Selection) -> tuple[dict[str, list[LakeRun]], dict
     undated: dict[str, int] = {}
     for row in rows:
         axis = path_of(row) or UNNAMED
-        if of.below and axis != of.below and not axis.startswith(of.below + "/"):
+        if not of.includes(axis):
             continue
         if row["recorded_from"] is None and (of.since or of.until):
             undated[axis] = undated.get(axis, 0) + 1

@@ -132,6 +132,10 @@ class Selection:
     recipe: str | None = None
     excluded: Sequence[str] = ()
 
+    def includes(self, axis: str) -> bool:
+        """Whether this axis is below the selected machine."""
+        return not self.below or axis == self.below or axis.startswith(self.below + "/")
+
     def without(self, contents: Sequence[str]) -> Selection:
         """The same without these recordings."""
         return replace(self, excluded=(*self.excluded, *contents))

@@ -30,9 +30,10 @@ def report_command(
 ) -> None:
     """Write the trends of all quantities and machines as one page, the worst machine first.
 
-    It contains significant changes in words, pictures of the worst machines, machines without data, and what was not
-    assessed and why. The PDF needs the extra `pdf`.
+    It contains alarms of recordings that were compared with a baseline, significant changes in words, pictures of the
+    worst machines, machines without data, and what was not assessed and why. The PDF needs the extra `pdf`.
     """
+    from livebode.archive.alarms import alarms_of
     from livebode.archive.contents import path_of, quarantine
     from livebode.archive.settings import lake_url
     from livebode.lake import Lake
@@ -44,7 +45,8 @@ def report_command(
     lake = Lake(lake_url(archive))
     of = chosen.selection()
     bad = [(path_of(row), str(row["sentence"])) for row in quarantine(lake)]
-    hall = Hall(name or of.below or Path(lake.url).name, assess(histories(lake, of), limit), bad, limit)
+    title = name or of.below or Path(lake.url).name
+    hall = Hall(title, assess(histories(lake, of), limit), bad, limit, *alarms_of(lake, of))
     with in_language(language or "en"):
         files, remark = write_documents(hall.document(datetime.now(UTC)), out, force=force)
     if as_json:
