@@ -14,7 +14,6 @@ Floats = NDArray[np.float64]
 
 _CORRELATIONS = np.sin(np.arange(1, 12) * 0.125)  # 0.12 … 0.98, evenly by their standard error √((1 − φ²)/n)
 _SHARES = np.array([0.4, 0.6, 0.8, 1.0])  # of the correlated part in the variance; the rest is white
-_FREEDOM_MIN = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,21 +71,31 @@ class CorrelatedScatter:
         other = matrix @ self.covariance @ matrix.T
         return CorrelatedScatter(self.probability, other, self.scatter, self.correlation, self.freedom)
 
+    def p(self, contrast: Floats, value: float) -> float:
+        """Probability of a combination at least as far from zero if the truth is zero, from the mean of the variances.
+
+        Of all changes that were searched for, the probability is that of a value far from zero. There the distribution
+        of `error` is too heavy: it would hide jumps that are five times their error.
+        """
+        (own,) = self._variances(contrast[np.newaxis]).T
+        return float(2 * t.sf(abs(value) / np.sqrt(self.probability @ own), self.freedom))
+
     def error(self, contrasts: Floats) -> tuple[Floats, Floats]:
         """Scale and degrees of freedom of Student's distribution for each combination, (combinations, terms) in.
 
-        It has mean and variance of the variances, which are those of the single correlations.
+        The logarithm of its variance has the mean and the variance of those with the single correlations.
         """
-        own = np.einsum("ci,gij,cj->gc", contrasts, self.covariance, contrasts)
-        mean = self.probability @ own
-        spread = np.divide(self.probability @ own**2, mean**2, out=np.ones_like(mean), where=mean > 0)
-        freedom = np.maximum(4 + 2 / (spread * (1 + 2 / self.freedom) - 1), _FREEDOM_MIN)
-        return np.sqrt(mean * (freedom - 2) / freedom), freedom
+        own = self._variances(contrasts)
+        logarithm = np.log(np.maximum(own, np.finfo(float).tiny))
+        mean = self.probability @ logarithm
+        spread = self.probability @ (logarithm - mean) ** 2 + 2 / self.freedom + 2 / self.freedom**2
+        # Of the logarithm of ν/χ², mean and variance are 1/ν and 2/ν + 2/ν², to second order.
+        freedom = (1 + np.sqrt(1 + 2 * spread)) / spread
+        return np.exp((mean + 1 / self.freedom - 1 / freedom) / 2), freedom
 
-    def p(self, contrast: Floats, value: float) -> float:
-        """Probability of a combination at least as far from zero if the truth is zero."""
-        own = np.sqrt(np.einsum("i,gij,j->g", contrast, self.covariance, contrast))
-        return float(self.probability @ (2 * t.sf(abs(value) / own, self.freedom)))
+    def _variances(self, contrasts: Floats) -> Floats:
+        """Of each combination with each correlation, (correlations, combinations)."""
+        return np.asarray(np.einsum("ci,gij,cj->gc", contrasts, self.covariance, contrasts, optimize=True))
 
 
 @lru_cache(maxsize=64)
@@ -97,5 +106,5 @@ def _processes(rows: int) -> tuple[Floats, Floats, Floats]:
     angle = np.pi * np.arange(rows) / rows
     first_order = (1 - phi**2)[:, None] / (1 - 2 * phi[:, None] * np.cos(angle) + (phi**2)[:, None])
     spectrum = (1 - share)[:, None] + share[:, None] * first_order
-    prior = np.append(1.0, np.full(phi.size - 1, 1 / len(_SHARES)))
-    return spectrum, share * phi, prior / prior.sum()
+    prior = np.append(0.5, np.full(phi.size - 1, 0.5 / (phi.size - 1)))  # as probable without correlation as with it
+    return spectrum, share * phi, prior
