@@ -90,7 +90,7 @@ def test_the_order_of_the_rows_does_not_matter() -> None:
     assert other.changes == one.changes
 
 
-@settings(max_examples=6)
+@settings(max_examples=6, deadline=None)
 @given(scale=st.floats(1e-3, 1e9), seed=st.integers(0, 20))
 def test_the_unit_does_not_matter(scale: float, seed: int) -> None:
     year = MachineYear(runs=60, jump=-2.0)
