@@ -18,7 +18,7 @@ def test_a_tenth_of_a_percent_a_month_is_found_and_the_bound_covers(correlation:
     # A bound that covers 95 % covers fewer than 90 % of 120 in one case of 100.
     assert of.covered >= 0.9
     assert of.change_covered >= 0.9
-    assert of.found >= 0.99
+    assert of.found >= 0.97
     assert of.bound < 0.04
 
 
@@ -36,7 +36,7 @@ def test_a_change_is_named_and_dated_and_the_slope_after_it_is_covered(year: Mac
     of = Tally.of(year, range(25))
     assert of.named >= 0.88
     assert of.covered >= 0.8
-    assert of.found == 1.0
+    assert of.found >= 0.95
 
 
 def test_false_discoveries_of_a_fleet_are_at_most_five_percent() -> None:

@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from datetime import UTC, datetime
 from os import PathLike
-from typing import Any
+from typing import Any, Protocol
 
 from livebode.configuration.axis import Axis, FitSection
 from livebode.configuration.fit_settings import fitter_of
 from livebode.configuration.recorded import recorded_configuration
 from livebode.configuration.recording import open_recording
-from livebode.core import BaselineError, Block, LivebodeError
+from livebode.core import BaselineError, Block, Lines, LivebodeError, PlantKinds, Responses
 from livebode.locations import Location, Url, local_copy, resolved
 from livebode.monitoring import (
     Baseline,
@@ -25,6 +25,7 @@ from livebode.monitoring import (
     places,
 )
 from livebode.records import RunRecord
+from livebode.records.wide_responses import from_wide, to_wide
 
 _ROLES = ("output", "input", "excitation", "schedule")
 # The belt's parameters referred to the motor shaft; changes are reported in percent.
@@ -62,12 +63,53 @@ def learn(
     if not paths:
         raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
     with ExitStack() as copies:
-        return _learned([RunRecord.open(copies.enter_context(local_copy(path))) for path in paths], report)
+        runs = [RunRecord.open(copies.enter_context(local_copy(path))) for path in paths]
+        axes = [learnable_axis(recorded_configuration(run.summary), run.place) for run in runs]
+        _check_once(runs, axes)
+        return learn_from(runs, axes, report)
 
 
-def _learned(runs: list[RunRecord], report: Callable[[str], None]) -> Baseline:
-    axes = [_axis(run) for run in runs]
-    _check_once(runs, axes)
+class HealthyRun(Protocol):
+    """A run of a run directory or of a lake."""
+
+    @property
+    def place(self) -> str:
+        """Where it is, for its user."""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Entries of run.json."""
+
+    @property
+    def found(self) -> dict[str, Any]:
+        """Rate, window, hop, lines, quantity and unit."""
+
+    @property
+    def lines(self) -> Lines:
+        """Lines of the measurement."""
+
+    @property
+    def kinds(self) -> PlantKinds:
+        """Kinds of the plant's output and input."""
+
+    def steady_batches(self) -> Iterator[Responses]:
+        """Responses of a machine that was ready."""
+
+
+def learn_from(
+    runs: Sequence[HealthyRun], axes: Sequence[Axis], report: Callable[[str], None] = lambda _: None
+) -> Baseline:
+    """The Baseline of runs, each with its `learnable_axis`, whose source.log is its recording.
+
+    Responses are rounded to float32, as a lake stores them: run directories and a lake give the same baseline.
+
+    Raises
+    ------
+    BaselineError
+        If the runs do not match, or contain too little data.
+    LivebodeError
+        If responses or recordings cannot be read.
+    """
     for run, axis in zip(runs, axes):
         _check_same(runs[0], axes[0], run, axis)
     report("learning the lines over the schedule")
@@ -102,32 +144,37 @@ def _learned(runs: list[RunRecord], report: Callable[[str], None]) -> Baseline:
     )
 
 
-def _axis(run: RunRecord) -> Axis:
-    configuration = recorded_configuration(run.summary)
+def learnable_axis(configuration: dict[str, Any], place: str) -> Axis:
+    """The axis of a run's configuration; BaselineError if a baseline cannot be learned from such a run."""
     if "source" not in configuration:
         raise BaselineError(
             "run-not-of-machine",
-            f"{str(run.path)!r} is not the run of a machine",
+            f"{place!r} is not the run of a machine",
             "learn from a directory that `livebode run` wrote",
-            path=str(run.path),
+            path=place,
         )
-    axis = Axis.of(configuration, str(run.path / "run.json"))
+    axis = Axis.of(configuration, place)
     if not axis.tracking.periodic:
         raise BaselineError(
             "run-not-periodic",
-            f"{str(run.path)!r} was estimated with {axis.tracking.estimator!r}, and a baseline needs an excitation "
+            f"{place!r} was estimated with {axis.tracking.estimator!r}, and a baseline needs an excitation "
             "that repeats",
             "learn from a run with the estimator joint, direct or indirect",
-            path=str(run.path),
+            path=place,
         )
     if axis.tracking.average:
         raise BaselineError(
             "run-averaged",
-            f"{str(run.path)!r} was created with tracking.average, so that each response contains those before it",
+            f"{place!r} was created with tracking.average, so that each response contains those before it",
             "learn from a run with tracking.average = false, or compare two averaged runs (livebode compare)",
-            path=str(run.path),
+            path=place,
         )
     return axis
+
+
+def reads_recordings(axis: Axis) -> bool:
+    """Whether a baseline of such runs has a model of the moving machine, which is learned from their recordings."""
+    return None not in (axis.signals.input, axis.signals.schedule) and axis.tracking.quantity == "plant"
 
 
 def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
@@ -148,7 +195,7 @@ def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
         seen |= dict.fromkeys(things, run)
 
 
-def _check_same(first: RunRecord, mine: Axis, run: RunRecord, axis: Axis) -> None:
+def _check_same(first: HealthyRun, mine: Axis, run: HealthyRun, axis: Axis) -> None:
     for name, one, other in (
         ("lines", first.lines, run.lines),
         ("hop", first.found["hop"], run.found["hop"]),
@@ -162,43 +209,48 @@ def _check_same(first: RunRecord, mine: Axis, run: RunRecord, axis: Axis) -> Non
         if one != other:
             raise BaselineError(
                 "runs-differ",
-                f"{str(run.path)!r} and {str(first.path)!r} differ in {name}",
+                f"{run.place!r} and {first.place!r} differ in {name}",
                 "learn from runs with the same configuration",
-                path=str(run.path),
-                other=str(first.path),
+                path=run.place,
+                other=first.place,
                 what=name,
             )
 
 
-def _apart(run: RunRecord) -> list[NonOverlappingWindows]:
+def _apart(run: HealthyRun) -> list[NonOverlappingWindows]:
     window, hop = run.lines.window, run.found["hop"]
     return [NonOverlappingWindows(max(window, hop), place) for place in places(window, hop)]
 
 
-def _rows(run: RunRecord) -> list[WindowRows]:
+def _rows(run: HealthyRun) -> list[WindowRows]:
     """Rows at each place of the period."""
     each = _apart(run)
-    return _joined([[apart.of_responses(batch) for apart in each] for batch in run.steady_batches()])
+    return _joined([[apart.of_responses(batch) for apart in each] for batch in _rounded(run)])
+
+
+def _rounded(run: HealthyRun) -> Iterator[Responses]:
+    """The responses as a lake stores them."""
+    return (from_wide(to_wide(batch), run.found) for batch in run.steady_batches())
 
 
 def _joined(batches: list[list[WindowRows]]) -> list[WindowRows]:
     return [WindowRows.join(parts) for parts in zip(*batches)]
 
 
-def _parameters(runs: list[RunRecord], section: FitSection) -> ScheduleTable:
+def _parameters(runs: Sequence[HealthyRun], section: FitSection) -> ScheduleTable:
     """The table of the fits; they are repeated, because a run's parameters.parquet has no covariance."""
     model = fitter_of(section, runs[0].kinds)
     names = [name for name in model.model.names if name not in model.held]
     rows = []
     for run in runs:
         fitter, each = fitter_of(section, run.kinds), _apart(run)
-        fitted = (fitter.process(batch).only(names) for batch in run.steady_batches())
+        fitted = (fitter.process(batch).only(names) for batch in _rounded(run))
         rows += _joined([[apart.of_parameters(part) for apart in each] for part in fitted])
     return learn_table("parameters", names, rows, len(_apart(runs[0])))
 
 
 def _machine(
-    runs: list[RunRecord], axes: list[Axis], report: Callable[[str], None]
+    runs: Sequence[HealthyRun], axes: Sequence[Axis], report: Callable[[str], None]
 ) -> tuple[LearnedMachine | None, str]:
     """A model of the moving machine, or the reason why there is none."""
     signals = axes[0].signals
@@ -227,7 +279,7 @@ def _machine(
         return None, str(error)
 
 
-def _samples(run: RunRecord, axis: Axis) -> Callable[[], Iterator[Block]]:
+def _samples(run: HealthyRun, axis: Axis) -> Callable[[], Iterator[Block]]:
     names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule, *axis.monitoring.covariates]
 
     ready = axis.ready

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -11,22 +12,30 @@ from packaging.version import Version
 from livebode.configuration.machine_section import LEVELS
 from livebode.lake import Lake
 
-_COLUMNS = ["content", "recipe", *LEVELS, "recorded_from"]
+_COLUMNS = ["content", "recipe", *LEVELS, "recorded_from", "alarms", "baseline"]
 
 
 @dataclass
 class MachineRuns:
-    """The runs of a machine: their number, and the days of the first and the last, as far as known."""
+    """The runs of a machine: how many, and the days of the first and the last, as far as known.
+
+    `judged` of them were compared with a baseline, and `alarming` of these have an alarm.
+    """
 
     machine: str
     runs: int = 0
+    judged: int = 0
+    alarming: int = 0
     quarantined: int = 0
     first: datetime | None = None
     last: datetime | None = None
 
-    def count(self, recorded: datetime | None) -> None:
-        """Count a run that was recorded then."""
+    def count(self, row: dict[str, Any]) -> None:
+        """Count the run of a row of `runs`."""
+        recorded = row["recorded_from"]
         self.runs += 1
+        self.judged += row["baseline"] is not None
+        self.alarming += bool(row["alarms"])
         if recorded is not None:
             self.first = min(self.first or recorded, recorded)
             self.last = max(self.last or recorded, recorded)
@@ -35,14 +44,15 @@ class MachineRuns:
     def plain(self) -> dict[str, Any]:
         """As plain data, the days in ISO 8601."""
         days = {name: when and when.date().isoformat() for name, when in (("first", self.first), ("last", self.last))}
-        return {"machine": self.machine, "runs": self.runs, "quarantined": self.quarantined, **days}
+        numbers = {name: getattr(self, name) for name in ("runs", "judged", "alarming", "quarantined")}
+        return {"machine": self.machine, **numbers, **days}
 
 
 def machines(lake: Lake) -> list[MachineRuns]:
     """The machines of the lake by name, with the numbers of their runs and of recordings in quarantine."""
     found: dict[str, MachineRuns] = {}
     for row in lake.read("runs", _COLUMNS).to_pylist():
-        found.setdefault(path_of(row), MachineRuns(path_of(row))).count(row["recorded_from"])
+        found.setdefault(path_of(row), MachineRuns(path_of(row))).count(row)
     for row in quarantine(lake):
         found.setdefault(path_of(row), MachineRuns(path_of(row))).quarantined += 1
     return [found[name] for name in sorted(found)]
@@ -57,7 +67,7 @@ def quarantine(lake: Lake) -> list[dict[str, Any]]:
     return sorted(newest.values(), key=lambda row: (row["url"], row["recipe"]))
 
 
-def path_of(row: dict[str, Any]) -> str:
+def path_of(row: Mapping[str, Any]) -> str:
     """The machine as site/line/machine/axis; levels that are not known are left out.
 
     >>> path_of({"site": "Graz", "line": None, "machine": "press 4", "axis": "x"})

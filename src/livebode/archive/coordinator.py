@@ -112,7 +112,9 @@ class Coordinator:
         axis = settings.axis()
         self._settings, self._report = settings, report
         self._lake = Lake(settings.lake)
-        self._job = Job(axis, recipe_id(axis), settings.lake, settings.cluster.memory_mb * 1_000_000)
+        self._job = Job(
+            axis, recipe_id(axis), settings.lake, settings.cluster.memory_mb * 1_000_000, settings.baselines
+        )
         self._outcome = ArchiveOutcome()
         self._cluster: Cluster | None = None
 

@@ -102,6 +102,10 @@ class ArchiveSettings(_Section):
         An axis.toml without its source, relative to this file. Its [machine] applies where the inputs name none.
     lake
         Directory, relative to this file, or URL of the results.
+    baselines
+        Path of the baseline of each machine, with its levels in braces: "baselines/{machine}-{axis}.json". A recording
+        of a machine whose file exists is compared with it; `livebode archive learn` writes these files. Relative to
+        this file. Default: none.
     cluster
         The processes that track.
     """
@@ -109,6 +113,7 @@ class ArchiveSettings(_Section):
     inputs: Annotated[list[Text], Field(min_length=1)]
     recipe: File
     lake: Text
+    baselines: Text | None = None
     cluster: ClusterSection = ClusterSection()
 
     @classmethod
@@ -126,6 +131,8 @@ class ArchiveSettings(_Section):
             found.cluster.checked()
             for template in found.templates:
                 template.checked()
+            if found.baselines is not None:
+                check_baselines(found.baselines, "baselines")
         except ValidationError as error:
             raise _first_of(error).at(str(path)) from None
         except ConfigError as error:
@@ -136,6 +143,7 @@ class ArchiveSettings(_Section):
                 "inputs": [_beside(folder, one) for one in found.inputs],
                 "recipe": folder / found.recipe,
                 "lake": _beside(folder, found.lake),
+                "baselines": None if found.baselines is None else str(folder / found.baselines),
                 "cluster": found.cluster.beside(folder),
             }
         )
@@ -163,7 +171,28 @@ class ArchiveSettings(_Section):
                 key=f"source.{named[0]}",
             ).at(str(self.recipe))
         own = data | {"source": {**source, "log": "recording"}}
-        return Axis.of(own, str(self.recipe)).beside(self.recipe.parent)
+        axis = Axis.of(own, str(self.recipe)).beside(self.recipe.parent)
+        if self.baselines is not None and axis.monitoring.baseline is not None:
+            raise ConfigError(
+                "key-conflict",
+                "the recipe has a baseline for all machines, and the archive one for each (baselines)",
+                "remove one of them",
+                key="monitoring.baseline",
+            ).at(str(self.recipe))
+        return axis
+
+
+def check_baselines(text: str, key: str) -> None:
+    """ConfigError if this is not the path of a file for each machine."""
+    Template(text).checked(key)
+    if "://" in text or any(sign in text for sign in "*?"):
+        raise ConfigError(
+            "value-invalid",
+            f"{key} = {text!r} is not a path on this computer with the levels of a machine in braces",
+            'write it as "baselines/{machine}-{axis}.json"',
+            key=key,
+            value=text,
+        )
 
 
 def archive_schema() -> Schema:

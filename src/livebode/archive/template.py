@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from livebode.configuration.machine_section import LEVELS
@@ -19,7 +20,7 @@ class Template:
 
     text: str
 
-    def checked(self) -> None:
+    def checked(self, key: str = "inputs") -> None:
         """ConfigError if a name in braces is not a level of a machine, or is there twice."""
         names = [found[1] for found in _PARTS.finditer(self.text) if found[0].startswith("{")]
         for name in names:
@@ -29,7 +30,7 @@ class Template:
                     "value-invalid",
                     f"{{{name}}} in {self.text!r} {what}",
                     "write {site}, {line}, {machine} and {axis}, each once",
-                    key="inputs",
+                    key=key,
                     value=self.text,
                 )
 
@@ -50,6 +51,16 @@ class Template:
         """
         found = self._expression.fullmatch(place.replace(os.sep, "/"))
         return found.groupdict() if found else {}
+
+    def filled(self, levels: Mapping[str, str | None]) -> str | None:
+        """The path of the machine with these levels; None if a level in braces is not known.
+
+        >>> Template("baselines/{site}-{machine}.json").filled({"site": "Graz", "machine": "press 4"})
+        'baselines/Graz-press 4.json'
+        """
+        if not all(levels.get(found[1]) for found in _PARTS.finditer(self.text)):
+            return None
+        return _PARTS.sub(lambda found: levels[found[1]] or "", self.text)
 
     @property
     def _expression(self) -> re.Pattern[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite
@@ -16,7 +16,9 @@ import pyarrow as pa
 
 from livebode.analysis.run_trend import trend_points
 from livebode.archive.recordings import ArchivedRecording, levels_of
+from livebode.archive.template import Template
 from livebode.configuration.axis import Axis
+from livebode.configuration.recorded import recorded_configuration
 from livebode.configuration.recording import open_recording
 from livebode.core import ArchiveError, Event
 from livebode.lake import DataFile, Key, Lake
@@ -45,17 +47,28 @@ class Job:
         URL of the lake.
     memory_bytes
         Memory that tracking one recording may use.
+    baselines
+        Path of the baseline of each machine, with its levels in braces; None: no comparison.
     """
 
     axis: Axis
     recipe: str
     lake: str
     memory_bytes: int
+    baselines: str | None = None
 
     @property
     def machine(self) -> dict[str, str]:
         """Levels of the machine for recordings whose place names none."""
         return self.axis.machine.levels if self.axis.machine else {}
+
+    def axis_for(self, path: Path, levels: Mapping[str, str | None]) -> Axis:
+        """The recipe for the recording in this file, compared with the baseline of its machine if there is one."""
+        axis = self.axis.model_copy(update={"source": self.axis.source.model_copy(update={"log": path})})
+        file = None if self.baselines is None else Template(self.baselines).filled(levels)
+        if file is None or not Path(file).exists():
+            return axis
+        return axis.model_copy(update={"monitoring": axis.monitoring.model_copy(update={"baseline": Path(file)})})
 
 
 @dataclass(frozen=True)
@@ -84,14 +97,15 @@ def track(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -
             raise ArchiveError(
                 "changed-meanwhile", f"{recording.place.url} changed while the archive was tracked", "run it again"
             )
-        axis = job.axis.model_copy(update={"source": job.axis.source.model_copy(update={"log": path})})
+        levels = levels_of(recording.place, job.machine)
+        axis = job.axis_for(path, levels)
         run(axis, Destination(Path(folder) / "run", _no_pictures))
         record = RunRecord.open(Path(folder) / "run")
         files = tuple(_files(Path(folder), key, record))
         lake = Lake(job.lake)
         for file in files:
             lake.store(Path(folder) / file.table / file.name, file.table)
-        common = key._asdict() | levels_of(recording.place, job.machine)
+        common = key._asdict() | levels
         return TrackedRun(files, common | _about(record, recording, files), tuple(_quantities(axis, record, common)))
 
 
@@ -133,6 +147,7 @@ def _plain(event: Event) -> dict[str, Any]:
 def _about(record: RunRecord, recording: ArchivedRecording, files: tuple[DataFile, ...]) -> dict[str, Any]:
     """Row of the table `runs`, without what all tables have."""
     found, recorded = record.found, record.summary.get("recorded") or {}
+    monitoring = record.summary.get("monitoring", {})
     rows = {file.table: file.rows for file in files}
     return {
         "url": str(recording.place.url),
@@ -147,7 +162,20 @@ def _about(record: RunRecord, recording: ArchivedRecording, files: tuple[DataFil
         "frequencies_hz": record.lines.frequency_hz.tolist(),
         "quiet_bins": list(record.lines.quiet),
         "livebode": __version__,
+        "alarms": monitoring.get("changes", 0),
+        "baseline": monitoring.get("baseline_id"),
+        "summary": json.dumps(_summary(record), sort_keys=True, ensure_ascii=False),
     } | {name: rows.get(name, 0) for name in ("responses", "parameters", "events")}
+
+
+def _summary(record: RunRecord) -> dict[str, Any]:
+    """What `LakeRun` needs of run.json: nothing in it depends on where and when the recording was tracked."""
+    configuration = recorded_configuration(record.summary)
+    del configuration["source"]["log"]
+    configuration.pop("machine", None)
+    configuration.get("monitoring", {}).pop("baseline", None)
+    transient = {name: record.summary[name] for name in ("left_out_samples",) if name in record.summary}
+    return {"configuration": configuration, "found": record.found} | transient
 
 
 def _quantities(axis: Axis, record: RunRecord, common: dict[str, Any]) -> Iterator[dict[str, Any]]:

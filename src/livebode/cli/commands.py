@@ -48,6 +48,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "retry": "Track recordings in quarantine again, each in a process of its own.",
         "compact": "Join the small files of a lake, and remove files that belong to no result.",
         "trend": "Find how a quantity changes over months, for each machine: slope, jumps and bends with bounds.",
+        "learn": "Learn a baseline of one machine, or of each machine of a hall, from its healthy runs in the lake.",
         "compare": "Find the quantities that differ between two axes, or between two spans of one, with bounds.",
         "report": "Write the trends of all quantities and machines as one page, the worst machine first.",
     },

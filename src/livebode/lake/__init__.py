@@ -3,6 +3,7 @@
 from livebode.lake.compaction import Compacted, compact
 from livebode.lake.data_file import DataFile, Key
 from livebode.lake.lake import Lake
+from livebode.lake.lake_run import LakeRun, runs_of
 from livebode.lake.schemas import EVENTS, FILES, PARAMETERS, QUANTITIES, QUARANTINE, RESPONSES, RUNS, TABLES
 
 __all__ = [
@@ -18,5 +19,7 @@ __all__ = [
     "DataFile",
     "Key",
     "Lake",
+    "LakeRun",
     "compact",
+    "runs_of",
 ]

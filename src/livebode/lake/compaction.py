@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from deltalake import ColumnProperties, DeltaTable, WriterProperties
 
+from livebode.lake.data_file import JOINED
 from livebode.lake.lake import Lake
 from livebode.lake.schemas import TABLES
 from livebode.records.wide_responses import wide_options
@@ -61,7 +62,7 @@ def _open_results(lake: Lake, name: str, table: DeltaTable) -> int:
         return 0
     counted = {f"{content}-{recipe}" for content, recipe in lake.keys("runs")}
     names = [uri.rpartition("/")[2].removesuffix(".parquet") for uri in table.file_uris()]
-    return sum(not name.startswith("part-") and name not in counted for name in names)
+    return sum(not name.startswith(JOINED) and name not in counted for name in names)
 
 
 def _layout(name: str) -> WriterProperties:

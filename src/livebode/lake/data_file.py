@@ -14,6 +14,9 @@ import pyarrow.parquet as pq
 from livebode.lake.schemas import TABLES
 from livebode.records.wide_responses import wide_options
 
+JOINED = "part-"
+"""Begin of the names that Delta gives to joined files."""
+
 
 class Key(NamedTuple):
     """What a result belongs to: the recording by its content, and the settings by the recipe's id."""

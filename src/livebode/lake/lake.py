@@ -19,9 +19,9 @@ from pyarrow.fs import LocalFileSystem, SubTreeFileSystem
 from livebode.core import ArchiveError
 from livebode.core.files import whole_file
 from livebode.core.installing import not_installed
-from livebode.lake.data_file import DataFile, parquet_writer
+from livebode.lake.data_file import JOINED, DataFile, Key, parquet_writer
 from livebode.lake.schemas import TABLES
-from livebode.locations import Location, delta_options, location, read_bytes, write_whole
+from livebode.locations import Location, Url, delta_options, location, read_bytes, write_whole
 from livebode.locations.storage import make_parent, opened, reporting
 
 try:
@@ -71,6 +71,28 @@ class Lake:
                 empty = TABLES[name].schema.empty_table()
                 return empty.select(columns) if columns else empty
             return self._rows(name, table, columns, where)
+
+    def rows_of(self, name: str, key: Key) -> pa.Table:
+        """The rows of one result in a table of responses, parameters or events, read from as few files as possible.
+
+        They are in the order in which they were tracked.
+
+        Raises
+        ------
+        ArchiveError
+            If the table cannot be read.
+        """
+        schema, place = TABLES[name].schema, self._place / name
+        where = (pc.field("content") == key.content) & (pc.field("recipe") == key.recipe)
+        with self.reported(name):
+            table = self.opened(name)
+            files = [] if table is None else [uri.rsplit("/", 1)[-1] for uri in table.file_uris()]
+            own = f"{key.content}-{key.recipe}.parquet"
+            parts = [schema.empty_table()]
+            for file in [own] if own in files else [file for file in files if file.startswith(JOINED)]:
+                source = pa.BufferReader(read_bytes(place / file)) if isinstance(place, Url) else place / file
+                parts.append(pq.read_table(source, filters=where, schema=schema))
+            return pa.concat_tables(parts).sort_by("sample")
 
     def quantities(self) -> pa.Table:
         """The quantities of the results that count, those with a row in `runs`."""
@@ -176,7 +198,9 @@ class Lake:
         place, schema = self._place / name, TABLES[name].schema
         if isinstance(place, Path):
             own = SubTreeFileSystem(str(place), LocalFileSystem())
-            return table.to_pyarrow_dataset(filesystem=own).to_table(columns=columns, filter=where)
+            # A table of an earlier livebode lacks the newest columns, which are then null.
+            found = table.to_pyarrow_dataset(filesystem=own, schema=schema)
+            return found.to_table(columns=columns, filter=where)
 
         def part(uri: str) -> pa.Table:
             source = pa.BufferReader(read_bytes(place / uri.rsplit("/", 1)[-1]))

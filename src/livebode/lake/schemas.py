@@ -47,6 +47,9 @@ RUNS = pa.schema(
         ("parameters", pa.int64()),
         ("events", pa.int64()),
         ("livebode", pa.string()),
+        ("alarms", pa.int64()),
+        ("baseline", pa.string()),
+        ("summary", pa.string()),
     ]
 )
 """One row for each result, which is written last: a result without it does not count."""

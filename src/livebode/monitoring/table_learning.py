@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 
 _BINS = 24
 _SMALLEST = 0.01  # of a magnitude or a parameter; radians of a phase
+_ROUNDING = float(np.finfo(np.float32).eps)
 _STILL = 0.05  # of the fastest usual step
 _ENOUGH = 0.9  # of the cells are to be known well enough for the smallest change
 
@@ -73,9 +74,14 @@ def _grid(rows: WindowRows) -> tuple[float, float, float, int]:
     if not np.isfinite(rows.schedule).any():
         return 0.0, 0.0, 0.0, 1
     low, high = float(np.nanmin(rows.schedule)), float(np.nanmax(rows.schedule))
-    step = (high - low) / _BINS * (1 + 1e-9) or max(abs(low), 1.0) * 1e-3
     moved = np.abs(rows.step[np.isfinite(rows.step)])
-    return low, step, _STILL * float(np.quantile(moved, 0.99)) if moved.size else 0.0, _BINS if high > low else 1
+    still = _STILL * float(np.quantile(moved, 0.99)) if moved.size else 0.0
+    # The ends are known as well as float32 gives them, and a position at an end belongs to its bin.
+    margin = _ROUNDING * max(abs(low), abs(high))
+    if high == low:
+        step = max(abs(low), 1.0) * 1e-3
+        return low - step / 2, step, still, 1
+    return low - margin, (high - low + 2 * margin) / _BINS * (1 + 1e-9), still, _BINS
 
 
 def _moments(

@@ -63,6 +63,14 @@ def kinds_in(found: Mapping[str, Any]) -> PlantKinds:
     return PlantKinds(**found["kinds"]) if "kinds" in found else PlantKinds.of_unit(found.get("unit", ""))
 
 
+def steady(responses: Responses, summary: Mapping[str, Any]) -> Responses:
+    """Those of a machine that was ready, without a transient at the start of a live run; averages are all included."""
+    left_out = int(summary.get("left_out_samples") or 0)
+    averages = (summary.get("configuration", {}).get("tracking") or {}).get("average")
+    use = responses.ready & (responses.first >= left_out) if left_out and not averages else responses.ready
+    return responses if use.all() else responses[np.flatnonzero(use)]
+
+
 @dataclass(frozen=True)
 class RunRecord:
     """The directory of a run: finished, stopped, killed, or still being written.
@@ -187,11 +195,7 @@ class RunRecord:
 
         Averaged responses are all included.
         """
-        left_out = int(self.summary.get("left_out_samples") or 0)
-        averages = (self.summary.get("configuration", {}).get("tracking") or {}).get("average")
-        for part in self.batches():
-            steady = part.ready & (part.first >= left_out) if left_out and not averages else part.ready
-            yield part if steady.all() else part[np.flatnonzero(steady)]
+        return (steady(part, self.summary) for part in self.batches())
 
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """Responses with an effective time in this span, including its ends, in parts; other segments are not read."""

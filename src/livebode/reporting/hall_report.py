@@ -26,6 +26,15 @@ from livebode.trending import LIMIT_PERCENT, Assessment, History, Ranked, urgenc
 _SENTENCES, _PICTURES, _ROWS = 12, 6, 40
 
 
+@dataclass(frozen=True)
+class RunAlarm:
+    """An alarm of a run: its axis, begin of the recording in s since 1970, and what was reported."""
+
+    axis: str
+    recorded_s: float | None
+    message: str
+
+
 @dataclass(frozen=True, eq=False)
 class Hall:
     """What a lake says about a hall.
@@ -40,12 +49,18 @@ class Hall:
         Rows of recordings that could not be tracked: axis, and reason.
     limit_percent
         Change that needs maintenance.
+    alarming
+        Number of runs with an alarm.
+    alarms
+        Those of the newest of these, the newest run first.
     """
 
     name: str
     assessments: Sequence[Assessment]
     quarantined: Sequence[tuple[str, str]] = ()
     limit_percent: float = LIMIT_PERCENT
+    alarming: int = 0
+    alarms: Sequence[RunAlarm] = ()
 
     @property
     def changed(self) -> list[tuple[Ranked, History]]:
@@ -85,11 +100,13 @@ class Hall:
                 for one, history in self.changed
             ],
             "silent": {axis: day(last) for axis, last in self.silent.items()},
+            "runs_with_alarms": self.alarming,
+            "alarms": [{"axis": one.axis, "recorded": _recorded(one), "message": one.message} for one in self.alarms],
         }
 
     def document(self, made: datetime) -> Document:
         """The report."""
-        sections = (self._changes(), self._silent(), self._not_assessed(), self._how())
+        sections = (self._alarm_list(), self._changes(), self._silent(), self._not_assessed(), self._how())
         return Document(
             kind=tr("Report of a hall"),
             title=self.name,
@@ -97,7 +114,7 @@ class Hall:
             verdict=(),
             sections=tuple(section for section in sections if section is not None),
             foot=self.name,
-            result=(self._result(), *self._findings()),
+            result=(*self._alarm_finding(), self._result(), *self._findings()),
             picture=self._picture(),
             made=made,
         )
@@ -144,6 +161,24 @@ class Hall:
             )
         for axis, last in self.silent.items():
             yield Finding("check", tr("{axis} has no run since {day}.", axis=axis, day=day(last)))
+
+    def _alarm_finding(self) -> Iterator[Finding]:
+        if self.alarms:
+            axes = listed(sorted({one.axis for one in self.alarms}))
+            text = trn(
+                "{n:,} run has an alarm against the baseline of its machine: {axes}.",
+                "{n:,} runs have an alarm against the baseline of their machine: {axes}.",
+                self.alarming,
+                axes=axes,
+            )
+            yield Finding("alarm", text)
+
+    def _alarm_list(self) -> Section | None:
+        if not self.alarms:
+            return None
+        rows = tuple((one.axis, _recorded(one) or "—", recognised(one.message)) for one in self.alarms[:_ROWS])
+        note = tr("The newest runs first. Each was compared with the baseline of its machine.")
+        return Section(tr("Alarms"), (Table((tr("axis"), tr("recorded"), tr("alarm")), rows, (), note),))
 
     def _changes(self) -> Section | None:
         if not self.changed:
@@ -217,3 +252,7 @@ class Hall:
             limit=number(self.limit_percent, "g"),
         )
         return Section(tr("How it was assessed"), (Paragraph(words),))
+
+
+def _recorded(one: RunAlarm) -> str:
+    return "" if one.recorded_s is None else day(one.recorded_s)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Literal, get_args
 
@@ -120,6 +120,8 @@ class Selection:
         Names; None: all that the runs have.
     recipe
         Begin of the id of the settings. None: those of most runs.
+    excluded
+        Contents of recordings that are left out.
     """
 
     by: Level = "machine"
@@ -128,6 +130,15 @@ class Selection:
     until: datetime | None = None
     covariates: Sequence[str] | None = None
     recipe: str | None = None
+    excluded: Sequence[str] = ()
+
+    def includes(self, axis: str) -> bool:
+        """Whether this axis is below the selected machine."""
+        return not self.below or axis == self.below or axis.startswith(self.below + "/")
+
+    def without(self, contents: Sequence[str]) -> Selection:
+        """The same without these recordings."""
+        return replace(self, excluded=(*self.excluded, *contents))
 
 
 def history(lake: Lake, quantity: str, of: Selection) -> History:
@@ -148,26 +159,27 @@ def history(lake: Lake, quantity: str, of: Selection) -> History:
         If there is no such quantity, several have the name, no run has the recipe or a covariate, or the lake cannot
         be read.
     """
-    found = lake.read("quantities", _COLUMNS, _where(of) & (pc.field("name") == quantity))
+    found = lake.read("quantities", _COLUMNS, where_of(of) & (pc.field("name") == quantity))
     models = pc.unique(found["model"]).to_pylist()
     model, name = (models[0], quantity) if len(models) == 1 else _resolved(lake, quantity)
     if name != quantity or not models:
         of_it = (pc.field("name") == name) & (pc.field("model") == model)
-        found = lake.read("quantities", _COLUMNS, _where(of) & of_it)
+        found = lake.read("quantities", _COLUMNS, where_of(of) & of_it)
     return _history(_counted(lake, found), of, model, name)
 
 
 def histories(lake: Lake, of: Selection) -> list[History]:
     """All quantities of the runs that count, in the order of models and names."""
-    found = _counted(lake, lake.read("quantities", _COLUMNS, _where(of)))
+    found = _counted(lake, lake.read("quantities", _COLUMNS, where_of(of)))
+    own = found if of.recipe is None else one_recipe(found, of.recipe)[0]
     return [
         _history(found.filter((pc.field("model") == model) & (pc.field("name") == name)), of, model, name)
-        for model, name in _quantities(found)
+        for model, name in _quantities(own)
     ]
 
 
 def _history(found: pa.Table, of: Selection, model: str, name: str) -> History:
-    found, recipe, others = _one_recipe(found, of.recipe)
+    found, recipe, others = one_recipe(found, of.recipe)
     path = _path(found, LEVELS)
     found = found.append_column("axis path", path)
     if of.below:
@@ -242,7 +254,7 @@ def _joined(rows: pa.Table) -> pa.ChunkedArray:
     return pc.binary_join_element_wise(rows["content"], rows["recipe"], "/")
 
 
-def _one_recipe(rows: pa.Table, recipe: str | None) -> tuple[pa.Table, str, int]:
+def one_recipe(rows: pa.Table, recipe: str | None) -> tuple[pa.Table, str, int]:
     """The rows with this recipe, or with that of most rows; its id, and the number of other rows."""
     counts = sorted((-one["counts"], one["values"]) for one in pc.value_counts(rows["recipe"]).to_pylist())
     if recipe is not None:
@@ -261,11 +273,13 @@ def _one_recipe(rows: pa.Table, recipe: str | None) -> tuple[pa.Table, str, int]
     return kept, own, rows.num_rows - kept.num_rows
 
 
-def _where(of: Selection) -> pc.Expression:
+def where_of(of: Selection) -> pc.Expression:
     """Runs of the span; those without a date count, so that their number is known."""
     at, where = pc.field("recorded_from"), pc.scalar(True)
     if of.since is not None:
         where &= at.is_null() | (at >= pa.scalar(of.since, pa.timestamp("us", tz="UTC")))
+    if of.excluded:
+        where &= ~pc.field("content").isin(list(of.excluded))
     if of.until is not None:
         where &= at.is_null() | (at < pa.scalar(of.until, pa.timestamp("us", tz="UTC")))
     return where

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, sqrt
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.stats import t
 
+from livebode.trending.correlated_scatter import CorrelatedScatter
+
 Floats = NDArray[np.float64]
 
 _BISQUARE = 4.685  # of the scatter: 95 % efficiency for a normal distribution
 _MAD = 1.482602  # standard deviation of a normal distribution whose median absolute deviation is 1
-_CORRELATION_MAX = 0.98
 _ITERATIONS, _CLOSE = 40, 1e-6
 _TINY = 1e-12  # of the size of the values: scatter that is only rounding
 
@@ -33,34 +34,33 @@ class RobustFit:
         Share with which each row counts, 0 for an outlier, (rows,).
     scatter
         Standard deviation of a row of average accuracy around the fit.
-    correlation
-        Of the scatter of neighbours; increased by its own standard error and by the bias of an estimate from residuals.
-    freedom
-        Degrees of freedom of `scatter`, reduced by the correlation.
-    covariance
-        Of the coefficients' errors, (terms, terms).
+    errors
+        Of the coefficients, with the correlation of the scatter.
     """
 
     coefficients: Floats
     residual: Floats
     weight: Floats
     scatter: float
-    correlation: float
-    freedom: float
-    covariance: Floats
+    errors: CorrelatedScatter
+
+    @property
+    def correlation(self) -> float:
+        """Of the scatter of neighbours."""
+        return self.errors.correlation
 
     def error(self, contrasts: Floats) -> Floats:
         """Standard error of each combination of the coefficients, (combinations, terms) in."""
-        rows = np.atleast_2d(contrasts)
-        return np.asarray(np.sqrt(np.einsum("ij,ij->i", rows @ self.covariance, rows)))
+        return self.errors.error(np.atleast_2d(contrasts))[0]
 
     def bound_95(self, contrasts: Floats) -> Floats:
         """95 % bound of each combination."""
-        return np.asarray(t.ppf(0.975, self.freedom) * self.error(contrasts))
+        error, freedom = self.errors.error(np.atleast_2d(contrasts))
+        return np.asarray(t.ppf(0.975, freedom) * error)
 
     def p(self, contrast: Floats) -> float:
         """Probability of a combination at least as far from zero if the truth is zero."""
-        return float(2 * t.sf(abs(float(self.coefficients @ contrast)) / float(self.error(contrast)[0]), self.freedom))
+        return self.errors.p(contrast, float(self.coefficients @ contrast))
 
 
 def robust_fit(terms: Floats, value: Floats, sigma: Floats) -> RobustFit:
@@ -70,9 +70,8 @@ def robust_fit(terms: Floats, value: Floats, sigma: Floats) -> RobustFit:
     15, 1987, without his start by resampling: outliers are in the values, not in the terms). A row counts with
     1/(τ² + σ²), where τ is the scatter beyond the errors of the rows.
 
-    The errors of the coefficients are those of a process of first order, e_i = φ e_{i−1} + ε_i, in the order of the
-    rows. Residuals understate φ: it is corrected by (1 + 3φ + (p − 1)(1 + φ))/n (Kendall, Biometrika 41, 1954, extended
-    to p terms) and increased by its standard error √((1 − φ²)/n). The variance is corrected for what the terms absorb.
+    The errors of the coefficients allow for scatter that is correlated in the order of the rows; see
+    `CorrelatedScatter`.
 
     Biased if more than a third of the rows are outliers, or if a term has an error of its own: its coefficient is then
     too small. The bounds are too small for scatter that is correlated longer than a tenth of the rows.
@@ -105,13 +104,9 @@ def robust_fit(terms: Floats, value: Floats, sigma: Floats) -> RobustFit:
     at, weight = _bisquare(q, y, start, scale)
     left = y - q @ at
     influence = _influence(left, weight, scale)
-    phi = _correlation(influence, count)
-    among = _correlated_products(q, phi)
-    variance = float(influence @ influence) / max(rows - float(among.trace()), 1.0)
-    freedom = max((rows - count) * (1 - phi) / (1 + phi), 2.0)
     to_q = solve_triangular(r, np.eye(count), lower=False)
-    covariance = variance * to_q @ among @ to_q.T
-    return RobustFit(to_q @ at, left * own, weight, sqrt(variance), phi, freedom, covariance)
+    errors = CorrelatedScatter.of(q, influence).seen_as(to_q)
+    return RobustFit(to_q @ at, left * own, weight, errors.scatter, errors)
 
 
 def _own_errors(terms: Floats, value: Floats, sigma: Floats) -> Floats:
@@ -161,27 +156,6 @@ def _influence(left: Floats, weight: Floats, scale: float) -> Floats:
     """What each row moves the estimate by, as the residual of least squares would (Huber, Robust Statistics, 7.6)."""
     slope = np.where(weight > 0, np.sqrt(weight) * (1 - 5 * (left / (_BISQUARE * scale)) ** 2), 0.0)
     return np.asarray(left * weight / max(float(slope.mean()), 0.1))
-
-
-def _correlation(influence: Floats, count: int) -> float:
-    """Correlation of neighbours, on the safe side, 0 to 0.98."""
-    rows, power = len(influence), float(influence @ influence)
-    if power == 0:
-        return 0.0
-    phi = float(influence[1:] @ influence[:-1]) / power
-    phi += (1 + 3 * phi + (count - 1) * (1 + phi)) / rows
-    phi += sqrt(max(1 - phi**2, 0.0) / rows)
-    return min(max(phi, 0.0), _CORRELATION_MAX)
-
-
-def _correlated_products(q: Floats, phi: float) -> Floats:
-    """QᵀRQ, where the correlation of rows i and j is R_ij = φ^|i−j|; the sum over j < i is a filter of first order."""
-    if phi == 0:
-        return np.asarray(q.T @ q)
-    from scipy.signal import lfilter
-
-    before = q.T @ lfilter([0.0, phi], [1.0, -phi], q, axis=0)
-    return np.asarray(q.T @ q + before + before.T)
 
 
 def rank_of(terms: Floats) -> int:

@@ -9,7 +9,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.archive.options import LakeOf
-from livebode.cli.archive.selection import By, CovariateNames, Recipe, Since, Until, selection
+from livebode.cli.archive.selection import SelectionOptions, with_selection
 from livebode.cli.options import Json
 from livebode.core import UsageError
 
@@ -20,19 +20,17 @@ if TYPE_CHECKING:
 _COLUMNS = ("quantity", "first", "second", "difference", "in %", "unit", "runs")
 
 
+@with_selection("since", "until", "covariate", "recipe")
 def compare_command(
     archive: LakeOf,
     first: Annotated[str, typer.Argument(metavar="AXIS", help="site/line/machine/axis.")],
+    chosen: SelectionOptions,
     second: Annotated[
         str | None, typer.Argument(metavar="OTHER", help="Another axis. \\[default: the same one, from --split on]")
     ] = None,
     split: Annotated[
         str | None, typer.Option(metavar="DATE", help="Compare the runs before this day with those from it on.")
     ] = None,
-    since: Since = None,
-    until: Until = None,
-    covariate: CovariateNames = None,
-    recipe: Recipe = None,
     as_json: Json = False,
 ) -> None:
     """Find the quantities that differ between two axes, or between two spans of one, with bounds.
@@ -51,8 +49,7 @@ def compare_command(
             "missing", "there is nothing to compare with, or twice", "name another axis, or --split DATE",
             argument="--split",
         )  # fmt: skip
-    chosen = selection(By.axis, "", since, until, covariate, recipe)
-    found, few = differences(_pairs(Lake(lake_url(archive)), chosen, first.strip("/"), second, split))
+    found, few = differences(_pairs(Lake(lake_url(archive)), chosen.selection(), first.strip("/"), second, split))
     if as_json:
         print(to_json({"differences": [vars(one) for one in found], "too_few_runs": few}))
         return

@@ -10,6 +10,8 @@ from livebode.cli import terminal
 from livebode.cli.archive.options import LakeOf
 from livebode.cli.options import Json
 
+_COLUMNS = ("machine", "runs", "judged", "alarming", "quarantined", "first", "last")
+
 
 def list_command(
     archive: LakeOf,
@@ -38,7 +40,7 @@ def list_command(
     if as_json:
         print(to_json({"machines": rows}))
     elif rows:
-        _print(("machine", "runs", "quarantined", "first", "last"), [tuple(row.values()) for row in rows])
+        _print(_COLUMNS, [tuple(row.values()) for row in rows])
     else:
         print(f"the lake {lake.url} has no run yet")
 
@@ -48,7 +50,7 @@ def _print(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
 
     table = Table(box=None, pad_edge=False)
     for column in columns:
-        table.add_column(column, overflow="fold", justify="right" if column in ("runs", "quarantined") else "left")
+        table.add_column(column, overflow="fold", justify="right" if column in _COLUMNS[1:5] else "left")
     for row in rows:
         table.add_row(*("" if value is None else str(value) for value in row))
     terminal.console(width=None if terminal.is_terminal() else 1 << 14, markup=False).print(table)

@@ -9,23 +9,20 @@ from typing import Annotated
 import typer
 
 from livebode.cli.archive.options import LakeOf
-from livebode.cli.archive.selection import Below, By, CovariateNames, Limit, Recipe, Since, Until, selection
+from livebode.cli.archive.selection import Limit, SelectionOptions, with_selection
 from livebode.cli.documents import write_documents
 from livebode.cli.options import Json
 from livebode.cli.report_options import ReportLanguage
 
 
+@with_selection("below", "since", "until", "covariate", "recipe")
 def report_command(
     archive: LakeOf,
+    chosen: SelectionOptions,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Write FILE.html and FILE.pdf.", show_default=True)] = Path(
         "hall-report"
     ),
     name: Annotated[str, typer.Option(metavar="TEXT", help="Title. \\[default: name of the lake]")] = "",
-    below: Below = "",
-    since: Since = None,
-    until: Until = None,
-    covariate: CovariateNames = None,
-    recipe: Recipe = None,
     limit: Limit = 10.0,
     language: ReportLanguage = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
@@ -33,9 +30,10 @@ def report_command(
 ) -> None:
     """Write the trends of all quantities and machines as one page, the worst machine first.
 
-    It contains significant changes in words, pictures of the worst machines, machines without data, and what was not
-    assessed and why. The PDF needs the extra `pdf`.
+    It contains alarms of recordings that were compared with a baseline, significant changes in words, pictures of the
+    worst machines, machines without data, and what was not assessed and why. The PDF needs the extra `pdf`.
     """
+    from livebode.archive.alarms import alarms_of
     from livebode.archive.contents import path_of, quarantine
     from livebode.archive.settings import lake_url
     from livebode.lake import Lake
@@ -45,9 +43,10 @@ def report_command(
     from livebode.trending import assess, histories
 
     lake = Lake(lake_url(archive))
-    chosen = selection(By.axis, below, since, until, covariate, recipe)
+    of = chosen.selection()
     bad = [(path_of(row), str(row["sentence"])) for row in quarantine(lake)]
-    hall = Hall(name or below or Path(lake.url).name, assess(histories(lake, chosen), limit), bad, limit)
+    title = name or of.below or Path(lake.url).name
+    hall = Hall(title, assess(histories(lake, of), limit), bad, limit, *alarms_of(lake, of))
     with in_language(language or "en"):
         files, remark = write_documents(hall.document(datetime.now(UTC)), out, force=force)
     if as_json:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated
+from functools import wraps
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -47,23 +51,64 @@ Limit = Annotated[
 ]
 
 
-def selection(
-    by: By, below: str, since: str | None, until: str | None, covariates: list[str] | None, recipe: str | None
-) -> Selection:
-    """The runs that the options select; UsageError if a date is not one."""
-    from datetime import timedelta
+_OPTIONS: Mapping[str, tuple[Any, Any]] = {
+    "by": (Level, By.machine),
+    "below": (Below, ""),
+    "since": (Since, None),
+    "until": (Until, None),
+    "covariate": (CovariateNames, None),
+    "recipe": (Recipe, None),
+}
 
-    from livebode.trending import Selection
 
-    last = day(until, "--until")
-    return Selection(
-        by.value,
-        below.strip("/"),
-        day(since, "--since"),
-        last and last + timedelta(days=1),
-        covariates or None,
-        recipe,
-    )
+@dataclass(frozen=True)
+class SelectionOptions:
+    """What was given; a command without an option has its default here."""
+
+    by: By = By.axis
+    below: str = ""
+    since: str | None = None
+    until: str | None = None
+    covariate: list[str] | None = None
+    recipe: str | None = None
+
+    def selection(self) -> Selection:
+        """The runs that the options select; UsageError if a date is not one."""
+        from livebode.trending import Selection
+
+        last = day(self.until, "--until")
+        return Selection(
+            self.by.value,
+            self.below.strip("/"),
+            day(self.since, "--since"),
+            last and last + timedelta(days=1),
+            self.covariate or None,
+            self.recipe,
+        )
+
+
+def with_selection(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """A command with these options in place of its parameter `chosen`, which receives them as SelectionOptions."""
+
+    def decorated(command: Callable[..., None]) -> Callable[..., None]:
+        @wraps(command)
+        def selecting(**given: Any) -> None:
+            command(chosen=SelectionOptions(**{name: given.pop(name) for name in names}), **given)
+
+        kind = inspect.Parameter.KEYWORD_ONLY
+        parameters: list[inspect.Parameter] = []
+        signature = inspect.signature(command, eval_str=True)
+        for name, parameter in signature.parameters.items():
+            if name == "chosen":
+                options = ((one, *_OPTIONS[one]) for one in names)
+                parameters += [inspect.Parameter(one, kind, default=d, annotation=of) for one, of, d in options]
+            else:
+                parameters.append(parameter.replace(kind=kind))
+        selecting.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        selecting.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        return selecting
+
+    return decorated
 
 
 def day(text: str | None, option: str) -> datetime | None:

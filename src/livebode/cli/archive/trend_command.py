@@ -10,7 +10,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.archive.options import LakeOf
-from livebode.cli.archive.selection import Below, By, CovariateNames, Level, Limit, Recipe, Since, Until, selection
+from livebode.cli.archive.selection import Limit, SelectionOptions, with_selection
 from livebode.cli.options import Json
 from livebode.core import UsageError
 
@@ -20,17 +20,13 @@ if TYPE_CHECKING:
 _NUMBERS = ("runs",)
 
 
+@with_selection("by", "below", "since", "until", "covariate", "recipe")
 def trend_command(
     archive: LakeOf,
     quantity: Annotated[
         str, typer.Argument(metavar="QUANTITY", help="Name as in `livebode fit`, or MODEL:NAME if several have it.")
     ],
-    by: Level = By.machine,
-    below: Below = "",
-    since: Since = None,
-    until: Until = None,
-    covariate: CovariateNames = None,
-    recipe: Recipe = None,
+    chosen: SelectionOptions,
     limit: Limit = 10.0,
     out: Annotated[
         Path | None,
@@ -57,7 +53,7 @@ def trend_command(
         raise UsageError(
             "unreadable", f"--out={str(out)!r} is neither a .png nor a .csv", "choose one of them", argument="--out"
         )
-    found = history(Lake(lake_url(archive)), quantity, selection(by, below, since, until, covariate, recipe))
+    found = history(Lake(lake_url(archive)), quantity, chosen.selection())
     (of,) = assess([found], limit)
     if out is not None:
         _write(of, out, dark=dark, force=force)

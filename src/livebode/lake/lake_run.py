@@ -1,0 +1,130 @@
+"""LakeRun: one run of a lake, with its responses as a run directory gives them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from typing import Any
+
+import pyarrow.compute as pc
+
+from livebode.core import ArchiveError, Lines, PlantKinds, Responses
+from livebode.lake.data_file import Key
+from livebode.lake.lake import Lake
+from livebode.records.run import kinds_in, lines_in, steady
+from livebode.records.wide_responses import from_wide
+
+_ROWS = 1 << 14
+
+
+@dataclass(frozen=True)
+class LakeRun:
+    """A result of a lake.
+
+    Attributes
+    ----------
+    lake
+        Where it is.
+    row
+        Its row of `runs`.
+
+    Examples
+    --------
+    >>> [run.responses() for run in runs_of(Lake("lake"), pc.field("machine") == "press-4")]
+    []
+    """
+
+    lake: Lake
+    row: Mapping[str, Any]
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The entries of run.json in a run directory that its responses depend on.
+
+        `configuration` without recording and machine, `found`, and `left_out_samples` if there is a transient.
+        ArchiveError if an earlier livebode tracked it, which did not store them.
+        """
+        if (text := self.row["summary"]) is None:
+            raise ArchiveError(
+                "run-without-summary",
+                f"the run of {self.row['url']} was tracked by an earlier livebode ({self.row['livebode']}), which did "
+                "not store its configuration",
+                "track its recording into a new lake (livebode archive run)",
+                content=self.row["content"],
+                livebode=self.row["livebode"],
+            )
+        found: dict[str, Any] = json.loads(text)
+        return found
+
+    @property
+    def key(self) -> Key:
+        """Content and recipe."""
+        return Key(self.row["content"], self.row["recipe"])
+
+    @property
+    def place(self) -> str:
+        """Where its recording was, and the begin of its content's SHA-256."""
+        return f"{self.row['url']}#{self.row['content'][:16]}"
+
+    @property
+    def recorded_from(self) -> datetime | None:
+        """Begin of the recording, in UTC; None if it is not known."""
+        found: datetime | None = self.row["recorded_from"]
+        return found
+
+    @property
+    def found(self) -> dict[str, Any]:
+        """Rate, window, lines, quantity and unit."""
+        return dict(self.summary["found"])
+
+    @property
+    def lines(self) -> Lines:
+        """Lines of the measurement."""
+        return lines_in(self.summary["found"])
+
+    @property
+    def kinds(self) -> PlantKinds:
+        """Kinds of the plant's output and input."""
+        return kinds_in(self.summary["found"])
+
+    def responses(self) -> Responses:
+        """All responses, rounded to float32 when they were stored.
+
+        Raises
+        ------
+        ArchiveError, RecordError
+            If the table cannot be read, or its rows are not from this run.
+        """
+        return from_wide(self.lake.rows_of("responses", self.key), self.summary["found"])
+
+    def batches(self) -> Iterator[Responses]:
+        """The same in parts of bounded size."""
+        table = self.lake.rows_of("responses", self.key)
+        for start in range(0, table.num_rows, _ROWS):
+            yield from_wide(table.slice(start, _ROWS), self.summary["found"])
+
+    def steady_batches(self) -> Iterator[Responses]:
+        """Those of a machine that was ready, without a transient at the start."""
+        return (steady(part, self.summary) for part in self.batches())
+
+
+def runs_of(lake: Lake, where: pc.Expression | None = None) -> list[LakeRun]:
+    """The runs that count, in the order of their dates; those without a date come last.
+
+    Parameters
+    ----------
+    lake
+        The lake.
+    where
+        Of columns of `runs`, for example ``pc.field("machine") == "press-4"``.
+
+    Raises
+    ------
+    ArchiveError
+        If the lake cannot be read.
+    """
+    rows = lake.read("runs", where=where).sort_by([("recorded_from", "ascending"), ("content", "ascending")])
+    return [LakeRun(lake, row) for row in rows.to_pylist()]
