@@ -74,7 +74,7 @@ def standing(path: Path, seed: int, *faults: TensionLoss) -> Path:
     """A configuration beside the recording of an axis that stands, with a fit and no schedule."""
     lines = Lines.parse("20:140:20", rate_hz=4000, window=400)
     axis = BeltAxis(
-        excitation_n_m=multisine(lines), sensor=Sensor(noise_rad_per_s=0.1), faults=faults, seconds=40, run_in_s=5,
+        excitation_n_m=multisine(lines), sensor=Sensor(noise_rad_per_s=0.1), faults=faults, seconds=24, run_in_s=5,
         seed=seed,
     )  # fmt: skip
     block, _ = SimulatedAxis(axis).run()
@@ -92,14 +92,14 @@ def test_changes_of_fitted_parameters_are_learned_and_reported(tmp_path: Path) -
     learned = livebode("learn", healthy_run, "--out", base)
     assert learned.code == 0, learned.err
     assert [table.what for table in Baseline.load(base).tables] == ["lines", "parameters"]
-    loss = TensionLoss(start_s=20.0, loss=0.05)
+    loss = TensionLoss(start_s=12.0, loss=0.05)
     toml = standing(tmp_path / "b.parquet", 2, loss)
     assert livebode("run", toml, "--baseline", base, "--out", changed_run).code == 0
     reported = {e["details"]["what"]: e for e in events(changed_run) if e["kind"] == "change"}
     assert set(reported) == {"lines", "parameters"}
     changes = {c["name"]: c["amount"] for c in reported["parameters"]["details"]["changes"]}
     assert changes == {"Keff": pytest.approx(-5, abs=0.5)}
-    assert reported["parameters"]["details"]["since_s"] == pytest.approx(20, abs=1)
+    assert reported["parameters"]["details"]["since_s"] == pytest.approx(12, abs=1)
     assert "Learned from" in learned.out
     assert "in 1 cell of the schedule. No model" in learned.out
     live = changes_live(toml, base, tmp_path / "live")

@@ -70,7 +70,7 @@ def new(options: dict) -> Tracker | NonPeriodicTracker:
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(at=st.lists(st.integers(1, SAMPLES - 1), max_size=12), jump=st.sampled_from([0, 23]), seed=st.integers(0, 9))
 def test_any_cut_gives_the_same_bits(options: dict, at: list[int], jump: int, seed: int) -> None:
     block = record(seed)
@@ -83,7 +83,7 @@ def test_any_cut_gives_the_same_bits(options: dict, at: list[int], jump: int, se
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(at=st.lists(st.integers(1, SAMPLES - 1), min_size=1, max_size=6), seed=st.integers(0, 9))
 def test_a_restored_tracker_continues_with_the_same_bits(options: dict, at: list[int], seed: int) -> None:
     block = record(seed)

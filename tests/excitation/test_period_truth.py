@@ -62,13 +62,13 @@ def test_multisines_with_offset_and_drift_never_give_a_wrong_period(
 
 
 @pytest.mark.parametrize(
-    ("snr_db", "periods", "least"), [(40, 2, 95), (20, 3, 95), (10, 5, 95), (0, 10, 90), (0, 50, 99)]
+    ("snr_db", "periods", "least"), [(40, 2, 38), (20, 3, 38), (10, 5, 38), (0, 10, 36), (0, 50, 40)]
 )
 def test_the_period_of_seven_lines_is_found_in_noise(snr_db, periods, least):
-    """Out of 100 seeded recordings at least so many give 200 samples. At 0 dB ten periods hold 2,000 samples."""
+    """Out of 40 seeded recordings at least so many give 200 samples. At 0 dB ten periods hold 2,000 samples."""
     rng = np.random.default_rng(snr_db + periods)
     right = 0
-    for _ in range(100):
+    for _ in range(40):
         try:
             right += recognise(noisy(rng, np.tile(SEVEN, periods), snr_db), 4000).period == 200
         except SignalError:
@@ -187,23 +187,18 @@ NOT_PERIODIC = {
 
 @pytest.mark.parametrize("kind", NOT_PERIODIC)
 def test_no_period_is_claimed_where_there_is_none(kind):
-    """At most one of 60 seeded recordings; the stated false-alarm rate of 1e-3 expects 0.06."""
+    """In none of 25 seeded recordings of each kind; the stated false-alarm rate of 1e-3 expects 0.28 of all 275."""
     rng = np.random.default_rng(11)
-    claimed = 0
-    for _ in range(60):
-        try:
+    for _ in range(25):
+        with pytest.raises(SignalError):
             recognise(NOT_PERIODIC[kind](rng, int(rng.integers(200, 12000))), 1000)
-            claimed += 1
-        except SignalError:
-            continue
-    assert claimed <= 1
 
 
 def test_a_recording_shorter_than_two_periods_is_refused_with_its_period():
-    """Dense multisines over 1.2 to 1.9 periods: refused, at least 45 of 50 with their true period in the sentence."""
+    """Dense multisines over 1.2 to 1.9 periods: refused, at least 18 of 20 with their true period in the sentence."""
     rng = np.random.default_rng(5)
     named = 0
-    for _ in range(50):
+    for _ in range(20):
         period = int(rng.integers(500, 8000))
         lines = Lines(tuple(range(1, period // 4)), period, 1000.0)
         one = multisine(lines, phases=rng.uniform(0, 6.28, len(lines)))
@@ -211,7 +206,7 @@ def test_a_recording_shorter_than_two_periods_is_refused_with_its_period():
         with pytest.raises(SignalError) as caught:
             recognise(x, 1000.0)
         named += caught.value.code == "signal.too-short" and caught.value.period == period
-    assert named >= 45
+    assert named >= 18
 
 
 def test_the_period_of_ten_minutes_at_4_khz():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -103,7 +105,7 @@ def test_without_any_sigma_lines_weigh_by_their_size() -> None:
 def test_lines_that_do_not_show_the_mode_give_no_numbers_and_an_event() -> None:
     low = Lines.parse("2:10:1", rate_hz=4000, window=4000)
     fitter = Fitter(BELT)
-    found, (event, *_) = with_events(fitter.process, noisy(BELT.at(TRUTH, EvaluationGrid.of(low)), low, 0.02, 20))
+    found, (event, *_) = with_events(fitter.process, noisy(BELT.at(TRUTH, EvaluationGrid.of(low)), low, 0.02, 6))
     assert not found.ok.any()
     assert np.isnan(found.value).all()
     assert np.isnan(found.bound()).all()
@@ -130,10 +132,9 @@ def test_invalid_lines_are_left_out_and_too_few_are_no_response() -> None:
     assert found["Keff"][:2] == pytest.approx([5e5, 5e5], rel=2e-3)
 
 
-@pytest.mark.parametrize("newtons", [15.0, 30.0])
-def test_friction_at_standstill_is_rejected_and_a_machine_without_friction_is_fitted(newtons: float) -> None:
+def test_friction_at_standstill_is_rejected_and_a_machine_without_friction_is_fitted() -> None:
     words = {}
-    for force in (0.0, newtons):
+    for force in (0.0, 15.0, 30.0):
         axis = BeltAxis(
             motion=Standstill(position_m=0.8), excitation_n_m=MULTISINE, friction=Friction(load_coulomb_n=force),
             sensor=Sensor(noise_rad_per_s=0.1), seconds=3.0, seed=1,
@@ -145,8 +146,9 @@ def test_friction_at_standstill_is_rejected_and_a_machine_without_friction_is_fi
         if force:
             assert events[0].kind == "fit-failed"
     assert words[0.0] == {"ok"}
-    assert "ok" not in words[newtons]
-    assert "friction" in words[newtons]
+    for newtons in (15.0, 30.0):
+        assert "ok" not in words[newtons]
+        assert "friction" in words[newtons]
 
 
 @pytest.mark.parametrize("free", [["B"], ["BL"], ["B", "BL"]])
@@ -189,6 +191,7 @@ def test_three_masses_fit_the_axis_of_three() -> None:
     assert [three["resonance_1"], three["resonance_2"]] == pytest.approx(list(modes), rel=0.005)
 
 
+@cache
 def bench() -> Response:
     careful = {"differenced": ("theta_mx",), "spikes": ("iq_adx",), "average": True, "forgetting": 1.0}
     return bench_responses(motorbench(), **careful)[-1]
@@ -214,7 +217,7 @@ def test_the_motor_benchs_bounds_hold_the_scatter_between_its_periods() -> None:
     periods = bench_responses(motorbench(), differenced=("theta_mx",), spikes=("iq_adx",))
     steady = [i for i in np.flatnonzero(periods.valid.all(axis=1)) if i >= 3]
     whole = fit(bench(), "two-mass-gain", output="position", band_hz=(20.0, 150.0))
-    single = [fit(periods[i], "two-mass-gain", output="position", band_hz=(20.0, 150.0)) for i in steady]
+    single = [fit(periods[i], "two-mass-gain", output="position", band_hz=(20.0, 150.0)) for i in steady[::3]]
     for name in ("antiresonance", "resonance", "resonance_damping", "antiresonance_damping", "gain"):
         apart = np.array([f[name] - whole[name] for f in single])
         print(f"{name}: periods differ by {apart.std():.2g}, bound {whole.bound(name):.2g}")

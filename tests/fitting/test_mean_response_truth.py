@@ -1,6 +1,6 @@
 """The mean of overlapping windows has the sigma of its formula, and that covers the truth, however the noise changes.
 
-Statistical bounds: 400 runs of 7 lines give a coverage of 63 % to ± 1 % and one of 98 % to ± 0.3 % (one standard
+Statistical bounds: 200 runs of 7 lines give a coverage of 63 % to ± 1.3 % and one of 98 % to ± 0.4 % (one standard
 deviation). Next to the resonance (60 Hz) the responses' own sigma is too high, and so is that of the mean.
 """
 
@@ -22,7 +22,7 @@ from tests.support.errors import refused
 from tests.support.responses import any_responses, cut, made
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
-RUNS, PERIODS, SIGMA = 400, 20, 0.1
+RUNS, PERIODS, SIGMA = 200, 20, 0.1
 TRUTH = TwoMassPlant().response(LINES.frequency_hz)
 
 

@@ -56,7 +56,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Desk]:
     plt.close("all")
 
 
-def run(step: Step, desk: Desk, names: dict[str, Any]) -> set[Path]:
+def run(step: Step, desk: Desk, names: dict[str, Any], pictures: bool = False) -> set[Path]:
     """Run it, unless another page has run the same command, and give the files that it creates."""
     if step.text in desk.created:
         return desk.created[step.text]
@@ -66,7 +66,7 @@ def run(step: Step, desk: Desk, names: dict[str, Any]) -> set[Path]:
     else:
         program, *words = step.words
         assert program == "livebode", f"{step.text}: mark what is not run with its reason"
-        result = livebode(*words)
+        result = livebode(*words, pictures=pictures)
         assert result.code == step.code, f"livebode {' '.join(words)}\n{result.err}"
     created = desk.files() - before
     if not step.python:
@@ -88,13 +88,11 @@ def test_what_a_page_shows_runs_with_files_of_the_examples_and_its_own(
 ) -> None:
     name = str(page.relative_to(ROOT))
     monkeypatch.chdir(desk.folder)
-    if name != "docs/reference/run-directory.md":  # the pictures of a run take most of its time
-        monkeypatch.setattr("livebode.report.save_pictures", lambda *_, **__: [])
     own, names = set(desk.examples), {"__name__": "page"}
     for step in steps_of(page):
         if step.reason or step.text in ("livebode example all", "cd example"):
             continue
-        own |= run(step, desk, names)
+        own |= run(step, desk, names, pictures=name == "docs/reference/run-directory.md")
         missing = {path for path in named(step, desk.folder) if path not in own}
         assert not missing, f"{step.text}\nuses {missing}, which neither an example nor this page creates"
 
@@ -108,7 +106,6 @@ def test_what_is_not_run_has_one_of_few_reasons() -> None:
 
 def test_the_commands_that_an_example_prints_are_on_a_page_or_run(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(desk.folder)
-    monkeypatch.setattr("livebode.report.save_pictures", lambda *_, **__: [])
     for example in EXAMPLES.values():
         for command in example.commands:
             run(Step(command), desk, {})

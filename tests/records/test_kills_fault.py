@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.support.killed import kill_often, run_s
 
-KILLS = int(os.environ.get("LIVEBODE_CRASH_KILLS", "24"))
+KILLS = int(os.environ.get("LIVEBODE_CRASH_KILLS", "12"))
 
 
 def test_a_kill_loses_at_most_the_last_second_and_the_run_continues(tmp_path: Path) -> None:

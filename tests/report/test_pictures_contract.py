@@ -63,7 +63,7 @@ def anything(draw: st.DrawFn) -> Responses:
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     run=anything(), dark=st.booleans(), few_lines=st.booleans(),
     size=st.tuples(st.integers(2, 140), st.integers(1, 50)),

@@ -31,7 +31,11 @@ def two(a: Machine, b: Machine) -> str:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_each_axis_leaves_what_it_would_have_left_alone(tmp_path: Path, number: int) -> None:
-    with Machine(tmp_path) as a, Machine(tmp_path, times=1.0) as b, Running(tmp_path, two(a, b)) as running:
+    with (
+        Machine(tmp_path) as a,
+        Machine(tmp_path, times=1.0) as b,
+        Running(tmp_path, two(a, b), pictures=True) as running,
+    ):
         running.tracked("x", 2500)
         running.tracked("y", 500)
         for machine in (a, b):

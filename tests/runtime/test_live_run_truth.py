@@ -64,7 +64,7 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
 
     with (
         Machine(tmp_path) as peer,
-        started(axis(tmp_path, f'url = "{peer.settings["url"]}"'), tmp_path / "live") as process,
+        started(axis(tmp_path, f'url = "{peer.settings["url"]}"'), tmp_path / "live", pictures=True) as process,
     ):
         peer.wait_ready()
         for at, batch in enumerate(sent()):

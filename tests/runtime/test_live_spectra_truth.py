@@ -137,7 +137,7 @@ def run_live(
     with of_spectra(kind, folder, sent[0].layout) as peer:
         path = folder / f"{name}.toml"
         path.write_text(f'[source]\nurl = "{peer.settings["url"]}"\n{config}')
-        with started(path, folder / name) as process:
+        with started(path, folder / name, pictures=True) as process:
             peer.wait_ready()
             for batch in sent:
                 peer.send(batch)

@@ -33,7 +33,7 @@ def joined(runs: list[Path]) -> Responses:
 
 
 def test_every_sample_is_in_one_of_the_records_and_no_window_is_lost(tmp_path: Path) -> None:
-    with Machine(tmp_path) as machine, Running(tmp_path, one(machine)) as running:
+    with Machine(tmp_path) as machine, Running(tmp_path, one(machine), pictures=True) as running:
         runs = [running.out / name for name in ("x", "x-2", "x-3", "x-4")]
         texts = [one(machine) + FIT, one(machine), one(machine, SHARED.replace("samples = true", "samples = true\n"))]
         running.tracked("x", 700)

@@ -19,6 +19,8 @@ from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import BinaryIO, Self
 
+from tests.support.command import no_pictures
+
 _IMPORTED = [
     "livebode.cli.app", "livebode.cli.run_command", "livebode.cli.serving", "livebode.report.bode",
     "livebode.report.tracking", "livebode.runtime.run", "livebode.runtime.demo", "livebode.sources.live.lines",
@@ -35,16 +37,16 @@ def server() -> ForkServerContext:
 
 
 class Command:
-    """`livebode` with these arguments, and what of subprocess.Popen the tests use."""
+    """`livebode` with these arguments, and what of subprocess.Popen the tests use; `pictures`: with those of a run."""
 
-    def __init__(self, *arguments: object) -> None:
+    def __init__(self, *arguments: object, pictures: bool = False) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="livebode-command-")
         self._printed = [Path(self._folder.name, name) for name in ("out", "err")]
         read, write = server().Pipe(duplex=False)
         self.stdin: BinaryIO = os.fdopen(os.dup(write.fileno()), "wb")
         write.close()
         here = (list(map(str, arguments)), dict(os.environ), os.getcwd())
-        self._process = server().Process(target=_run, args=(read, self._printed, *here))
+        self._process = server().Process(target=_run, args=(read, self._printed, pictures, *here))
         self._process.start()
         read.close()
 
@@ -90,7 +92,12 @@ class Command:
 
 
 def _run(
-    given: Connection, printed: list[Path], arguments: list[str], environment: dict[str, str], directory: str
+    given: Connection,
+    printed: list[Path],
+    pictures: bool,
+    arguments: list[str],
+    environment: dict[str, str],
+    directory: str,
 ) -> None:
     os.dup2(given.fileno(), 0)
     given.close()
@@ -109,4 +116,5 @@ def _run(
     sys.argv = ["livebode", *arguments]
     from livebode.cli import main
 
-    main()
+    with contextlib.nullcontext() if pictures else no_pictures():
+        main()

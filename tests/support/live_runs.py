@@ -11,9 +11,9 @@ from livebode.records import RunRecord
 from tests.support.forked import Command
 
 
-def started(path: Path, out: Path) -> Command:
+def started(path: Path, out: Path, pictures: bool = False) -> Command:
     """The process of this run; it does not outlive the test, also where a wait for it times out."""
-    return Command("run", path, "--out", out, "--json")
+    return Command("run", path, "--out", out, "--json", pictures=pictures)
 
 
 def table(out: Path, what: str = "responses") -> dict[str, np.ndarray]:

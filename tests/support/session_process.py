@@ -33,10 +33,10 @@ def source(machine: Machine) -> str:
 class Running:
     """The command on a file of ours, that may be edited."""
 
-    def __init__(self, folder: Path, text: str, *options: str) -> None:
+    def __init__(self, folder: Path, text: str, *options: str, pictures: bool = False) -> None:
         self.file, self.out = folder / "axes.toml", folder / "run"
         self.file.write_text(text)
-        self.process = Command("run", self.file, "--out", self.out, "--json", *options)
+        self.process = Command("run", self.file, "--out", self.out, "--json", *options, pictures=pictures)
 
     def __enter__(self) -> Running:
         return self

@@ -52,18 +52,18 @@ def judged(model: Fit, columns: np.ndarray, excitation: str | None = "w"):  # ty
 
 @pytest.mark.parametrize("colour", [0.0, 0.7])
 def test_97_percent_of_lags_lie_inside_for_an_independent_residual(colour: float) -> None:
-    """1,000 residuals against the multisine; the plain limit is right for white ones and wrong for others."""
+    """400 residuals against the multisine; the plain limit is right for white ones and wrong for others."""
     rng = np.random.default_rng(1)
     x, nothing = np.resize(W, SAMPLES) + 0.3 * rng.standard_normal(SAMPLES), np.zeros((SAMPLES, 1))
     inside, plain, together = [], [], []
-    for _ in range(1000):
+    for _ in range(400):
         residual = signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(SAMPLES))
         found = correlation("x", residual, x, x, LAGS, nothing, np.zeros((1, 1)), -LAGS)
         inside.append(found.share)
         plain.append(found.white_share)
         together.append(found.p > 0.03)
     assert np.mean(inside) == pytest.approx(0.97, abs=0.01)
-    assert np.mean(together) == pytest.approx(0.97, abs=0.02)
+    assert np.mean(together) == pytest.approx(0.97, abs=0.026)  # three standard deviations of 400 verdicts
     if colour:
         assert np.mean(plain) < 0.8
     else:
@@ -72,8 +72,8 @@ def test_97_percent_of_lags_lie_inside_for_an_independent_residual(colour: float
 
 @pytest.mark.parametrize("colour", [0.0, 0.7])
 def test_a_true_model_passes_in_the_loop(colour: float) -> None:
-    """100 runs, with hardly any excitation, so that u is mostly what the noise made of it."""
-    found = [judged(fitted(1e-6), columns) for columns in loop(100, 0.02, colour)]
+    """50 runs, with hardly any excitation, so that u is mostly what the noise made of it."""
+    found = [judged(fitted(1e-6), columns) for columns in loop(50, 0.02, colour)]
     for i, c in enumerate(found[0].correlations):
         share = np.mean([v.correlations[i].share for v in found])
         if c.name in found[0].judged_by or not colour:
@@ -82,21 +82,21 @@ def test_a_true_model_passes_in_the_loop(colour: float) -> None:
     if colour:
         assert all(v.judged_by == ("w",) for v in found)
         # Without the excitation a verdict against the model says that it may be the noise.
-        blind = judged(fitted(1e-6), loop(100, 0.02, colour)[0], excitation=None)
+        blind = judged(fitted(1e-6), loop(50, 0.02, colour)[0], excitation=None)
         assert blind.doubtful
         assert "specify the excitation" in blind.sentence or blind.verdict == "passes"
 
 
 def test_in_a_loop_lags_at_which_the_residual_comes_first_are_not_for_judging() -> None:
     """What the study's table says: ŷ before the noise is fine, ŷ after it is made of the noise."""
-    found = [judged(fitted(1e-6), columns) for columns in loop(100, 0.02, 0.0)[:30]]
+    found = [judged(fitted(1e-6), columns) for columns in loop(50, 0.02, 0.0)[:30]]
     before = np.mean([np.abs(v.correlations[1].value[:LAGS]) <= v.correlations[1].limit[:LAGS] for v in found])
     assert before < 0.9
 
 
 def test_the_limits_make_room_for_a_fit_that_is_itself_uncertain() -> None:
-    """60 fits to noisy lines, each on fresh data: without its covariance many lags would lie outside."""
-    found = [judged(fitted(0.08, seed), columns) for seed, columns in enumerate(loop(100)[:60])]
+    """30 fits to noisy lines, each on fresh data: without its covariance many lags would lie outside."""
+    found = [judged(fitted(0.08, seed), columns) for seed, columns in enumerate(loop(30))]
     share = np.mean([v.correlations[2].share for v in found])
     assert share == pytest.approx(0.97, abs=0.02)
     assert np.mean([v.correlations[2].white_share for v in found]) < share - 0.1
@@ -132,7 +132,7 @@ def test_a_fit_of_99_percent_does_not_fail_for_lack_of_noise() -> None:
 def test_a_drift_that_rules_the_residual_neither_hides_a_wrong_machine_nor_makes_one(drift: float) -> None:
     """A random walk on y. Keff 30 % wrong fails or cannot be judged, never less; the true model never fails."""
     true, wrong = fitted(1e-6), fitted(1e-6, plant=TwoMassPlant(keff=3.5e5))
-    for seed, columns in enumerate(loop(20)):
+    for seed, columns in enumerate(loop(20)[:10]):
         moved = columns.copy()
         moved[2] += drift * np.cumsum(np.random.default_rng(seed).standard_normal(SAMPLES))
         good, bad = judged(true, moved), judged(wrong, moved)
