@@ -31,19 +31,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import tomli_w
 
-from livebode.archive.alone import track_alone
 from livebode.archive.clusters import Cluster, started
 from livebode.archive.committing import Committer
 from livebode.archive.distributing import Distribution
 from livebode.archive.grouping import RecordingGroups
-from livebode.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places
-from livebode.archive.results import Failed, Tracked
+from livebode.archive.job import Job
+from livebode.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places, longest_first
+from livebode.archive.results import Handled, Tracked, each_result
 from livebode.archive.settings import ArchiveSettings, ClusterSection
-from livebode.archive.tasks import hash_places, track_one, track_recordings
+from livebode.archive.tasks import handle, handle_alone, handle_one
 from livebode.archive.template import Template
-from livebode.archive.tracking import Job
 from livebode.configuration.axis import Axis
-from livebode.configuration.recipe import recipe_id
 from livebode.core import Lines
 from livebode.excitation import multisine
 from livebode.lake import RUNS, Lake
@@ -78,40 +76,34 @@ def write_recording(path: Path, seconds: float, seed: int) -> None:
             file.write_table(pa.table([pa.array(t), *map(pa.array, block.data * noise)], schema=file.schema))
 
 
-def recordings_in(folder: Path) -> list[ArchivedRecording]:
-    """The recordings of a directory, the longest first."""
-    hashed = hash_places(find_places([Template(f"{folder}/*.parquet")]))
-    return [ArchivedRecording(one.content, one.item) for one in hashed if not isinstance(one, Failed)]
-
-
 def job_of(lake: Path, fit: bool) -> Job:
     """The recipe with or without a fit."""
     axis = Axis.of(CONFIGURATION | {"source": {"log": "recording"}} | (FIT if fit else {}), "bench")
-    return Job(axis, recipe_id(axis), str(lake), 2_000_000_000)
+    return Job.of({"": axis}, str(lake), 2_000_000_000)
 
 
-def timed(job: Job, results: Callable[[], Iterable[Tracked | Failed]], recordings: int) -> float:
+def timed(job: Job, results: Callable[[], Iterable[Handled]], recordings: int) -> float:
     """Seconds until all results are in the lake."""
-    committer = Committer(Lake(job.lake), job.recipe, job.machine)
+    committer = Committer(Lake(job.lake), job)
     began = time.perf_counter()
-    found = list(results())
+    found = each_result(results())
     committer.take(found)
     committer.commit()
     seconds = time.perf_counter() - began
-    assert sum(isinstance(one, Tracked) for one in found) == recordings, found[:1]
+    assert sum(isinstance(one, Tracked) for one in found) == recordings, found[:2]
     return seconds
 
 
-def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> Iterator[Tracked | Failed]:
+def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> Iterator[Handled]:
     """As the coordinator does it."""
     groups = RecordingGroups(recordings)
-    work: Distribution[ArchivedRecording, Tracked | Failed] = Distribution(
-        cluster, groups, partial(track_recordings, job), partial(track_alone, job), lambda _: False
+    work: Distribution[ArchivedRecording, Handled] = Distribution(
+        cluster, groups, partial(handle, job), partial(handle_alone, job), lambda _: False
     )
     for pairs in work.results():
-        for item, result in pairs:
-            groups.learn(item.size_bytes, result.seconds)
-            yield result
+        for recording, handled in pairs:
+            groups.learn(recording.size_bytes, handled.seconds)
+            yield handled
 
 
 def speed(folder: Path, rounds: int) -> None:
@@ -124,11 +116,13 @@ def speed(folder: Path, rounds: int) -> None:
             own.mkdir()
             for number in range(count):
                 write_recording(own / f"{number}.parquet", seconds, number)
-            recordings = recordings_in(own)
+            places = find_places([Template(f"{own}/*.parquet")])
             for fit in (False, True):
-                ways: dict[str, Callable[[Job], Iterable[Tracked | Failed]]] = {
-                    "loop": lambda job, all_=recordings: (track_one(job, one) for one in all_),
-                    "pool": lambda job, all_=recordings: pool.imap_unordered(partial(track_one, job), all_),
+                recipes = tuple(job_of(own, fit).recipes)
+                recordings = longest_first(ArchivedRecording(place, recipes) for place in places)
+                ways: dict[str, Callable[[Job], Iterable[Handled]]] = {
+                    "loop": lambda job, all_=recordings: (handle_one(job, one) for one in all_),
+                    "pool": lambda job, all_=recordings: pool.imap_unordered(partial(handle_one, job), all_),
                     "dask": lambda job, all_=recordings: by_dask(cluster, job, all_),
                 }
                 found: dict[str, list[float]] = {name: [] for name in ways}
@@ -159,7 +153,8 @@ def known(folder: Path) -> None:
     archive = folder / "archive.toml"
     archive.write_text('inputs = ["plant/*.csv"]\nrecipe = "recipe.toml"\nlake = "lake"\n')
     settings = ArchiveSettings.read(archive)
-    lake, recipe = Lake(settings.lake), recipe_id(settings.axis())
+    lake = Lake(settings.lake)
+    (recipe,) = Job.of(settings.axes(), settings.lake, 1).recipes
     contents: list[tuple[RecordingPlace, str]] = [
         (place, f"{number:064x}") for number, place in enumerate(find_places(settings.templates))
     ]
