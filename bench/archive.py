@@ -37,7 +37,7 @@ from livebode.archive.distributing import Distribution
 from livebode.archive.grouping import RecordingGroups
 from livebode.archive.job import Job
 from livebode.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places, longest_first
-from livebode.archive.results import Handled, Tracked, each_result
+from livebode.archive.results import Handled, Tracked, each_result, lost
 from livebode.archive.settings import ArchiveSettings, ClusterSection
 from livebode.archive.tasks import handle, handle_alone, handle_one
 from livebode.archive.template import Template
@@ -98,7 +98,7 @@ def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> 
     """As the coordinator does it."""
     groups = RecordingGroups(recordings)
     work: Distribution[ArchivedRecording, Handled] = Distribution(
-        cluster, groups, partial(handle, job), partial(handle_alone, job), lambda _: False
+        cluster, groups, partial(handle, job), partial(handle_alone, job), lambda _: False, lost
     )
     for pairs in work.results():
         for recording, handled in pairs:

@@ -33,7 +33,7 @@ def scheduler(tmp_path: Path) -> Iterator[tuple[str, dict[str, Path]]]:
     security = Security(tls_ca_file=str(files["authority"]), require_encryption=True, **each)
     with LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, host="tls://127.0.0.1", protocol="tls://",
-        security=security, dashboard_address=None,
+        security=security, dashboard_address="127.0.0.1:0",
     ) as cluster:  # fmt: skip
         yield cluster.scheduler_address, files
 

@@ -28,6 +28,8 @@ _SETTINGS = {
     # The first death of a worker ends the tasks that it had; the archive tries each of their recordings again.
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.work-stealing": False,
+    # A computer that is switched off closes no connection; its tasks go to others after this time.
+    "distributed.scheduler.worker-ttl": "2 minutes",
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
@@ -63,8 +65,11 @@ class Cluster:
 
     @property
     def workers(self) -> int:
-        """Workers at this moment, at least one."""
-        return max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1)
+        """Workers at this moment; none where the scheduler does not answer."""
+        try:
+            return len(self.client.scheduler_info(n_workers=-1)["workers"])
+        except (OSError, AttributeError):  # the client has no connection
+            return 0
 
     @property
     def dashboard(self) -> str | None:
@@ -94,7 +99,7 @@ def started(section: ClusterSection) -> Iterator[Cluster]:
             client = stack.enter_context(Client(target, security=security, timeout=_CONNECT_S, set_as_default=False))
             client.register_plugin(QuietWorker())
             client.wait_for_workers(1, timeout=None if section.kind == "slurm" else _CONNECT_S)
-        except (OSError, TimeoutError) as error:
+        except (OSError, TimeoutError, RuntimeError) as error:  # RuntimeError: what Dask makes of an error of SSH
             raise ArchiveError(
                 "cluster-unreachable",
                 f"the cluster {section.address or section.kind!r} does not answer: {error or type(error).__name__}",

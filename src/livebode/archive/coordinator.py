@@ -24,7 +24,7 @@ from livebode.archive.recordings import (
     place_of,
     untracked,
 )
-from livebode.archive.results import Failed, Handled, Hashed, Result, Tracked, each_result
+from livebode.archive.results import Failed, Handled, Hashed, Result, Tracked, each_result, lost
 from livebode.archive.settings import ArchiveSettings
 from livebode.archive.tasks import handle, handle_alone
 from livebode.lake import Lake
@@ -209,7 +209,7 @@ class Coordinator:
 
         groups = RecordingGroups([] if alone else recordings)
         together, one = partial(handle, self._job), partial(handle_alone, self._job)
-        work: Distribution[ArchivedRecording, Handled] = Distribution(cluster, groups, together, one, _again)
+        work: Distribution[ArchivedRecording, Handled] = Distribution(cluster, groups, together, one, _again, lost)
         work.last.extend(recordings if alone else ())
         done, done_bytes, total_bytes = 0, 0, sum(one.size_bytes for one in recordings)
         self._report(Progress(stage, 0, len(recordings), 0, total_bytes, cluster.dashboard))

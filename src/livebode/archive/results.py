@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from livebode.archive.recordings import RecordingPlace
+from livebode.archive.recordings import ArchivedRecording, RecordingPlace
 from livebode.core import ArchiveError, LivebodeError
 from livebode.lake import DataFile
 from livebode.locations import with_originals
@@ -90,3 +90,14 @@ def failed(place: RecordingPlace, error: Exception, content: str = "", recipe: s
 def each_result(handled: Iterable[Handled]) -> list[Result]:
     """The results of several recordings."""
     return [result for one in handled for result in one.results]
+
+
+def lost(recording: ArchivedRecording) -> Handled:
+    """The results of a recording whose worker ended each time."""
+    error = ArchiveError(
+        "process-ended",
+        "the worker that tracked the recording ended three times, with nothing else in it",
+        "please report it with the recording",
+    )
+    recipes = recording.recipes if recording.content else ("",)
+    return Handled(tuple(failed(recording.place, error, recording.content, recipe) for recipe in recipes), 0.0)

@@ -21,6 +21,7 @@ class ArchiveError(LivebodeError):
     area: ClassVar[str] = "archive"
     codes: ClassVar[Mapping[str, str]] = {
         "changed-meanwhile": "A recording changed between two steps of the same archive run.",
+        "cluster-lost": "The scheduler of the cluster does not answer any more.",
         "cluster-unreachable": "The scheduler of the cluster does not answer, or refuses the certificate.",
         "covariate-unknown": "No run has a covariate of that name.",
         "internal": "Tracking a recording ended with an internal error.",
@@ -31,4 +32,5 @@ class ArchiveError(LivebodeError):
         "quantity-ambiguous": "Several models have a quantity of that name.",
         "quantity-unknown": "No run of the lake has a quantity of that name.",
         "recipe-unknown": "No run was tracked with these settings.",
+        "workers-lost": "The cluster has had no worker for two minutes.",
     }
