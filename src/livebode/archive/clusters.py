@@ -8,7 +8,7 @@ import signal
 import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,7 @@ except ImportError:
     raise not_installed("Dask is not installed, and an archive needs it", "distributed", "archive") from None
 
 _CONNECT_S = 30
+_CLOSE_S = 10
 _SETTINGS = {
     # The first death of a worker ends the tasks that it had; the archive tries each of their recordings again.
     "distributed.scheduler.allowed-failures": 0,
@@ -92,11 +93,14 @@ def started(section: ClusterSection) -> Iterator[Cluster]:
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(_SETTINGS | _certificates(section)))
         stack.callback(logging.disable, logging.root.manager.disable)
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        for name in ("distributed", "tornado"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
-            target = section.address or stack.enter_context(_cluster(section))
+            target = section.address or stack.enter_context(_closing(_cluster(section)))
             security = Security() if section.encrypted else None
-            client = stack.enter_context(Client(target, security=security, timeout=_CONNECT_S, set_as_default=False))
+            client = stack.enter_context(
+                _closing(Client(target, security=security, timeout=_CONNECT_S, set_as_default=False))
+            )
             client.register_plugin(QuietWorker())
             client.wait_for_workers(1, timeout=None if section.kind == "slurm" else _CONNECT_S)
         except (OSError, TimeoutError, RuntimeError) as error:  # RuntimeError: what Dask makes of an error of SSH
@@ -107,6 +111,16 @@ def started(section: ClusterSection) -> Iterator[Cluster]:
                 address=section.address,
             ) from error
         yield Cluster(client)
+
+
+@contextmanager
+def _closing(part: Any) -> Iterator[Any]:
+    """A client or a cluster until the end of the block; what does not answer any more cannot be asked to close."""
+    try:
+        yield part
+    finally:
+        with suppress(OSError, TimeoutError, RuntimeError):
+            part.close(timeout=_CLOSE_S)
 
 
 def _cluster(section: ClusterSection) -> Any:
