@@ -5,6 +5,7 @@
 speed: the same recordings of several lengths, with and without a fit, tracked by a simple loop, by a pool of two
 processes (`multiprocessing`, one task for each recording) and by two workers of Dask as `livebode archive run` uses
 them, in turn. All start with warm processes and commit their results to a lake. The ratios are medians over rounds.
+The last column is twice the ratio of the processor times: what two free cores would give if none of them ever waited.
 known: `livebode archive run` in a process of its own where the lake knows each of 10,000 files.
 memory: the largest resident memory of the worker that tracks recordings of growing length. The load of the computer is
 printed, because other work changes all of it.
@@ -22,6 +23,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -76,22 +78,36 @@ def write_recording(path: Path, seconds: float, seed: int) -> None:
             file.write_table(pa.table([pa.array(t), *map(pa.array, block.data * noise)], schema=file.schema))
 
 
+@dataclass(frozen=True)
+class Cost:
+    """Wall time and processor time, s."""
+
+    wall_s: float
+    processor_s: float
+
+
 def job_of(lake: Path, fit: bool) -> Job:
     """The recipe with or without a fit."""
     axis = Axis.of(CONFIGURATION | {"source": {"log": "recording"}} | (FIT if fit else {}), "bench")
     return Job.of({"": axis}, str(lake), 2_000_000_000)
 
 
-def timed(job: Job, results: Callable[[], Iterable[Handled]], recordings: int) -> float:
-    """Seconds until all results are in the lake."""
+def timed(job: Job, results: Callable[[], Iterable[Handled]], recordings: int) -> Cost:
+    """Costs until all results are in the lake."""
     committer = Committer(Lake(job.lake), job)
-    began = time.perf_counter()
+    began, before_s = time.perf_counter(), processor_s()
     found = each_result(results())
     committer.take(found)
     committer.commit()
-    seconds = time.perf_counter() - began
+    cost = Cost(time.perf_counter() - began, processor_s() - before_s)
     assert sum(isinstance(one, Tracked) for one in found) == recordings, found[:2]
-    return seconds
+    return cost
+
+
+def processor_s() -> float:
+    """Processor time of this process and all that it started."""
+    own = psutil.Process()
+    return sum(sum(one.cpu_times()[:2]) for one in (own, *own.children(recursive=True)))
 
 
 def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> Iterator[Handled]:
@@ -108,7 +124,7 @@ def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> 
 
 def speed(folder: Path, rounds: int) -> None:
     """Print the ratios for each length, without and with a fit."""
-    print(f"{'recording':>10} {'fit':>4} {'loop':>8} {'pool':>8} {'Dask':>8} {'Dask/pool':>10} {'loop/Dask':>10}")
+    print(f"{'recording':>10} {'fit':>4} {'loop':>8} {'pool':>8} {'Dask':>8} {'Dask/pool':>10} {'loop/Dask':>10} {'on free cores':>13}")
     processes = multiprocessing.get_context("spawn").Pool(WORKERS)
     with processes as pool, started(ClusterSection(workers=WORKERS, memory_mb=2000)) as cluster:
         for seconds, count in LENGTHS:
@@ -125,7 +141,7 @@ def speed(folder: Path, rounds: int) -> None:
                     "pool": lambda job, all_=recordings: pool.imap_unordered(partial(handle_one, job), all_),
                     "dask": lambda job, all_=recordings: by_dask(cluster, job, all_),
                 }
-                found: dict[str, list[float]] = {name: [] for name in ways}
+                found: dict[str, list[Cost]] = {name: [] for name in ways}
                 for turn in range(rounds + 1):  # the first warms the processes
                     for name, way in ways.items():
                         job = job_of(folder / f"lake-{seconds:g}-{fit}-{turn}-{name}", fit)
@@ -134,13 +150,15 @@ def speed(folder: Path, rounds: int) -> None:
                 _print_speed(seconds, fit, found)
 
 
-def _print_speed(seconds: float, fit: bool, found: dict[str, list[float]]) -> None:
+def _print_speed(seconds: float, fit: bool, found: dict[str, list[Cost]]) -> None:
     loop, pool, dask = found.values()
-    to_pool = statistics.median(d / p for d, p in zip(dask, pool))
-    to_loop = statistics.median(one / d for one, d in zip(loop, dask))
-    times = " ".join(f"{statistics.median(one):7.2f}s" for one in found.values())
+    to_pool = statistics.median(d.wall_s / p.wall_s for d, p in zip(dask, pool))
+    to_loop = statistics.median(one.wall_s / d.wall_s for one, d in zip(loop, dask))
+    at_most = statistics.median(WORKERS * one.processor_s / d.processor_s for one, d in zip(loop, dask))
+    times = " ".join(f"{statistics.median(one.wall_s for one in way):7.2f}s" for way in (loop, pool, dask))
     met = "met" if to_pool <= POOL_RATIO_MAX and to_loop >= LOOP_RATIO_MIN else "missed"
-    print(f"{seconds:8.0f} s {'yes' if fit else 'no':>4} {times} {to_pool:10.2f} {to_loop:10.2f}  {met}", flush=True)
+    row = f"{seconds:8.0f} s {'yes' if fit else 'no':>4} {times} {to_pool:10.2f} {to_loop:10.2f} {at_most:13.2f}"
+    print(f"{row}  {met}", flush=True)
 
 
 def known(folder: Path) -> None:

@@ -16,6 +16,8 @@ from livebode.archive.settings import ClusterSection
 from livebode.core import ArchiveError
 from livebode.core.installing import not_installed
 
+import pyarrow as pa
+
 try:
     import dask
     from distributed import Client, LocalCluster, Security
@@ -25,6 +27,7 @@ except ImportError:
 
 _CONNECT_S = 30
 _CLOSE_S = 10
+_ADAPT = "2s"
 _SETTINGS = {
     # The first death of a worker ends the tasks that it had; the archive tries each of their recordings again.
     "distributed.scheduler.allowed-failures": 0,
@@ -46,12 +49,13 @@ _SETTINGS = {
 
 
 class QuietWorker(WorkerPlugin):  # type: ignore[misc]
-    """Ctrl-C is for the coordinator, and what a damaged file lets a library print is not for the terminal."""
+    """A worker uses one core; Ctrl-C is for the coordinator, and what a damaged file lets a library print is not for the terminal."""
 
     def setup(self, worker: Any) -> None:  # noqa: ARG002
         """Apply it to a worker's process; nothing to a worker in another program, which is a thread there."""
         if threading.current_thread() is not threading.main_thread():
             return
+        pa.set_cpu_count(1)  # each worker has a core
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         warnings.simplefilter("ignore")
         logging.disable(logging.CRITICAL)
@@ -68,8 +72,8 @@ class Cluster:
     def workers(self) -> int:
         """Workers at this moment; none where the scheduler does not answer."""
         try:
-            return len(self.client.scheduler_info(n_workers=-1)["workers"])
-        except (OSError, AttributeError):  # the client has no connection
+            return len(self.client.scheduler_info(n_workers=-1).get("workers", ()))
+        except OSError:
             return 0
 
     @property
@@ -127,7 +131,7 @@ def _cluster(section: ClusterSection) -> Any:
     if section.kind == "ssh":
         return _by_ssh(section)
     if section.kind == "slurm":
-        return slurm_cluster(section)
+        return _by_slurm(section)
     return LocalCluster(
         n_workers=section.workers or os.cpu_count(),
         threads_per_worker=1,
@@ -156,23 +160,24 @@ def _by_ssh(section: ClusterSection) -> Any:
     )
 
 
-def slurm_cluster(section: ClusterSection, **over: Any) -> Any:
-    """A scheduler here and workers as jobs of Slurm, one process each."""
+def _by_slurm(section: ClusterSection) -> Any:
+    """A scheduler here and workers as jobs of Slurm, one process each; a job that ends is submitted again."""
     try:
         from dask_jobqueue import SLURMCluster
     except ImportError:
         raise not_installed("dask-jobqueue is not installed, and Slurm needs it", "dask-jobqueue", "slurm") from None
-    return SLURMCluster(
+    cluster = SLURMCluster(
         queue=section.queue,
         cores=1,
         processes=1,
         memory=f"{section.memory_mb}MB",
-        n_workers=section.workers or 1,
         protocol="tls://",
         security=Security(),
         scheduler_options={"dashboard_address": "127.0.0.1:0"},
-        **over,
     )
+    workers = section.workers or 1
+    cluster.adapt(minimum=workers, maximum=workers, interval=_ADAPT)
+    return cluster
 
 
 def _certificates(section: ClusterSection) -> dict[str, Any]:
