@@ -124,7 +124,8 @@ def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> 
 
 def speed(folder: Path, rounds: int) -> None:
     """Print the ratios for each length, without and with a fit."""
-    print(f"{'recording':>10} {'fit':>4} {'loop':>8} {'pool':>8} {'Dask':>8} {'Dask/pool':>10} {'loop/Dask':>10} {'on free cores':>13}")
+    names = f"{'recording':>10} {'fit':>4} {'loop':>8} {'pool':>8} {'Dask':>8} {'Dask/pool':>10} {'loop/Dask':>10}"
+    print(f"{names} {'on free cores':>13}")
     processes = multiprocessing.get_context("spawn").Pool(WORKERS)
     with processes as pool, started(ClusterSection(workers=WORKERS, memory_mb=2000)) as cluster:
         for seconds, count in LENGTHS:

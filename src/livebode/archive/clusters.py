@@ -12,11 +12,11 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
+import pyarrow as pa
+
 from livebode.archive.settings import ClusterSection
 from livebode.core import ArchiveError
 from livebode.core.installing import not_installed
-
-import pyarrow as pa
 
 try:
     import dask
@@ -38,18 +38,33 @@ _SETTINGS = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
-    # With a pool of its own, Arrow could not use what NumPy has freed. Dask's own threshold returns memory so often
-    # that tracking takes a third longer.
-    "distributed.nanny.pre-spawn-environ.ARROW_DEFAULT_MEMORY_POOL": "system",
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 8 << 20,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 20,
+    # What Dask measures of itself several times a second takes processor time from the tasks.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "2s",
+    "distributed.scheduler.active-memory-manager.start": False,
     # Events of the scheduler, which nobody reads, grow with the number of tasks.
     "distributed.admin.low-level-log-length": 100,
 }
 
 
+_ENVIRONMENT = {
+    # With a pool of its own, Arrow could not use what NumPy has freed. Dask's own threshold returns memory so often
+    # that tracking takes a third longer.
+    "ARROW_DEFAULT_MEMORY_POOL": "system",
+    "MALLOC_TRIM_THRESHOLD_": str(8 << 20),
+    "MALLOC_MMAP_THRESHOLD_": str(1 << 20),
+}
+
+
+def _environment() -> dict[str, str]:
+    """Of each worker. Fits on different processors differ in the last digits, except if all use the same routines."""
+    same = os.environ.get("OPENBLAS_CORETYPE")
+    return _ENVIRONMENT | ({"OPENBLAS_CORETYPE": same} if same else {})
+
+
 class QuietWorker(WorkerPlugin):  # type: ignore[misc]
-    """A worker uses one core; Ctrl-C is for the coordinator, and what a damaged file lets a library print is not for the terminal."""
+    """A worker uses one core; Ctrl-C is for the coordinator; a damaged file's messages are not for the terminal."""
 
     def setup(self, worker: Any) -> None:  # noqa: ARG002
         """Apply it to a worker's process; nothing to a worker in another program, which is a thread there."""
@@ -95,7 +110,8 @@ def started(section: ClusterSection) -> Iterator[Cluster]:
         If a package for this kind is not installed.
     """
     with ExitStack() as stack:
-        stack.enter_context(dask.config.set(_SETTINGS | _certificates(section)))
+        own = {f"distributed.nanny.pre-spawn-environ.{name}": value for name, value in _environment().items()}
+        stack.enter_context(dask.config.set(_SETTINGS | own | _certificates(section)))
         stack.callback(logging.disable, logging.root.manager.disable)
         for name in ("distributed", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -174,6 +190,7 @@ def _by_slurm(section: ClusterSection) -> Any:
         protocol="tls://",
         security=Security(),
         scheduler_options={"dashboard_address": "127.0.0.1:0"},
+        job_script_prologue=[f"export {name}={value}" for name, value in _environment().items()],
     )
     workers = section.workers or 1
     cluster.adapt(minimum=workers, maximum=workers, interval=_ADAPT)
