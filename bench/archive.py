@@ -25,6 +25,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from multiprocessing.pool import Pool
 from pathlib import Path
 
 import numpy as np
@@ -124,31 +125,38 @@ def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> 
 
 def speed(folder: Path, rounds: int) -> None:
     """Print the ratios for each length, without and with a fit."""
+    processes = multiprocessing.get_context("spawn").Pool(WORKERS)
+    with processes as pool:
+        before_s = processor_s()
+        with started(ClusterSection(workers=WORKERS, memory_mb=2000)) as cluster:
+            print(f"two workers of Dask start in {processor_s() - before_s:.1f} s of processor time", flush=True)
+            _print_lengths(folder, rounds, pool, cluster)
+
+
+def _print_lengths(folder: Path, rounds: int, pool: Pool, cluster: Cluster) -> None:
     names = f"{'recording':>10} {'fit':>4} {'loop':>8} {'pool':>8} {'Dask':>8} {'Dask/pool':>10} {'loop/Dask':>10}"
     print(f"{names} {'on free cores':>13}")
-    processes = multiprocessing.get_context("spawn").Pool(WORKERS)
-    with processes as pool, started(ClusterSection(workers=WORKERS, memory_mb=2000)) as cluster:
-        for seconds, count in LENGTHS:
-            own = folder / f"{seconds:g}"
-            own.mkdir()
-            for number in range(count):
-                write_recording(own / f"{number}.parquet", seconds, number)
-            places = find_places([Template(f"{own}/*.parquet")])
-            for fit in (False, True):
-                recipes = tuple(job_of(own, fit).recipes)
-                recordings = longest_first(ArchivedRecording(place, recipes) for place in places)
-                ways: dict[str, Callable[[Job], Iterable[Handled]]] = {
-                    "loop": lambda job, all_=recordings: (handle_one(job, one) for one in all_),
-                    "pool": lambda job, all_=recordings: pool.imap_unordered(partial(handle_one, job), all_),
-                    "dask": lambda job, all_=recordings: by_dask(cluster, job, all_),
-                }
-                found: dict[str, list[Cost]] = {name: [] for name in ways}
-                for turn in range(rounds + 1):  # the first warms the processes
-                    for name, way in ways.items():
-                        job = job_of(folder / f"lake-{seconds:g}-{fit}-{turn}-{name}", fit)
-                        once = timed(job, partial(way, job), count)
-                        found[name] += [once] if turn else []
-                _print_speed(seconds, fit, found)
+    for seconds, count in LENGTHS:
+        own = folder / f"{seconds:g}"
+        own.mkdir()
+        for number in range(count):
+            write_recording(own / f"{number}.parquet", seconds, number)
+        places = find_places([Template(f"{own}/*.parquet")])
+        for fit in (False, True):
+            recipes = tuple(job_of(own, fit).recipes)
+            recordings = longest_first(ArchivedRecording(place, recipes) for place in places)
+            ways: dict[str, Callable[[Job], Iterable[Handled]]] = {
+                "loop": lambda job, all_=recordings: (handle_one(job, one) for one in all_),
+                "pool": lambda job, all_=recordings: pool.imap_unordered(partial(handle_one, job), all_),
+                "dask": lambda job, all_=recordings: by_dask(cluster, job, all_),
+            }
+            found: dict[str, list[Cost]] = {name: [] for name in ways}
+            for turn in range(rounds + 1):  # the first warms the processes
+                for name, way in ways.items():
+                    job = job_of(folder / f"lake-{seconds:g}-{fit}-{turn}-{name}", fit)
+                    once = timed(job, partial(way, job), count)
+                    found[name] += [once] if turn else []
+            _print_speed(seconds, fit, found)
 
 
 def _print_speed(seconds: float, fit: bool, found: dict[str, list[Cost]]) -> None:
