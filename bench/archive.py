@@ -34,6 +34,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import tomli_w
 
+from livebode.archive.alone import handle_alone
 from livebode.archive.clusters import Cluster, started
 from livebode.archive.committing import Committer
 from livebode.archive.distributing import Distribution
@@ -42,7 +43,7 @@ from livebode.archive.job import Job
 from livebode.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places, longest_first
 from livebode.archive.results import Handled, Tracked, each_result, lost
 from livebode.archive.settings import ArchiveSettings, ClusterSection
-from livebode.archive.tasks import handle, handle_alone, handle_one
+from livebode.archive.tasks import handle, handle_one
 from livebode.archive.template import Template
 from livebode.configuration.axis import Axis
 from livebode.core import Lines

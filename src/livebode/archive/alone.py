@@ -14,18 +14,33 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from livebode.archive.job import Job
 from livebode.archive.recordings import ArchivedRecording
-from livebode.archive.results import Result, failed
+from livebode.archive.results import Failed, Handled, Hashed, Result, failed
+from livebode.archive.tasks import handle_one
 from livebode.core import ArchiveError
 from livebode.core.files import write_whole
 
 _LOOK_S = 0.1
 
 
-def track_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Sequence[Result]:
+def handle_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Handled:
+    """Hash a recording, which ends no process, and find each of its results in a process of its own."""
+    started = time.perf_counter()
+    hashed = handle_one(job, replace(recording, recipes=()), scratch)
+    results: list[Result] = list(hashed.results)
+    found = next((one.content for one in results if isinstance(one, Hashed)), recording.content)
+    if not any(isinstance(one, Failed) for one in results) and not (not recording.content and job.knows(found)):
+        for recipe in recording.recipes:
+            one = replace(recording, content=found, recipes=(recipe,))
+            results += _tracked_alone(job, one, scratch)
+    return Handled(tuple(results), time.perf_counter() - started)
+
+
+def _tracked_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Sequence[Result]:
     """Track a recording of known content by one recipe in a new process; one that needs too much memory is ended."""
     with tempfile.TemporaryDirectory(prefix="livebode-", dir=scratch) as name:
         folder = Path(name)
@@ -92,8 +107,6 @@ def _end_with(parent: int) -> None:
 
 def _main(folder: Path) -> None:
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
-    from livebode.archive.tasks import handle_one  # which imports this module
-
     job, recording = pickle.loads((folder / "task").read_bytes())
     write_whole(folder / "result", pickle.dumps(handle_one(job, recording, folder).results))
 

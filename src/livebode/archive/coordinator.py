@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from packaging.version import Version
 
+from livebode.archive.alone import handle_alone
 from livebode.archive.committing import Committer
 from livebode.archive.contents import quarantine
 from livebode.archive.grouping import RecordingGroups
@@ -26,7 +27,7 @@ from livebode.archive.recordings import (
 )
 from livebode.archive.results import Failed, Handled, Hashed, Result, Tracked, each_result, lost
 from livebode.archive.settings import ArchiveSettings
-from livebode.archive.tasks import handle, handle_alone
+from livebode.archive.tasks import handle
 from livebode.lake import Lake
 from livebode.version import __version__
 

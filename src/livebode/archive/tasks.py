@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
-from livebode.archive.alone import track_alone
 from livebode.archive.job import Job
 from livebode.archive.recordings import ArchivedRecording
-from livebode.archive.results import Failed, Handled, Hashed, Result, failed
+from livebode.archive.results import Handled, Hashed, Result, failed
 from livebode.archive.tracking import track
 from livebode.core import ArchiveError
 from livebode.lake import Key
@@ -27,19 +25,6 @@ def handle_one(job: Job, recording: ArchivedRecording, scratch: Path | None = No
     """Hash and track one recording."""
     started = time.perf_counter()
     return Handled(tuple(_results(job, recording, scratch)), time.perf_counter() - started)
-
-
-def handle_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Handled:
-    """The same with each result in a process of its own; hashing ends no process."""
-    started = time.perf_counter()
-    hashed = handle_one(job, replace(recording, recipes=()), scratch)
-    results: list[Result] = list(hashed.results)
-    found = next((one.content for one in results if isinstance(one, Hashed)), recording.content)
-    if not any(isinstance(one, Failed) for one in results) and not (not recording.content and job.knows(found)):
-        for recipe in recording.recipes:
-            one = replace(recording, content=found, recipes=(recipe,))
-            results += track_alone(job, one, scratch)
-    return Handled(tuple(results), time.perf_counter() - started)
 
 
 def _results(job: Job, recording: ArchivedRecording, scratch: Path | None) -> Iterator[Result]:
