@@ -43,6 +43,8 @@ _SETTINGS = {
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "2s",
     "distributed.scheduler.active-memory-manager.start": False,
+    # A scheduler by SSH whose coordinator was killed ends by itself, and its workers with it.
+    "distributed.scheduler.idle-timeout": "10 minutes",
     # Events of the scheduler, which nobody reads, grow with the number of tasks.
     "distributed.admin.low-level-log-length": 100,
 }
