@@ -100,7 +100,7 @@ class QuantityRows:
         return time_s, value, _BOUND_95 * sigma
 
 
-class FittedRows:
+class FittedQuantities:
     """The valid fits of each quantity that is not fixed, margins included, from tables of parameters as they come."""
 
     def __init__(self) -> None:
@@ -140,16 +140,16 @@ class FittedRows:
         return found
 
 
-def fitted_rows(run: RunRecord) -> FittedRows:
+def fitted_rows(run: RunRecord) -> FittedQuantities:
     """The valid fits of a run; of one in segments the newest 64 MiB."""
-    found = FittedRows()
+    found = FittedQuantities()
     for table in run.tables("parameters", _NEWEST_BYTES):
         found.add(table)
     return found
 
 
 def trend_points(run: RunRecord) -> list[TrendPoint]:
-    """The run as one point for each of its quantities; see `FittedRows.points`."""
+    """The run as one point for each of its quantities; see `FittedQuantities.points`."""
     return fitted_rows(run).points(run.summary)
 
 

@@ -11,7 +11,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Generic, TypeVar
 
 from distributed import KilledWorker, get_worker
-from distributed.client import ClosedClientError
+from distributed.client import ClosedClientError, FutureCancelledError
 
 from livebode.archive.clusters import Cluster
 from livebode.archive.grouping import RecordingGroups, Sized
@@ -59,6 +59,7 @@ class Distribution(Generic[S, R]):
     suspects: deque[S] = field(default_factory=deque)
     last: deque[S] = field(default_factory=deque)
     _tasks: dict[Any, tuple[list[S], bool]] = field(default_factory=dict)
+    _arrived: SimpleQueue[Any] = field(default_factory=SimpleQueue)
     _lost_alone: Counter[S] = field(default_factory=Counter)
 
     def results(self) -> Iterator[list[tuple[S, R]]]:
@@ -69,7 +70,6 @@ class Distribution(Generic[S, R]):
         ArchiveError
             If the scheduler does not answer any more, or there has been no worker for two minutes.
         """
-        arrived: SimpleQueue[Any] = SimpleQueue()
         counted_s, present_s, workers = 0.0, time.monotonic(), 1
         while True:
             if (now_s := time.monotonic()) - counted_s > _COUNT_AGAIN_S:
@@ -77,13 +77,11 @@ class Distribution(Generic[S, R]):
                 present_s = now_s if workers else present_s
                 _check_present(now_s - present_s)
             while len(self._tasks) < _IN_FLIGHT * max(workers, 1) and (task := self._next(max(workers, 1))):
-                future = self._submit(*task)
-                self._tasks[future] = task
-                future.add_done_callback(arrived.put)
+                self._expect(self._submit(*task), task)
             if not self._tasks:
                 return
             try:
-                future = arrived.get(timeout=_COUNT_AGAIN_S)
+                future = self._arrived.get(timeout=_COUNT_AGAIN_S)
             except Empty:
                 continue
             if found := self._taken(future):
@@ -95,6 +93,10 @@ class Distribution(Generic[S, R]):
         self.cluster.client.cancel(list(self._tasks), force=True)
         self._tasks.clear()
         return found
+
+    def _expect(self, future: Any, task: tuple[list[S], bool]) -> None:
+        self._tasks[future] = task
+        future.add_done_callback(self._arrived.put)
 
     def _next(self, workers: int) -> tuple[list[S], bool] | None:
         """The next items, and whether each is processed alone."""
@@ -115,13 +117,19 @@ class Distribution(Generic[S, R]):
 
     def _taken(self, future: Any) -> list[tuple[S, R]]:
         """The final results of a task; what has none is tried again."""
-        items, alone = self._tasks.pop(future)
-        if future.status == "finished":
-            results = [future.result()] if alone else future.result()
-        elif isinstance(future.exception(), KilledWorker) or future.status in ("cancelled", "lost"):
-            return self._try_again(items, alone)
-        else:
+        items, alone = task = self._tasks.pop(future)
+        if future.status == "error" and not isinstance(future.exception(), KilledWorker):
             raise future.exception()
+        if future.status not in ("finished", "pending"):
+            return self._try_again(items, alone)
+        try:
+            found = future.result(timeout=_COUNT_AGAIN_S)
+        except TimeoutError:  # it was on a worker that was lost since then, and is computed again
+            self._expect(future, task)
+            return []
+        except (KilledWorker, FutureCancelledError):
+            return self._try_again(items, alone)
+        results = [found] if alone else found
         final = []
         for item, result in zip(items, results):
             if not alone and self.again(result):

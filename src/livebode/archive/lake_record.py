@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 import pyarrow as pa
 
-from livebode.analysis.run_trend import FittedRows
+from livebode.analysis.run_trend import FittedQuantities
 from livebode.arrow import from_numpy, text
 from livebode.core import Event, Responses
 from livebode.core.writing import writing
@@ -49,7 +49,7 @@ class LakeRecord(RecordInOnePiece):
     def __init__(self, path: Path, key: Key) -> None:
         self.path, self._key = path, key
         self.files: tuple[DataFile, ...] = ()
-        self.fitted = FittedRows()
+        self.fitted = FittedQuantities()
         self.summary: dict[str, Any] = {}
         self._events: list[Event] = []
         self._open = ExitStack()
