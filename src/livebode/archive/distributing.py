@@ -73,6 +73,8 @@ class Distribution(Generic[S, R]):
         counted_s, present_s, workers = 0.0, time.monotonic(), 1
         while True:
             if (now_s := time.monotonic()) - counted_s > _COUNT_AGAIN_S:
+                if self.cluster.client.status == "closed":
+                    raise _cluster_lost()
                 counted_s, workers = now_s, self.cluster.workers
                 present_s = now_s if workers else present_s
                 _check_present(now_s - present_s)
@@ -111,9 +113,7 @@ class Distribution(Generic[S, R]):
         try:
             return self.cluster.client.submit(_in_scratch, task, argument, pure=False)
         except ClosedClientError:
-            raise ArchiveError(
-                "cluster-lost", "the scheduler of the cluster does not answer any more", _CONTINUE
-            ) from None
+            raise _cluster_lost() from None
 
     def _taken(self, future: Any) -> list[tuple[S, R]]:
         """The final results of a task; what has none is tried again."""
@@ -150,6 +150,10 @@ class Distribution(Generic[S, R]):
 
 
 _CONTINUE = "start the cluster again; the same command continues"
+
+
+def _cluster_lost() -> ArchiveError:
+    return ArchiveError("cluster-lost", "the scheduler of the cluster does not answer any more", _CONTINUE)
 
 
 def _check_present(without_worker_s: float) -> None:
