@@ -5,6 +5,7 @@
 speed: the same recordings of several lengths, with and without a fit, tracked by a simple loop, by a pool of two
 processes (`multiprocessing`, one task for each recording) and by two workers of Dask as `livebode archive run` uses
 them, in turn. All start with warm processes and commit their results to a lake. The ratios are medians over rounds.
+The last column is twice the ratio of the processor times: what two free cores would give if none of them ever waited.
 known: `livebode archive run` in a process of its own where the lake knows each of 10,000 files.
 memory: the largest resident memory of the worker that tracks recordings of growing length. The load of the computer is
 printed, because other work changes all of it.
@@ -22,7 +23,9 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
+from multiprocessing.pool import Pool
 from pathlib import Path
 
 import numpy as np
@@ -31,19 +34,18 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import tomli_w
 
-from livebode.archive.alone import track_alone
+from livebode.archive.alone import handle_alone
 from livebode.archive.clusters import Cluster, started
 from livebode.archive.committing import Committer
 from livebode.archive.distributing import Distribution
 from livebode.archive.grouping import RecordingGroups
-from livebode.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places
-from livebode.archive.results import Failed, Tracked
+from livebode.archive.job import Job
+from livebode.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places, longest_first
+from livebode.archive.results import Handled, Tracked, each_result, lost
 from livebode.archive.settings import ArchiveSettings, ClusterSection
-from livebode.archive.tasks import hash_places, track_one, track_recordings
+from livebode.archive.tasks import handle, handle_one
 from livebode.archive.template import Template
-from livebode.archive.tracking import Job
 from livebode.configuration.axis import Axis
-from livebode.configuration.recipe import recipe_id
 from livebode.core import Lines
 from livebode.excitation import multisine
 from livebode.lake import RUNS, Lake
@@ -78,75 +80,95 @@ def write_recording(path: Path, seconds: float, seed: int) -> None:
             file.write_table(pa.table([pa.array(t), *map(pa.array, block.data * noise)], schema=file.schema))
 
 
-def recordings_in(folder: Path) -> list[ArchivedRecording]:
-    """The recordings of a directory, the longest first."""
-    hashed = hash_places(find_places([Template(f"{folder}/*.parquet")]))
-    return [ArchivedRecording(one.content, one.item) for one in hashed if not isinstance(one, Failed)]
+@dataclass(frozen=True)
+class Cost:
+    """Wall time and processor time, s."""
+
+    wall_s: float
+    processor_s: float
 
 
 def job_of(lake: Path, fit: bool) -> Job:
     """The recipe with or without a fit."""
     axis = Axis.of(CONFIGURATION | {"source": {"log": "recording"}} | (FIT if fit else {}), "bench")
-    return Job(axis, recipe_id(axis), str(lake), 2_000_000_000)
+    return Job.of({"": axis}, str(lake), 2_000_000_000)
 
 
-def timed(job: Job, results: Callable[[], Iterable[Tracked | Failed]], recordings: int) -> float:
-    """Seconds until all results are in the lake."""
-    committer = Committer(Lake(job.lake), job.recipe, job.machine)
-    began = time.perf_counter()
-    found = list(results())
+def timed(job: Job, results: Callable[[], Iterable[Handled]], recordings: int) -> Cost:
+    """Costs until all results are in the lake."""
+    committer = Committer(Lake(job.lake), job)
+    began, before_s = time.perf_counter(), processor_s()
+    found = each_result(results())
     committer.take(found)
     committer.commit()
-    seconds = time.perf_counter() - began
-    assert sum(isinstance(one, Tracked) for one in found) == recordings, found[:1]
-    return seconds
+    cost = Cost(time.perf_counter() - began, processor_s() - before_s)
+    assert sum(isinstance(one, Tracked) for one in found) == recordings, found[:2]
+    return cost
 
 
-def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> Iterator[Tracked | Failed]:
+def processor_s() -> float:
+    """Processor time of this process and all that it started."""
+    own = psutil.Process()
+    return sum(sum(one.cpu_times()[:2]) for one in (own, *own.children(recursive=True)))
+
+
+def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> Iterator[Handled]:
     """As the coordinator does it."""
     groups = RecordingGroups(recordings)
-    work: Distribution[ArchivedRecording, Tracked | Failed] = Distribution(
-        cluster, groups, partial(track_recordings, job), partial(track_alone, job), lambda _: False
+    work: Distribution[ArchivedRecording, Handled] = Distribution(
+        cluster, groups, partial(handle, job), partial(handle_alone, job), lambda _: False, lost
     )
     for pairs in work.results():
-        for item, result in pairs:
-            groups.learn(item.size_bytes, result.seconds)
-            yield result
+        for recording, handled in pairs:
+            groups.learn(recording.size_bytes, handled.seconds)
+            yield handled
 
 
 def speed(folder: Path, rounds: int) -> None:
     """Print the ratios for each length, without and with a fit."""
-    print(f"{'recording':>10} {'fit':>4} {'loop':>8} {'pool':>8} {'Dask':>8} {'Dask/pool':>10} {'loop/Dask':>10}")
     processes = multiprocessing.get_context("spawn").Pool(WORKERS)
-    with processes as pool, started(ClusterSection(workers=WORKERS, memory_mb=2000)) as cluster:
-        for seconds, count in LENGTHS:
-            own = folder / f"{seconds:g}"
-            own.mkdir()
-            for number in range(count):
-                write_recording(own / f"{number}.parquet", seconds, number)
-            recordings = recordings_in(own)
-            for fit in (False, True):
-                ways: dict[str, Callable[[Job], Iterable[Tracked | Failed]]] = {
-                    "loop": lambda job, all_=recordings: (track_one(job, one) for one in all_),
-                    "pool": lambda job, all_=recordings: pool.imap_unordered(partial(track_one, job), all_),
-                    "dask": lambda job, all_=recordings: by_dask(cluster, job, all_),
-                }
-                found: dict[str, list[float]] = {name: [] for name in ways}
-                for turn in range(rounds + 1):  # the first warms the processes
-                    for name, way in ways.items():
-                        job = job_of(folder / f"lake-{seconds:g}-{fit}-{turn}-{name}", fit)
-                        once = timed(job, partial(way, job), count)
-                        found[name] += [once] if turn else []
-                _print_speed(seconds, fit, found)
+    with processes as pool:
+        before_s = processor_s()
+        with started(ClusterSection(workers=WORKERS, memory_mb=2000)) as cluster:
+            print(f"two workers of Dask start in {processor_s() - before_s:.1f} s of processor time", flush=True)
+            _print_lengths(folder, rounds, pool, cluster)
 
 
-def _print_speed(seconds: float, fit: bool, found: dict[str, list[float]]) -> None:
+def _print_lengths(folder: Path, rounds: int, pool: Pool, cluster: Cluster) -> None:
+    names = f"{'recording':>10} {'fit':>4} {'loop':>8} {'pool':>8} {'Dask':>8} {'Dask/pool':>10} {'loop/Dask':>10}"
+    print(f"{names} {'on free cores':>13}")
+    for seconds, count in LENGTHS:
+        own = folder / f"{seconds:g}"
+        own.mkdir()
+        for number in range(count):
+            write_recording(own / f"{number}.parquet", seconds, number)
+        places = find_places([Template(f"{own}/*.parquet")])
+        for fit in (False, True):
+            recipes = tuple(job_of(own, fit).recipes)
+            recordings = longest_first(ArchivedRecording(place, recipes) for place in places)
+            ways: dict[str, Callable[[Job], Iterable[Handled]]] = {
+                "loop": lambda job, all_=recordings: (handle_one(job, one) for one in all_),
+                "pool": lambda job, all_=recordings: pool.imap_unordered(partial(handle_one, job), all_),
+                "dask": lambda job, all_=recordings: by_dask(cluster, job, all_),
+            }
+            found: dict[str, list[Cost]] = {name: [] for name in ways}
+            for turn in range(rounds + 1):  # the first warms the processes
+                for name, way in ways.items():
+                    job = job_of(folder / f"lake-{seconds:g}-{fit}-{turn}-{name}", fit)
+                    once = timed(job, partial(way, job), count)
+                    found[name] += [once] if turn else []
+            _print_speed(seconds, fit, found)
+
+
+def _print_speed(seconds: float, fit: bool, found: dict[str, list[Cost]]) -> None:
     loop, pool, dask = found.values()
-    to_pool = statistics.median(d / p for d, p in zip(dask, pool))
-    to_loop = statistics.median(one / d for one, d in zip(loop, dask))
-    times = " ".join(f"{statistics.median(one):7.2f}s" for one in found.values())
+    to_pool = statistics.median(d.wall_s / p.wall_s for d, p in zip(dask, pool))
+    to_loop = statistics.median(one.wall_s / d.wall_s for one, d in zip(loop, dask))
+    at_most = statistics.median(WORKERS * one.processor_s / d.processor_s for one, d in zip(loop, dask))
+    times = " ".join(f"{statistics.median(one.wall_s for one in way):7.2f}s" for way in (loop, pool, dask))
     met = "met" if to_pool <= POOL_RATIO_MAX and to_loop >= LOOP_RATIO_MIN else "missed"
-    print(f"{seconds:8.0f} s {'yes' if fit else 'no':>4} {times} {to_pool:10.2f} {to_loop:10.2f}  {met}", flush=True)
+    row = f"{seconds:8.0f} s {'yes' if fit else 'no':>4} {times} {to_pool:10.2f} {to_loop:10.2f} {at_most:13.2f}"
+    print(f"{row}  {met}", flush=True)
 
 
 def known(folder: Path) -> None:
@@ -159,7 +181,8 @@ def known(folder: Path) -> None:
     archive = folder / "archive.toml"
     archive.write_text('inputs = ["plant/*.csv"]\nrecipe = "recipe.toml"\nlake = "lake"\n')
     settings = ArchiveSettings.read(archive)
-    lake, recipe = Lake(settings.lake), recipe_id(settings.axis())
+    lake = Lake(settings.lake)
+    (recipe,) = Job.of(settings.axes(), settings.lake, 1).recipes
     contents: list[tuple[RecordingPlace, str]] = [
         (place, f"{number:064x}") for number, place in enumerate(find_places(settings.templates))
     ]

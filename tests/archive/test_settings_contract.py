@@ -72,8 +72,8 @@ def test_what_is_wrong_is_named(tmp_path: Path, text: str, code: str, key: str |
 
 def test_a_recipe_has_no_source_of_its_own(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"source\.log"):
-        settings(tmp_path, recipe='[source]\nlog = "a.csv"\n[signals]\noutput = "y"\n').axis()
-    assert settings(tmp_path, recipe='[source]\nrate_hz = 4000.0\n[signals]\noutput = "y"\n').axis().source.rate_hz
+        settings(tmp_path, recipe='[source]\nlog = "a.csv"\n[signals]\noutput = "y"\n').axes()
+    assert settings(tmp_path, recipe='[source]\nrate_hz = 4000.0\n[signals]\noutput = "y"\n').axes()[""].source.rate_hz
 
 
 @pytest.mark.parametrize("text", ["{plant}/*.csv", "{line}/{line}/*.csv"])

@@ -9,15 +9,14 @@ from pathlib import Path
 import pytest
 
 from livebode.archive.committing import Committer
-from livebode.archive.recordings import file_rows, find_places, untracked
-from livebode.archive.results import Failed, Hashed, Tracked
+from livebode.archive.job import Job
+from livebode.archive.recordings import find_places, untracked
+from livebode.archive.results import Hashed, Tracked, each_result
 from livebode.archive.settings import ArchiveSettings
-from livebode.archive.tasks import hash_places, track_one
-from livebode.archive.tracking import Job
-from livebode.configuration.recipe import recipe_id
+from livebode.archive.tasks import handle
 from livebode.lake import DataFile, Lake
 from livebode.locations import find, write_whole
-from tests.support.archives import write_archive
+from tests.support.archives import contents_of, write_archive
 from tests.support.object_storage import BUCKET, object_storage
 
 LAKE, RECORDINGS = f"s3://{BUCKET}/lake", 3
@@ -37,17 +36,14 @@ def test_two_coordinators_lose_nothing_and_double_nothing(tmp_path: Path) -> Non
     text = archive.read_text().replace('"plant/', f'"s3://{BUCKET}/plant/').replace('"lake"', f'"{LAKE}"')
     archive.write_text(text)
     settings = ArchiveSettings.read(archive)
-    axis = settings.axis()
-    job = Job(axis, recipe_id(axis), settings.lake, 10**12)
-    hashed = [one for one in hash_places(find_places(settings.templates)) if isinstance(one, Hashed)]
-    contents = [(one.item, one.content) for one in hashed]
-    results: list[Tracked | Failed] = [track_one(job, one) for one in untracked(contents, job.recipe, set())]
+    job = Job.of(settings.axes(), settings.lake, 10**12)
+    contents = contents_of(job, find_places(settings.templates))
+    results = each_result(handle(job, untracked(contents, job.recipes, set())))
 
     def coordinator(order: int) -> list[DataFile]:
         lake = Lake(LAKE)
-        lake.add_rows("files", file_rows(contents, job.machine))
-        for result in results[::order]:
-            committer = Committer(lake, job.recipe, job.machine)
+        for result in [*(Hashed(*one) for one in contents), *results[::order]]:
+            committer = Committer(lake, job)
             committer.take([result])
             committer.commit()
         return [file for result in results if isinstance(result, Tracked) for file in result.files]

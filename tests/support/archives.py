@@ -15,12 +15,11 @@ from deltalake import DeltaTable
 
 from livebode.archive.committing import Committer
 from livebode.archive.coordinator import Coordinator, Progress
-from livebode.archive.recordings import file_rows, find_places, known_contents, untracked
-from livebode.archive.results import Hashed
+from livebode.archive.job import Job
+from livebode.archive.recordings import ArchivedRecording, RecordingPlace, find_places, known_contents, untracked
+from livebode.archive.results import Hashed, each_result
 from livebode.archive.settings import ArchiveSettings
-from livebode.archive.tasks import hash_places, track_recordings
-from livebode.archive.tracking import Job
-from livebode.configuration.recipe import recipe_id
+from livebode.archive.tasks import handle
 from livebode.lake import TABLES, Lake
 
 _RATE_HZ, _WINDOW, _LINES = 4000, 400, np.array([20.0, 40.0, 60.0, 100.0])
@@ -104,17 +103,21 @@ def coordinator(archive: Path, **over: Any) -> Coordinator:
 
 def loop(archive: Path, lake: str) -> Lake:
     """What a simple loop over the recordings that the lake does not have stores; nothing in it is distributed."""
-    settings = ArchiveSettings.read(archive)
-    axis, into = settings.axis(), Lake(lake)
-    job = Job(axis, recipe_id(axis), lake, 10**12, settings.baselines)
-    hashed = [one for one in hash_places(find_places(settings.templates)) if isinstance(one, Hashed)]
-    contents = [(one.item, one.content) for one in hashed]
-    into.add_rows("files", file_rows(contents, job.machine))
-    committer = Committer(into, job.recipe, job.machine)
-    committer.take(track_recordings(job, untracked(contents, job.recipe, into.keys("runs"))))
+    settings, into = ArchiveSettings.read(archive), Lake(lake)
+    job = Job.of(settings.axes(), lake, 10**12, settings.baselines)
+    contents = contents_of(job, find_places(settings.templates))
+    committer = Committer(into, job)
+    committer.take(Hashed(place, content) for place, content in contents)
+    committer.take(each_result(handle(job, untracked(contents, job.recipes, into.keys("runs")))))
     committer.commit()
-    assert set(known_contents(into).values()) >= {content for _, content in contents}
+    assert set(known_contents(into)[0].values()) >= {content for _, content in contents}
     return into
+
+
+def contents_of(job: Job, places: list[RecordingPlace]) -> list[tuple[RecordingPlace, str]]:
+    """The content at each place."""
+    found = each_result(handle(job, [ArchivedRecording(place) for place in places]))
+    return [(one.place, one.content) for one in found if isinstance(one, Hashed)]
 
 
 @dataclass(frozen=True)

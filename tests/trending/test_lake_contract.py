@@ -107,12 +107,14 @@ def test_a_name_of_two_models_needs_the_model(tmp_path: Path) -> None:
 def test_runs_without_a_date_or_with_other_settings_or_without_their_row_are_left_out(tmp_path: Path) -> None:
     lake = hall(tmp_path / "lake", {"M/a": SHORT})
     add(lake, "M/b", MachineYear(runs=3), 1, recorded_from=None)
-    add(lake, "M/c", MachineYear(runs=4), 2, recipe="b" * 16)
+    add(lake, "M/a", MachineYear(runs=4), 2, recipe="b" * 16)
+    add(lake, "M/c", MachineYear(runs=4), 4, recipe="c" * 16)  # another axis has its own settings
     half = rows("M/d", SHORT, 3)  # a coordinator was killed before the rows of `runs`
     lake.add_rows("quantities", pa.Table.from_pylist(half, TABLES["quantities"].schema))
     found = history(lake, "Keff", Selection())
-    assert (list(found.machines), found.undated, found.other_recipes) == (["M/a"], 3, 4)
-    assert history(lake, "Keff", Selection(recipe="bb")).other_recipes == 33
+    assert (list(found.machines), found.undated, found.other_recipes) == (["M/a", "M/c"], 3, 4)
+    assert len(found.machines["M/a"].time_s) == SHORT.runs
+    assert history(lake, "Keff", Selection(recipe="bb")).other_recipes == 37
 
 
 def test_a_machine_that_stopped_sending_is_reported(tmp_path: Path) -> None:

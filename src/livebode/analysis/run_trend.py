@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from livebode.analysis.parameter_track import MARGINS
+from livebode.arrow import to_numpy
 from livebode.core import Event
 from livebode.core.parameters import OK
 from livebode.records import RunRecord
@@ -97,40 +100,57 @@ class QuantityRows:
         return time_s, value, _BOUND_95 * sigma
 
 
-def fitted_rows(run: RunRecord) -> list[QuantityRows]:
-    """The valid fits of each quantity that is not fixed, margins included; of a run in segments the newest 64 MiB."""
-    found: dict[tuple[str, str], QuantityRows] = {}
-    for table in run.tables("parameters", _NEWEST_BYTES):
-        columns = {name: table[name].to_numpy(zero_copy_only=False) for name in ("time_s", "value", "sigma")}
-        rows = np.column_stack([columns[name].astype(np.float64) for name in columns])
-        valid = (
-            (table["status"].to_numpy(zero_copy_only=False) == OK) & np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0)
-        )
-        coded = [table[name].combine_chunks().dictionary_encode() for name in ("model", "name", "unit")]
-        models, names, units = (column.dictionary.to_pylist() for column in coded)
-        model, name, unit = (column.indices.to_numpy(zero_copy_only=False) for column in coded)
+class FittedQuantities:
+    """The valid fits of each quantity that is not fixed, margins included, from tables of parameters as they come."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[str, str], QuantityRows] = {}
+
+    def add(self, table: pa.Table) -> None:
+        """Add rows as in parameters.parquet."""
+        rows = np.column_stack([to_numpy(table[name].combine_chunks()) for name in ("time_s", "value", "sigma")])
+        coded = [table[name].combine_chunks().dictionary_encode() for name in ("model", "name", "unit", "status")]
+        models, names, units, statuses = (column.dictionary.to_pylist() for column in coded)
+        model, name, unit, status = (to_numpy(column.indices) for column in coded)
+        valid = (np.array(statuses)[status] == OK) & np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0)
         both = np.where(valid, model * len(names) + name, -1)
         for code in np.unique(both[both >= 0]).tolist():
             here = np.flatnonzero(both == code)
             key = models[code // len(names)], names[code % len(names)]
-            quantity = found.get(key) or QuantityRows(*key, units[unit[here[0]]])
-            found[key] = quantity
+            quantity = self._found.get(key) or QuantityRows(*key, units[unit[here[0]]])
+            self._found[key] = quantity
             quantity.add(rows[here])
-    return list(found.values())
+
+    @property
+    def quantities(self) -> list[QuantityRows]:
+        """Those with a valid fit."""
+        return list(self._found.values())
+
+    def points(self, summary: Mapping[str, Any]) -> list[TrendPoint]:
+        """The run as one point for each; margins from run.json where they were not recorded live."""
+        found = [quantity.point for quantity in self.quantities]
+        if any(point.model == MARGINS for point in found):
+            return found
+        loop, newest = summary.get("loop", {}), summary.get("fit", {}).get("newest", {})
+        for name, margin in (loop.get("margins") or {}).items():
+            value, bound, time_s = margin.get("value"), margin.get("bound_95"), newest.get("time_s")
+            if all(isinstance(x, int | float) and isfinite(x) for x in (value, bound, time_s)):
+                unit = str(margin.get("unit", ""))
+                found.append(TrendPoint(MARGINS, str(name), unit, value, bound, value, value, time_s, 1))
+        return found
+
+
+def fitted_rows(run: RunRecord) -> FittedQuantities:
+    """The valid fits of a run; of one in segments the newest 64 MiB."""
+    found = FittedQuantities()
+    for table in run.tables("parameters", _NEWEST_BYTES):
+        found.add(table)
+    return found
 
 
 def trend_points(run: RunRecord) -> list[TrendPoint]:
-    """The run as one point for each of its quantities; margins from run.json where they were not recorded live."""
-    found = [quantity.point for quantity in fitted_rows(run)]
-    if any(point.model == MARGINS for point in found):
-        return found
-    loop, newest = run.summary.get("loop", {}), run.summary.get("fit", {}).get("newest", {})
-    for name, margin in (loop.get("margins") or {}).items():
-        value, bound, time_s = margin.get("value"), margin.get("bound_95"), newest.get("time_s")
-        if all(isinstance(x, int | float) and isfinite(x) for x in (value, bound, time_s)):
-            unit = str(margin.get("unit", ""))
-            found.append(TrendPoint(MARGINS, str(name), unit, value, bound, value, value, time_s, 1))
-    return found
+    """The run as one point for each of its quantities; see `FittedQuantities.points`."""
+    return fitted_rows(run).points(run.summary)
 
 
 def alarms_of(run: RunRecord) -> list[Event]:

@@ -13,21 +13,35 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from livebode.archive.job import Job
 from livebode.archive.recordings import ArchivedRecording
-from livebode.archive.results import Failed, Tracked, failed
-from livebode.archive.tasks import track_one
-from livebode.archive.tracking import Job
+from livebode.archive.results import Failed, Handled, Hashed, Result, failed
+from livebode.archive.tasks import handle_one
 from livebode.core import ArchiveError
 from livebode.core.files import write_whole
 
 _LOOK_S = 0.1
 
 
-def track_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Tracked | Failed:
-    """Track a recording in a new process, and wait for it; one that needs too much memory is ended."""
+def handle_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Handled:
+    """Hash a recording, which ends no process, and find each of its results in a process of its own."""
     started = time.perf_counter()
+    hashed = handle_one(job, replace(recording, recipes=()), scratch)
+    results: list[Result] = list(hashed.results)
+    found = next((one.content for one in results if isinstance(one, Hashed)), recording.content)
+    if not any(isinstance(one, Failed) for one in results) and not (not recording.content and job.knows(found)):
+        for recipe in recording.recipes:
+            one = replace(recording, content=found, recipes=(recipe,))
+            results += _tracked_alone(job, one, scratch)
+    return Handled(tuple(results), time.perf_counter() - started)
+
+
+def _tracked_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Sequence[Result]:
+    """Track a recording of known content by one recipe in a new process; one that needs too much memory is ended."""
     with tempfile.TemporaryDirectory(prefix="livebode-", dir=scratch) as name:
         folder = Path(name)
         (folder / "task").write_bytes(pickle.dumps((job, recording)))
@@ -43,10 +57,10 @@ def track_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = N
                 process.kill()
         result = folder / "result"
         if result.exists():
-            found: Tracked | Failed = pickle.loads(result.read_bytes())
+            found: Sequence[Result] = pickle.loads(result.read_bytes())
             return found
     error = _exceeded(job) if exceeded else _ended(process.returncode)
-    return failed(recording, error, time.perf_counter() - started)
+    return [failed(recording.place, error, recording.content, *recording.recipes)]
 
 
 def _watched(process: subprocess.Popen[bytes], memory_bytes: int) -> bool:
@@ -94,8 +108,7 @@ def _end_with(parent: int) -> None:
 def _main(folder: Path) -> None:
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     job, recording = pickle.loads((folder / "task").read_bytes())
-    result = track_one(job, recording, folder)
-    write_whole(folder / "result", pickle.dumps(result))
+    write_whole(folder / "result", pickle.dumps(handle_one(job, recording, folder).results))
 
 
 if __name__ == "__main__":

@@ -8,9 +8,11 @@ import signal
 import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
+
+import pyarrow as pa
 
 from livebode.archive.settings import ClusterSection
 from livebode.core import ArchiveError
@@ -24,31 +26,53 @@ except ImportError:
     raise not_installed("Dask is not installed, and an archive needs it", "distributed", "archive") from None
 
 _CONNECT_S = 30
+_CLOSE_S = 10
+_ADAPT = "2s"
 _SETTINGS = {
     # The first death of a worker ends the tasks that it had; the archive tries each of their recordings again.
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.work-stealing": False,
+    # A computer that is switched off closes no connection; its tasks go to others after this time.
+    "distributed.scheduler.worker-ttl": "2 minutes",
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
-    # With a pool of its own, Arrow could not use what NumPy has freed. Dask's own threshold returns memory so often
-    # that tracking takes a third longer.
-    "distributed.nanny.pre-spawn-environ.ARROW_DEFAULT_MEMORY_POOL": "system",
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 8 << 20,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 20,
+    # What Dask measures of itself several times a second takes processor time from the tasks.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "2s",
+    "distributed.scheduler.active-memory-manager.start": False,
+    # A scheduler by SSH whose coordinator was killed ends by itself, and its workers with it.
+    "distributed.scheduler.idle-timeout": "10 minutes",
     # Events of the scheduler, which nobody reads, grow with the number of tasks.
     "distributed.admin.low-level-log-length": 100,
 }
 
 
+_ENVIRONMENT = {
+    # With a pool of its own, Arrow could not use what NumPy has freed. Dask's own threshold returns memory so often
+    # that tracking takes a third longer.
+    "ARROW_DEFAULT_MEMORY_POOL": "system",
+    "MALLOC_TRIM_THRESHOLD_": str(8 << 20),
+    "MALLOC_MMAP_THRESHOLD_": str(1 << 20),
+}
+
+
+def _environment() -> dict[str, str]:
+    """Of each worker. Fits on different processors differ in the last digits, except if all use the same routines."""
+    same = os.environ.get("OPENBLAS_CORETYPE")
+    return _ENVIRONMENT | ({"OPENBLAS_CORETYPE": same} if same else {})
+
+
 class QuietWorker(WorkerPlugin):  # type: ignore[misc]
-    """Ctrl-C is for the coordinator, and what a damaged file lets a library print is not for the terminal."""
+    """A worker uses one core; Ctrl-C is for the coordinator; a damaged file's messages are not for the terminal."""
 
     def setup(self, worker: Any) -> None:  # noqa: ARG002
         """Apply it to a worker's process; nothing to a worker in another program, which is a thread there."""
         if threading.current_thread() is not threading.main_thread():
             return
+        pa.set_cpu_count(1)  # each worker has a core
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         warnings.simplefilter("ignore")
         logging.disable(logging.CRITICAL)
@@ -63,8 +87,11 @@ class Cluster:
 
     @property
     def workers(self) -> int:
-        """Workers at this moment, at least one."""
-        return max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1)
+        """Workers at this moment; none where the scheduler does not answer."""
+        try:
+            return len(self.client.scheduler_info(n_workers=-1).get("workers", ()))
+        except OSError:
+            return 0
 
     @property
     def dashboard(self) -> str | None:
@@ -85,16 +112,20 @@ def started(section: ClusterSection) -> Iterator[Cluster]:
         If a package for this kind is not installed.
     """
     with ExitStack() as stack:
-        stack.enter_context(dask.config.set(_SETTINGS | _certificates(section)))
+        own = {f"distributed.nanny.pre-spawn-environ.{name}": value for name, value in _environment().items()}
+        stack.enter_context(dask.config.set(_SETTINGS | own | _certificates(section)))
         stack.callback(logging.disable, logging.root.manager.disable)
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        for name in ("distributed", "tornado"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
-            target = section.address or stack.enter_context(_cluster(section))
+            target = section.address or stack.enter_context(_closing(_cluster(section)))
             security = Security() if section.encrypted else None
-            client = stack.enter_context(Client(target, security=security, timeout=_CONNECT_S, set_as_default=False))
+            client = stack.enter_context(
+                _closing(Client(target, security=security, timeout=_CONNECT_S, set_as_default=False))
+            )
             client.register_plugin(QuietWorker())
             client.wait_for_workers(1, timeout=None if section.kind == "slurm" else _CONNECT_S)
-        except (OSError, TimeoutError) as error:
+        except (OSError, TimeoutError, RuntimeError) as error:  # RuntimeError: what Dask makes of an error of SSH
             raise ArchiveError(
                 "cluster-unreachable",
                 f"the cluster {section.address or section.kind!r} does not answer: {error or type(error).__name__}",
@@ -104,11 +135,21 @@ def started(section: ClusterSection) -> Iterator[Cluster]:
         yield Cluster(client)
 
 
+@contextmanager
+def _closing(part: Any) -> Iterator[Any]:
+    """A client or a cluster until the end of the block; what does not answer any more cannot be asked to close."""
+    try:
+        yield part
+    finally:
+        with suppress(OSError, TimeoutError, RuntimeError):
+            part.close(timeout=_CLOSE_S)
+
+
 def _cluster(section: ClusterSection) -> Any:
     if section.kind == "ssh":
         return _by_ssh(section)
     if section.kind == "slurm":
-        return slurm_cluster(section)
+        return _by_slurm(section)
     return LocalCluster(
         n_workers=section.workers or os.cpu_count(),
         threads_per_worker=1,
@@ -137,23 +178,25 @@ def _by_ssh(section: ClusterSection) -> Any:
     )
 
 
-def slurm_cluster(section: ClusterSection, **over: Any) -> Any:
-    """A scheduler here and workers as jobs of Slurm, one process each."""
+def _by_slurm(section: ClusterSection) -> Any:
+    """A scheduler here and workers as jobs of Slurm, one process each; a job that ends is submitted again."""
     try:
         from dask_jobqueue import SLURMCluster
     except ImportError:
         raise not_installed("dask-jobqueue is not installed, and Slurm needs it", "dask-jobqueue", "slurm") from None
-    return SLURMCluster(
+    cluster = SLURMCluster(
         queue=section.queue,
         cores=1,
         processes=1,
         memory=f"{section.memory_mb}MB",
-        n_workers=section.workers or 1,
         protocol="tls://",
         security=Security(),
         scheduler_options={"dashboard_address": "127.0.0.1:0"},
-        **over,
+        job_script_prologue=[f"export {name}={value}" for name, value in _environment().items()],
     )
+    workers = section.workers or 1
+    cluster.adapt(minimum=workers, maximum=workers, interval=_ADAPT)
+    return cluster
 
 
 def _certificates(section: ClusterSection) -> dict[str, Any]:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 import pyarrow as pa
 
-from livebode.archive.recordings import ArchivedRecording, levels_of
-from livebode.archive.results import Failed, Tracked
+from livebode.archive.job import Job
+from livebode.archive.recordings import file_rows, levels_of
+from livebode.archive.results import Failed, Hashed, Result, Tracked
 from livebode.lake import QUANTITIES, QUARANTINE, RUNS, DataFile, Lake
 from livebode.version import __version__
 
@@ -25,19 +26,16 @@ class Committer:
     ----------
     lake
         Where to.
-    recipe
-        Id of the recipe.
-    machine
-        Levels of the machine for recordings whose place names none.
+    job
+        What the results are of.
     """
 
     lake: Lake
-    recipe: str
-    machine: dict[str, str]
-    _waiting: list[Tracked | Failed] = field(default_factory=list)
+    job: Job
+    _waiting: list[Result] = field(default_factory=list)
     _committed_s: float = field(default_factory=time.monotonic)
 
-    def take(self, results: Iterable[Tracked | Failed]) -> None:
+    def take(self, results: Iterable[Result]) -> None:
         """Take results, and commit if it is time."""
         self._waiting += results
         if time.monotonic() - self._committed_s > _EVERY_S or len(self._waiting) >= _RESULTS_MAX:
@@ -45,8 +43,12 @@ class Committer:
 
     def commit(self) -> None:
         """Commit what waits; ArchiveError or LocationError if the lake cannot be written."""
+        hashed = [one for one in self._waiting if isinstance(one, Hashed)]
         tracked = [one for one in self._waiting if isinstance(one, Tracked)]
         bad = [one for one in self._waiting if isinstance(one, Failed) and not one.by_storage]
+        if hashed:  # first: what has a result and no known place would be tracked again
+            rows = file_rows([(one.place, one.content) for one in hashed], self.job.common_machine)
+            self.lake.add_rows("files", rows)
         by_table: dict[str, list[DataFile]] = {"responses": [], "parameters": [], "events": []}
         for one in tracked:
             for file in one.files:
@@ -54,24 +56,22 @@ class Committer:
         for table, files in by_table.items():
             self.lake.add_files(table, files)
         quantities = [row for one in tracked for row in one.quantities]
-        for name, rows, schema in (
+        for name, found, schema in (
             ("quantities", quantities, QUANTITIES),
             ("runs", [one.run for one in tracked], RUNS),
             ("quarantine", [self._quarantined(one) for one in bad], QUARANTINE),
         ):
-            if rows:
-                self.lake.add_rows(name, pa.Table.from_pylist(rows, schema=schema))
+            if found:
+                self.lake.add_rows(name, pa.Table.from_pylist(found, schema=schema))
         self._waiting.clear()
         self._committed_s = time.monotonic()
 
     def _quarantined(self, one: Failed) -> dict[str, str | None]:
-        assert isinstance(one.item, ArchivedRecording)
-        place = one.item.place
         return {
-            "content": one.item.content,
-            "recipe": self.recipe,
-            "url": str(place.url),
+            "content": one.content,
+            "recipe": one.recipe,
+            "url": str(one.place.url),
             "code": one.code,
             "sentence": one.sentence,
             "livebode": __version__,
-        } | levels_of(place, self.machine)
+        } | levels_of(one.place, self.job.machine(one.recipe))

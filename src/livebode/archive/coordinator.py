@@ -2,40 +2,37 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from packaging.version import Version
 
-from livebode.archive.alone import track_alone
+from livebode.archive.alone import handle_alone
 from livebode.archive.committing import Committer
 from livebode.archive.contents import quarantine
 from livebode.archive.grouping import RecordingGroups
+from livebode.archive.job import Job, short
 from livebode.archive.recordings import (
     ArchivedRecording,
     RecordingPlace,
-    file_rows,
     find_places,
     known_contents,
+    longest_first,
     place_of,
     untracked,
 )
-from livebode.archive.results import Failed, Hashed, Result, Tracked
+from livebode.archive.results import Failed, Handled, Hashed, Result, Tracked, each_result, lost
 from livebode.archive.settings import ArchiveSettings
-from livebode.archive.tasks import hash_places, track_recordings
-from livebode.archive.tracking import Job
-from livebode.configuration.recipe import recipe_id
+from livebode.archive.tasks import handle
 from livebode.lake import Lake
 from livebode.version import __version__
 
 if TYPE_CHECKING:
     from livebode.archive.clusters import Cluster
-
-_HASHED_MAX = 1000
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,7 @@ class Progress:
     Attributes
     ----------
     stage
-        "reading" (hashing what is new) or "tracking".
+        "reading" (hashing what may be a copy) or "tracking".
     done, total
         Recordings.
     done_bytes, total_bytes
@@ -73,7 +70,7 @@ class ArchiveOutcome:
     known
         Of these, those whose content was in the lake already, as a result or in quarantine, or is at another place.
     tracked
-        Results that are in the lake now.
+        Results that are in the lake now: one for each recording and axis of the recipe.
     quarantined, unreadable
         Recordings that could not be tracked, and those that could not be read; these are tried again next time.
     stopped
@@ -109,12 +106,10 @@ class Coordinator:
     """
 
     def __init__(self, settings: ArchiveSettings, report: Report) -> None:
-        axis = settings.axis()
         self._settings, self._report = settings, report
         self._lake = Lake(settings.lake)
-        self._job = Job(
-            axis, recipe_id(axis), settings.lake, settings.cluster.memory_mb * 1_000_000, settings.baselines
-        )
+        memory_bytes = settings.cluster.memory_mb * 1_000_000
+        self._job = Job.of(settings.axes(), settings.lake, memory_bytes, settings.baselines)
         self._outcome = ArchiveOutcome()
         self._cluster: Cluster | None = None
 
@@ -131,67 +126,76 @@ class Coordinator:
         outcome.recordings = len(places)
         with ExitStack() as stack:
             try:
-                contents = self._contents(places, stack)
-                skipped = {*self._lake.keys("runs"), *(key[:2] for key in self._lake.keys("quarantine"))}
-                recordings = untracked(contents, self._job.recipe, skipped)
+                recordings = self._recordings(places, stack)
                 outcome.known = len(places) - len(recordings) - len(outcome.unreadable)
-                self._track(recordings, stack)
+                self._handle("tracking", recordings, stack)
             except (KeyboardInterrupt, SystemExit):
                 outcome.stopped = True
         return outcome
 
     def retry(self, older: bool) -> ArchiveOutcome:
         """Track what is in quarantine for this recipe again, each alone; with `older` what another livebode tried."""
-        rows = [row for row in quarantine(self._lake) if row["recipe"] == self._job.recipe]
+        rows = [row for row in quarantine(self._lake) if row["recipe"] in self._job.recipes]
         if older:
             rows = [row for row in rows if Version(row["livebode"]) < Version(__version__)]
         self._outcome.recordings = len(rows)
+        recordings = [ArchivedRecording(place_of(row), (row["recipe"],), row["content"]) for row in rows]
         with ExitStack() as stack:
             try:
-                self._track([ArchivedRecording(row["content"], place_of(row)) for row in rows], stack, alone=True)
+                self._handle("tracking", recordings, stack, alone=True)
             except (KeyboardInterrupt, SystemExit):
                 self._outcome.stopped = True
         return self._outcome
 
-    def _contents(self, places: Sequence[RecordingPlace], stack: ExitStack) -> list[tuple[RecordingPlace, str]]:
-        """The content at each place; what the lake does not know is hashed, and committed to `files`."""
-        known = known_contents(self._lake)
+    def _recordings(self, places: Sequence[RecordingPlace], stack: ExitStack) -> list[ArchivedRecording]:
+        """What is to be tracked, the longest first: contents without a result, and places whose content is not known.
+
+        Only recordings of one length can have one content, so only those are hashed before any of them is tracked.
+        """
+        known, by_size = known_contents(self._lake)
+        skipped = {*self._lake.keys("runs"), *(key[:2] for key in self._lake.keys("quarantine"))}
+        recipes = tuple(self._job.recipes)
+
+        def waiting() -> list[ArchivedRecording]:
+            contents = [(place, known[place.known_as]) for place in places if place.known_as in known]
+            return untracked(contents, recipes, skipped)
+
         new = [place for place in places if place.known_as not in known]
-        waiting: list[tuple[RecordingPlace, str]] = []
+        lengths = Counter(place.size_bytes for place in (*new, *(one.place for one in waiting())))
+        alike = [place for place in new if not place.size_bytes or lengths[place.size_bytes] > 1]
+        for result in self._handle("reading", [ArchivedRecording(place) for place in alike], stack):
+            if isinstance(result, Hashed):
+                known[result.place.known_as] = result.content
+        single = [ArchivedRecording(place, recipes) for place in new if lengths[place.size_bytes] == 1]
+        candidates = {content for one in single for content in by_size.get(one.size_bytes, ())}
+        done = {content for content in candidates if all((content, recipe) in skipped for recipe in recipes)}
+        self._job = replace(self._job, known=frozenset(map(short, done)))
+        return longest_first([*waiting(), *single])
 
-        def commit() -> None:
-            if waiting:
-                self._lake.add_rows("files", file_rows(waiting, self._job.machine))
-                known.update({place.known_as: content for place, content in waiting})
-                waiting.clear()
-
-        for results in self._distributed("reading", new, hash_places, _hash_alone, stack) if new else ():
-            for result in results:
-                if isinstance(result, Hashed):
-                    waiting.append((result.item, result.content))
-                elif isinstance(result, Failed):
-                    self._outcome.unreadable.append(result)
-            if len(waiting) >= _HASHED_MAX:
-                commit()
-        commit()
-        return [(place, known[place.known_as]) for place in places if place.known_as in known]
-
-    def _track(self, recordings: Sequence[ArchivedRecording], stack: ExitStack, alone: bool = False) -> None:
+    def _handle(
+        self, stage: str, recordings: Sequence[ArchivedRecording], stack: ExitStack, alone: bool = False
+    ) -> list[Result]:
+        """Hash or track recordings, and commit what is found."""
         if not recordings:
-            return
-        committer = Committer(self._lake, self._job.recipe, self._job.machine)
-        self._outcome.remaining = len(recordings)
-        together, one = partial(track_recordings, self._job), partial(track_alone, self._job)
+            return []
+        committer, results = Committer(self._lake, self._job), []
+        tracking = stage == "tracking"
+        self._outcome.remaining = len(recordings) if tracking else 0
         try:
-            for results in self._distributed("tracking", recordings, together, one, stack, alone):
-                self._count(results)
-                committer.take(results)
+            for handled in self._distributed(stage, recordings, stack, alone):
+                found = each_result(handled)
+                self._count(found)
+                if tracking:
+                    self._outcome.remaining -= len(handled)
+                    self._outcome.known += sum(all(isinstance(x, Hashed) for x in one.results) for one in handled)
+                results += [] if tracking else found
+                committer.take(found)
         finally:
             committer.commit()
+        return results
 
     def _count(self, results: Iterable[Result]) -> None:
         for result in results:
-            self._outcome.remaining -= 1
             if isinstance(result, Tracked):
                 self._outcome.tracked += 1
             elif isinstance(result, Failed):
@@ -199,26 +203,27 @@ class Coordinator:
                 bad.append(result)
 
     def _distributed(
-        self, stage: str, items: Sequence[Any], together: Any, one: Any, stack: ExitStack, alone: bool = False
-    ) -> Iterator[list[Any]]:
-        """The results of items, in the order in which they come."""
+        self, stage: str, recordings: Sequence[ArchivedRecording], stack: ExitStack, alone: bool
+    ) -> Iterator[list[Handled]]:
+        """What was found, in the order in which it comes."""
         cluster = self._started(stack)
         from livebode.archive.distributing import Distribution
 
-        groups: RecordingGroups[Any] = RecordingGroups([] if alone else items)
-        work: Distribution[Any, Any] = Distribution(cluster, groups, together, one, _again)
-        work.last.extend(items if alone else ())
-        done, done_bytes, total_bytes = 0, 0, sum(item.size_bytes for item in items)
-        self._report(Progress(stage, 0, len(items), 0, total_bytes, cluster.dashboard))
+        groups = RecordingGroups([] if alone else recordings)
+        together, one = partial(handle, self._job), partial(handle_alone, self._job)
+        work: Distribution[ArchivedRecording, Handled] = Distribution(cluster, groups, together, one, _again, lost)
+        work.last.extend(recordings if alone else ())
+        done, done_bytes, total_bytes = 0, 0, sum(one.size_bytes for one in recordings)
+        self._report(Progress(stage, 0, len(recordings), 0, total_bytes, cluster.dashboard))
         try:
             for pairs in work.results():
-                for item, result in pairs:
-                    groups.learn(item.size_bytes, result.seconds)
-                    done, done_bytes = done + 1, done_bytes + item.size_bytes
-                self._report(Progress(stage, done, len(items), done_bytes, total_bytes, cluster.dashboard))
-                yield [result for _, result in pairs]
+                for recording, handled in pairs:
+                    groups.learn(recording.size_bytes, handled.seconds)
+                    done, done_bytes = done + 1, done_bytes + recording.size_bytes
+                self._report(Progress(stage, done, len(recordings), done_bytes, total_bytes, cluster.dashboard))
+                yield [handled for _, handled in pairs]
         except (KeyboardInterrupt, SystemExit):
-            yield [result for _, result in work.ready()]
+            yield [handled for _, handled in work.ready()]
             raise
 
     def _started(self, stack: ExitStack) -> Cluster:
@@ -230,11 +235,5 @@ class Coordinator:
         return self._cluster
 
 
-def _again(result: Result) -> bool:
-    """Whether to try again alone: what the content is the reason of has the same result each time."""
-    return isinstance(result, Failed) and not result.by_content
-
-
-def _hash_alone(place: RecordingPlace, scratch: Path | None = None) -> Hashed | Failed:  # noqa: ARG001
-    """Hash once more: hashing ends no process, but a storage may fail for a moment."""
-    return hash_places([place])[0]
+def _again(handled: Handled) -> bool:
+    return handled.again

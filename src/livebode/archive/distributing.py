@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any, Generic, TypeVar
 
-from distributed import KilledWorker, as_completed, get_worker
+from distributed import KilledWorker, get_worker
+from distributed.client import ClosedClientError, FutureCancelledError
 
 from livebode.archive.clusters import Cluster
 from livebode.archive.grouping import RecordingGroups, Sized
+from livebode.core import ArchiveError
 
 S = TypeVar("S", bound=Sized)
 R = TypeVar("R")
 
 _IN_FLIGHT = 2
 _COUNT_AGAIN_S = 5.0
+_NO_WORKER_S = 120.0
+_ALONE_MAX = 3
 
 
 @dataclass
@@ -41,6 +46,8 @@ class Distribution(Generic[S, R]):
         Processes one item in a process of its own; its result is final.
     again
         Whether a result is a failure that is tried alone.
+    lost
+        The result of an item that has lost its worker three times while it was alone.
     """
 
     cluster: Cluster
@@ -48,23 +55,38 @@ class Distribution(Generic[S, R]):
     together: Callable[[Sequence[S], Path], list[R]]
     alone: Callable[[S, Path], R]
     again: Callable[[R], bool]
+    lost: Callable[[S], R]
     suspects: deque[S] = field(default_factory=deque)
     last: deque[S] = field(default_factory=deque)
     _tasks: dict[Any, tuple[list[S], bool]] = field(default_factory=dict)
+    _arrived: SimpleQueue[Any] = field(default_factory=SimpleQueue)
+    _lost_alone: Counter[S] = field(default_factory=Counter)
 
     def results(self) -> Iterator[list[tuple[S, R]]]:
-        """The items with their results, as they come."""
-        done, counted_s, workers = as_completed(with_results=False, loop=self.cluster.client.loop), 0.0, 1
+        """The items with their results, as they come.
+
+        Raises
+        ------
+        ArchiveError
+            If the scheduler does not answer any more, or there has been no worker for two minutes.
+        """
+        counted_s, present_s, workers = 0.0, time.monotonic(), 1
         while True:
-            if time.monotonic() - counted_s > _COUNT_AGAIN_S:
-                counted_s, workers = time.monotonic(), self.cluster.workers
-            while len(self._tasks) < _IN_FLIGHT * workers and (task := self._next(workers)):
-                future = self._submit(*task)
-                self._tasks[future] = task
-                done.add(future)
+            if (now_s := time.monotonic()) - counted_s > _COUNT_AGAIN_S:
+                if self.cluster.client.status == "closed":
+                    raise _cluster_lost()
+                counted_s, workers = now_s, self.cluster.workers
+                present_s = now_s if workers else present_s
+                _check_present(now_s - present_s)
+            while len(self._tasks) < _IN_FLIGHT * max(workers, 1) and (task := self._next(max(workers, 1))):
+                self._expect(self._submit(*task), task)
             if not self._tasks:
                 return
-            if found := self._taken(next(done)):
+            try:
+                future = self._arrived.get(timeout=_COUNT_AGAIN_S)
+            except Empty:
+                continue
+            if found := self._taken(future):
                 yield found
 
     def ready(self) -> list[tuple[S, R]]:
@@ -73,6 +95,10 @@ class Distribution(Generic[S, R]):
         self.cluster.client.cancel(list(self._tasks), force=True)
         self._tasks.clear()
         return found
+
+    def _expect(self, future: Any, task: tuple[list[S], bool]) -> None:
+        self._tasks[future] = task
+        future.add_done_callback(self._arrived.put)
 
     def _next(self, workers: int) -> tuple[list[S], bool] | None:
         """The next items, and whether each is processed alone."""
@@ -83,21 +109,27 @@ class Distribution(Generic[S, R]):
         return (self.groups.next(workers), False) if len(self.groups) else None
 
     def _submit(self, items: list[S], alone: bool) -> Any:
-        submit = self.cluster.client.submit
-        if alone:
-            return submit(_in_scratch, self.alone, items[0], pure=False)
-        return submit(_in_scratch, self.together, items, pure=False)
+        task, argument = (self.alone, items[0]) if alone else (self.together, items)
+        try:
+            return self.cluster.client.submit(_in_scratch, task, argument, pure=False)
+        except ClosedClientError:
+            raise _cluster_lost() from None
 
     def _taken(self, future: Any) -> list[tuple[S, R]]:
         """The final results of a task; what has none is tried again."""
-        items, alone = self._tasks.pop(future)
-        if future.status == "finished":
-            results = [future.result()] if alone else future.result()
-        elif isinstance(future.exception(), KilledWorker) or future.status in ("cancelled", "lost"):
-            self._try_again(items, alone)
-            return []
-        else:
+        items, alone = task = self._tasks.pop(future)
+        if future.status == "error" and not isinstance(future.exception(), KilledWorker):
             raise future.exception()
+        if future.status not in ("finished", "pending"):
+            return self._try_again(items, alone)
+        try:
+            found = future.result(timeout=_COUNT_AGAIN_S)
+        except TimeoutError:  # it was on a worker that was lost since then, and is computed again
+            self._expect(future, task)
+            return []
+        except (KilledWorker, FutureCancelledError):
+            return self._try_again(items, alone)
+        results = [found] if alone else found
         final = []
         for item, result in zip(items, results):
             if not alone and self.again(result):
@@ -106,12 +138,27 @@ class Distribution(Generic[S, R]):
                 final.append((item, result))
         return final
 
-    def _try_again(self, items: list[S], alone: bool) -> None:
+    def _try_again(self, items: list[S], alone: bool) -> list[tuple[S, R]]:
         """The worker ended: by one of these items if they were processed, or by what it processed before them."""
-        if alone or len(items) == 1:
-            self.last.extend(items)
-        else:
+        if not alone and len(items) > 1:
             self.suspects.extend(items)
+            return []
+        self._lost_alone.update(items if alone else ())
+        given_up = [item for item in items if self._lost_alone[item] == _ALONE_MAX]
+        self.last.extend(item for item in items if item not in given_up)
+        return [(item, self.lost(item)) for item in given_up]
+
+
+_CONTINUE = "start the cluster again; the same command continues"
+
+
+def _cluster_lost() -> ArchiveError:
+    return ArchiveError("cluster-lost", "the scheduler of the cluster does not answer any more", _CONTINUE)
+
+
+def _check_present(without_worker_s: float) -> None:
+    if without_worker_s > _NO_WORKER_S:
+        raise ArchiveError("workers-lost", f"the cluster has had no worker for {without_worker_s:.0f} s", _CONTINUE)
 
 
 def _in_scratch(task: Callable[[Any, Path], Any], items: Any) -> Any:

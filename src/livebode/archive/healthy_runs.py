@@ -10,7 +10,7 @@ from livebode.core import ArchiveError, counted, nearest_name
 from livebode.lake import Lake, LakeRun
 from livebode.reporting.trend_words import sentence
 from livebode.trending import LIMIT_PERCENT, RUNS_MIN, Selection, assess, histories
-from livebode.trending.quantity_history import UNNAMED, one_recipe, where_of
+from livebode.trending.quantity_history import UNNAMED, recipe_of_each, where_of
 
 _FEW = 3  # below, nothing is known of differences from run to run
 _NAMED = 3
@@ -70,8 +70,7 @@ def healthy_runs(lake: Lake, of: Selection) -> list[HealthyRuns]:
     """
     of = replace(of, by="axis")
     axes, undated = _selected(lake, of)
-    recipe = next(iter(axes.values()))[0].key.recipe
-    jumps, drifts = _changes(lake, replace(of, recipe=recipe))
+    jumps, drifts = _changes(lake, of)
     return [
         HealthyRuns(
             axis, tuple(runs), (*_alarms(runs), *jumps.get(axis, ())),
@@ -113,7 +112,7 @@ def _means(name: str, content: str, url: str) -> bool:
 def _selected(lake: Lake, of: Selection) -> tuple[dict[str, list[LakeRun]], dict[str, list[str]]]:
     """The runs of each axis in the order of their dates, and a remark on those that are left out."""
     every = lake.read("runs", where=where_of(of))
-    own = one_recipe(every, of.recipe)[0] if every.num_rows else every
+    own = recipe_of_each(every, of.recipe)[0] if every.num_rows else every
     rows = own.sort_by([("recorded_from", "ascending"), ("content", "ascending")]).to_pylist()
     names = {path_of(row) or UNNAMED for row in rows}
     axes: dict[str, list[LakeRun]] = {}
@@ -154,7 +153,8 @@ def _changes(lake: Lake, of: Selection) -> tuple[dict[str, list[str]], dict[str,
     """Sentences on the jumps of each axis, and on its other changes, such as a trend."""
     jumps: dict[str, list[str]] = {}
     drifts: dict[str, list[str]] = {}
-    if of.recipe not in lake.read("quantities", ["recipe"])["recipe"].to_pylist():
+    fitted = lake.read("quantities", ["recipe"])["recipe"].to_pylist()
+    if not any(recipe.startswith(of.recipe or "") for recipe in fitted):
         return jumps, drifts
     for assessment in assess(histories(lake, of), LIMIT_PERCENT):
         history = assessment.history

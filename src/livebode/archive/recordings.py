@@ -44,10 +44,21 @@ class RecordingPlace:
 
 @dataclass(frozen=True)
 class ArchivedRecording:
-    """A content, and the place from which it is read."""
+    """A recording, and which results of it are to be found.
 
-    content: str
+    Attributes
+    ----------
+    place
+        From which it is read.
+    recipes
+        Ids of the recipes by which it is tracked; with none it is only hashed.
+    content
+        Its content; empty if it is not known yet.
+    """
+
     place: RecordingPlace
+    recipes: tuple[str, ...] = ()
+    content: str = ""
 
     @property
     def size_bytes(self) -> int:
@@ -83,11 +94,14 @@ def find_places(templates: Iterable[Template]) -> list[RecordingPlace]:
     return [found[name] for name in sorted(found)]
 
 
-def known_contents(lake: Lake) -> dict[tuple[str, str], str]:
-    """Content by place and version, of all places where the lake knows the content."""
-    table = lake.read("files", ["url", "version", "content"])
-    url, version, content = (table[name].to_pylist() for name in ("url", "version", "content"))
-    return dict(zip(zip(url, version), content))
+def known_contents(lake: Lake) -> tuple[dict[tuple[str, str], str], dict[int, set[str]]]:
+    """Content by place and version, of all places where the lake knows the content; and the contents by length."""
+    table = lake.read("files", ["url", "version", "content", "size_bytes"])
+    url, version, content, size = (table[name].to_pylist() for name in ("url", "version", "content", "size_bytes"))
+    by_size: dict[int, set[str]] = {}
+    for one, size_bytes in zip(content, size):
+        by_size.setdefault(size_bytes, set()).add(one)
+    return dict(zip(zip(url, version), content)), by_size
 
 
 def file_rows(contents: Iterable[tuple[RecordingPlace, str]], machine: dict[str, str]) -> pa.Table:
@@ -101,14 +115,21 @@ def file_rows(contents: Iterable[tuple[RecordingPlace, str]], machine: dict[str,
 
 
 def untracked(
-    contents: Iterable[tuple[RecordingPlace, str]], recipe: str, skipped: set[tuple[str, ...]]
+    contents: Iterable[tuple[RecordingPlace, str]], recipes: Iterable[str], skipped: set[tuple[str, ...]]
 ) -> list[ArchivedRecording]:
-    """Each content once, at its first place, except those whose key is skipped; the longest first."""
+    """Each content once, at its first place, with the recipes whose key is not skipped, if there are any."""
     found: dict[str, ArchivedRecording] = {}
+    recipes = tuple(recipes)
     for place, content in contents:
-        if Key(content, recipe) not in skipped:
-            found.setdefault(content, ArchivedRecording(content, place))
-    return sorted(found.values(), key=lambda one: (-one.place.size_bytes, one.content))
+        missing = tuple(recipe for recipe in recipes if Key(content, recipe) not in skipped)
+        if missing:
+            found.setdefault(content, ArchivedRecording(place, missing, content))
+    return longest_first(found.values())
+
+
+def longest_first(recordings: Iterable[ArchivedRecording]) -> list[ArchivedRecording]:
+    """In the order in which they are distributed."""
+    return sorted(recordings, key=lambda one: (-one.size_bytes, one.content, str(one.place.url)))
 
 
 def levels_of(place: RecordingPlace, machine: dict[str, str]) -> dict[str, str | None]:

@@ -1,7 +1,8 @@
-"""What a task returns: the content of a recording, its tracked result, or why there is none."""
+"""What tracking a recording gives: its content, a result for each recipe, or why there is none."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,30 +19,31 @@ _LAKE = ("archive.lake-unusable", "archive.changed-meanwhile")
 class Hashed:
     """The content at a place."""
 
-    item: RecordingPlace
+    place: RecordingPlace
     content: str
-    seconds: float
 
 
 @dataclass(frozen=True)
 class Tracked:
     """A result whose files are in the lake's directory, and its rows of `runs` and `quantities`, not committed yet."""
 
-    item: ArchivedRecording
     files: tuple[DataFile, ...]
     run: dict[str, Any]
     quantities: tuple[dict[str, Any], ...]
-    seconds: float
 
 
 @dataclass(frozen=True)
 class Failed:
-    """A recording that cannot be read or tracked: the code of the error, and its sentence."""
+    """A recording that cannot be read or tracked: the code of the error, and its sentence.
 
-    item: RecordingPlace | ArchivedRecording
+    Content and recipe are empty if the recording could not be read, which is no result.
+    """
+
+    place: RecordingPlace
     code: str
     sentence: str
-    seconds: float = 0.0
+    content: str = ""
+    recipe: str = ""
 
     @property
     def by_content(self) -> bool:
@@ -51,13 +53,26 @@ class Failed:
     @property
     def by_storage(self) -> bool:
         """Whether the storage is the reason, so that it says nothing about the recording."""
-        return self.code.partition(".")[0] in _STORAGE or self.code in _LAKE
+        return not self.recipe or self.code.partition(".")[0] in _STORAGE or self.code in _LAKE
 
 
 Result = Hashed | Tracked | Failed
 
 
-def failed(item: RecordingPlace | ArchivedRecording, error: Exception, seconds: float = 0.0) -> Failed:
+@dataclass(frozen=True)
+class Handled:
+    """All results of one recording, and the time that they took."""
+
+    results: tuple[Result, ...]
+    seconds: float
+
+    @property
+    def again(self) -> bool:
+        """Whether to try again alone: what the content is the reason of has the same result each time."""
+        return any(isinstance(one, Failed) and not one.by_content for one in self.results)
+
+
+def failed(place: RecordingPlace, error: Exception, content: str = "", recipe: str = "") -> Failed:
     """The failure that an exception means."""
     if isinstance(error, MemoryError):
         error = ArchiveError(
@@ -69,4 +84,20 @@ def failed(item: RecordingPlace | ArchivedRecording, error: Exception, seconds: 
         error = ArchiveError(
             "internal", f"internal error ({type(error).__name__}: {error})", "please report it with the recording"
         )
-    return Failed(item, error.code, str(with_originals(error)), seconds)
+    return Failed(place, error.code, str(with_originals(error)), content, recipe)
+
+
+def each_result(handled: Iterable[Handled]) -> list[Result]:
+    """The results of several recordings."""
+    return [result for one in handled for result in one.results]
+
+
+def lost(recording: ArchivedRecording) -> Handled:
+    """The results of a recording whose worker ended each time."""
+    error = ArchiveError(
+        "process-ended",
+        "the worker that tracked the recording ended three times, with nothing else in it",
+        "please report it with the recording",
+    )
+    recipes = recording.recipes if recording.content else ("",)
+    return Handled(tuple(failed(recording.place, error, recording.content, recipe) for recipe in recipes), 0.0)

@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.archive.template import Template
+from livebode.configuration.axes import tables_of
 from livebode.configuration.axis import Axis
 from livebode.configuration.schema import Schema, schema_of
 from livebode.configuration.section import File
@@ -99,7 +100,8 @@ class ArchiveSettings(_Section):
         Paths or URLs of the recordings, with * in a name and ** for any depth. {site}, {line}, {machine} and {axis}
         name the machine of a recording: "s3://plant/{line}/{machine}/*.csv". Relative to this file.
     recipe
-        An axis.toml without its source, relative to this file. Its [machine] applies where the inputs name none.
+        An axis.toml without its source, relative to this file. Its [machine] applies where the inputs name none. With
+        [axes], each recording has all of these axes.
     lake
         Directory, relative to this file, or URL of the results.
     baselines
@@ -153,32 +155,47 @@ class ArchiveSettings(_Section):
         """The inputs."""
         return [Template(one) for one in self.inputs]
 
-    def axis(self) -> Axis:
-        """The axis of the recipe, whose source.log is a placeholder.
+    def axes(self) -> dict[str, Axis]:
+        """The axes of the recipe by name, whose source.log is a placeholder; a single one has the empty name.
 
         Raises
         ------
         ConfigError
-            If the recipe is not a configuration of one axis without a source.
+            If the recipe is not a configuration of axes without a source, or inputs name the axis as well.
         """
-        data = read_table(self.recipe)
+        found = {}
+        for name, data in tables_of(read_table(self.recipe), str(self.recipe)).items():
+            place = f"{self.recipe}, axis {name}" if name else str(self.recipe)
+            if name and any("{axis}" in text for text in self.inputs):
+                raise ConfigError(
+                    "key-conflict",
+                    "inputs name the axis of a recording by {axis}, and [axes] of the recipe name several in it",
+                    "write * in place of {axis}",
+                    key="inputs",
+                ).at(str(self.recipe))
+            found[name] = self._axis(name, data, place)
+        return found
+
+    def _axis(self, name: str, data: dict[str, Any], place: str) -> Axis:
         source = data.get("source", {})
-        if isinstance(source, dict) and (named := [key for key in ("log", "url") if key in source]):
+        if isinstance(source, dict) and (named := [key for key in ("log", "url", "replay") if key in source]):
             raise ConfigError(
                 "key-conflict",
                 f"the recipe of an archive has a source of its own (source.{named[0]})",
                 "remove it: the inputs of the archive are the sources",
                 key=f"source.{named[0]}",
-            ).at(str(self.recipe))
+            ).at(place)
         own = data | {"source": {**source, "log": "recording"}}
-        axis = Axis.of(own, str(self.recipe)).beside(self.recipe.parent)
+        if name and isinstance(machine := data.get("machine", {}), dict):
+            own["machine"] = {"axis": name} | machine
+        axis = Axis.of(own, place).beside(self.recipe.parent)
         if self.baselines is not None and axis.monitoring.baseline is not None:
             raise ConfigError(
                 "key-conflict",
                 "the recipe has a baseline for all machines, and the archive one for each (baselines)",
                 "remove one of them",
                 key="monitoring.baseline",
-            ).at(str(self.recipe))
+            ).at(place)
         return axis
 
 

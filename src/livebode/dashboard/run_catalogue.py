@@ -158,7 +158,7 @@ def details(run: Path) -> list[list[Any]]:
         clock = record.clock
         return [
             [q.model, q.name, [_unix(clock, t) for t in time_s], time_s.tolist(), value.tolist(), bound.tolist()]
-            for q in fitted_rows(record)
+            for q in fitted_rows(record).quantities
             for time_s, value, bound in [q.shown()]
         ]
 

@@ -6,16 +6,19 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from livebode.arrow import text
 from livebode.lake.schemas import TABLES
 from livebode.records.wide_responses import wide_options
 
 JOINED = "part-"
 """Begin of the names that Delta gives to joined files."""
+_GROUP_BYTES = 4 << 20
 
 
 class Key(NamedTuple):
@@ -57,17 +60,63 @@ class DataFile:
         return json.dumps({"numRecords": self.rows})
 
 
+class DataFileWriter:
+    """Writes the rows of one result, as they come, to a file in this directory. A context manager.
+
+    Row groups have a bounded size, and follow from the rows alone.
+
+    Parameters
+    ----------
+    folder
+        An existing directory.
+    table
+        Of the lake.
+    key
+        The result; its columns are added to the rows.
+    """
+
+    def __init__(self, folder: Path, table: str, key: Key) -> None:
+        self._path, self._table, self._key = folder / f"{key.content}-{key.recipe}.parquet", table, key
+        self._schema = TABLES[table].schema
+        self._writer = parquet_writer(self._path, self._schema)
+        self._waiting: list[pa.Table] = []
+        self._waiting_bytes = self._rows = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._writer.close()
+
+    def write(self, rows: pa.Table) -> None:
+        """Append rows without the key's columns."""
+        own = [text([word], np.zeros(rows.num_rows, dtype=np.int64)) for word in self._key]
+        columns = [rows[name].cast(self._schema.field(name).type) for name in self._schema.names[len(own) :]]
+        self._waiting.append(pa.table([*own, *columns], schema=self._schema))
+        self._rows += rows.num_rows
+        self._waiting_bytes += rows.nbytes
+        if self._waiting_bytes >= _GROUP_BYTES:
+            self._flush()
+
+    def finish(self) -> DataFile:
+        """Complete the file."""
+        self._flush()
+        self._writer.close()
+        return DataFile(self._table, self._path.name, self._path.stat().st_size, self._rows, self._key)
+
+    def _flush(self) -> None:
+        if self._waiting:
+            whole = pa.concat_tables(self._waiting)
+            self._waiting, self._waiting_bytes = [], 0
+            self._writer.write_table(whole, row_group_size=max(whole.num_rows, 1))
+
+
 def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table]) -> DataFile:
     """Write the rows of one result, without the key's columns, to a file in this directory; none if it has no rows."""
-    path = folder / f"{key.content}-{key.recipe}.parquet"
-    schema, rows = TABLES[table].schema, 0
-    with parquet_writer(path, schema) as writer:
+    with DataFileWriter(folder, table, key) as writer:
         for part in parts:
-            own = [pa.repeat(pa.scalar(text, pa.string()), part.num_rows) for text in key]
-            columns = [*own, *(part[name].cast(schema.field(name).type) for name in schema.names[len(key) :])]
-            writer.write_table(pa.table(columns, schema=schema))
-            rows += part.num_rows
-    return DataFile(table, path.name, path.stat().st_size, rows, key)
+            writer.write(part)
+        return writer.finish()
 
 
 def parquet_writer(path: Path | pa.BufferOutputStream, schema: pa.Schema) -> pq.ParquetWriter:

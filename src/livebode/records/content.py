@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
 from livebode.core import RecordingError
+
+_SAME_TIME_NS = 1_000_000_000
+"""A file that changes twice within it may have the same time of change."""
 
 
 def content_sha256(path: Path) -> str:
     """SHA-256 of a recording in hexadecimal digits: of a file that of its bytes, as `sha256sum` prints it.
 
-    Of a directory, such as a ROS 2 bag, it is that of its files in the order of their names (`joined_sha256`).
+    Of a directory, such as a ROS 2 bag, it is that of its files in the order of their names (`joined_sha256`). A file
+    that has not changed is read once in a process.
 
     Raises
     ------
@@ -32,14 +38,27 @@ def content_sha256(path: Path) -> str:
         if path.is_dir():
             files = sorted(file for file in path.rglob("*") if file.is_file())
             return joined_sha256([content_sha256(file) for file in files])
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        found = path.stat()
+        if time.time_ns() - found.st_mtime_ns < _SAME_TIME_NS:
+            return _digest(path)
+        return _digest_once(path, found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns)
     except FileNotFoundError:
         raise RecordingError("not-found", f"there is no file {path}", "check the name", path=str(path)) from None
     except OSError as error:
         raise RecordingError(
             "not-readable", f"cannot read {path}: {error.strerror}", "check its permissions", path=str(path)
         ) from None
+
+
+@lru_cache(64)
+def _digest_once(path: Path, *_unchanged: int) -> str:
+    """Computed once per process, as long as the file is unchanged."""
+    return _digest(path)
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def joined_sha256(parts: Sequence[str]) -> str:

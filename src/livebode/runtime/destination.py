@@ -8,6 +8,7 @@ from pathlib import Path
 
 from livebode.core import Model, Responses
 from livebode.runtime.documents import Subscriber
+from livebode.runtime.recorder import Recorder
 
 Draw = Callable[[Responses, Path, str, Model | None], None]
 
@@ -28,9 +29,12 @@ class Destination:
         Replace an earlier run there.
     subscribers
         Each receives every document that the run publishes.
+    record
+        Record of a recording's run in place of a run directory. `draw` and `force` then have no effect.
     """
 
     directory: Path
     draw: Draw
     force: bool = False
     subscribers: tuple[Subscriber, ...] = ()
+    record: Recorder | None = None

@@ -21,6 +21,7 @@ from livebode.runtime.documents import FitResults, Subscriber, TrackerResults
 from livebode.runtime.event_groups import EventGroups
 from livebode.runtime.mode_summaries import ModeSummaries
 from livebode.runtime.provenance import RecordedSpan, provenance, recorded
+from livebode.runtime.recorder import Recorder
 from livebode.runtime.stream import Stream
 from livebode.runtime.summary import versions
 from livebode.runtime.whole_record import WholeRecord
@@ -42,6 +43,7 @@ def run_output_only(
     *,
     force: bool = False,
     subscribers: Sequence[Subscriber] = (),
+    record: Recorder | None = None,
 ) -> OutputOnlyOutcome:
     """Track the modes of a recording from its outputs alone, and write a run directory.
 
@@ -57,6 +59,8 @@ def run_output_only(
         Replace an earlier run there.
     subscribers
         Each receives the rows of modes, the events and the progress.
+    record
+        In place of a run directory. `draw` and `force` then have no effect.
 
     Raises
     ------
@@ -67,7 +71,8 @@ def run_output_only(
     log = output_only_part(axis, open_recording(axis))
     settings = output_only_settings(axis, log)
     log = log.naming([*settings.outputs, *filter(None, [settings.schedule])])
-    with moments_by(RunClock.of_kind(log.clock_kind)), WholeRecord(directory, force=force, responses=False) as record:
+    record = record or WholeRecord(directory, force=force, responses=False)
+    with moments_by(RunClock.of_kind(log.clock_kind)), record:
         run = _OutputOnlyRun(axis, log, settings, Stream(record, subscribers, EventGroups()))
         with threadpool_limits(1, user_api="blas"):  # the matrices are small: threads would wait for each other
             run.follow()

@@ -446,6 +446,8 @@ class RunLoop:
         self._recorder.__exit__(*error)
 
     def _recorder_of(self, segments: RecordSection | None, again: bool) -> Recorder:
+        if self.to.record is not None:
+            return self.to.record
         if segments is None:
             return WholeRecord(self.to.directory, force=self.to.force)
         from livebode.runtime.segmented import SegmentedRecord  # needs a POSIX system

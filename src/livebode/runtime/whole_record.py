@@ -1,4 +1,4 @@
-"""WholeRecord: the record of a run in one piece, which appears when the run is complete."""
+"""Records of a run in one piece: there is nothing to continue and nothing to commit, and samples are not recorded."""
 
 from __future__ import annotations
 
@@ -12,16 +12,38 @@ from livebode.records import RunDirectory
 from livebode.runtime.documents import Document, FitResults
 
 
-class WholeRecord:
-    """Writes the documents of a run to a `RunDirectory`; an exception leaves nothing behind.
-
-    There is nothing to continue and nothing to commit, and samples are not recorded.
-    """
+class RecordInOnePiece:
+    """What all records have that are complete or not there."""
 
     continues = False
     clock = ()
     numbering = ()
     begun = None
+
+    def previous(self) -> Iterator[Responses]:
+        return iter(())
+
+    def pieces(self, block: Block) -> Iterator[Block]:
+        yield block
+
+    def write_samples(self, block: Block) -> None: ...
+
+    def commit(self, block: Block) -> None: ...
+
+    def commit_while_silent(self) -> None: ...
+
+    def commit_last(self) -> None: ...
+
+    def renew(self, **found: Any) -> None: ...
+
+    def limit(self, section: RecordSection) -> None: ...
+
+    def stopped(self) -> Event | None:
+        return None
+
+
+class WholeRecord(RecordInOnePiece):
+    """Writes the documents of a run to a `RunDirectory`; an exception leaves nothing behind."""
 
     def __init__(self, path: Path, *, force: bool, responses: bool = True) -> None:
         self.path = path
@@ -45,24 +67,3 @@ class WholeRecord:
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
         self._directory.finish(summary, draw)
-
-    def previous(self) -> Iterator[Responses]:
-        return iter(())
-
-    def pieces(self, block: Block) -> Iterator[Block]:
-        yield block
-
-    def write_samples(self, block: Block) -> None: ...
-
-    def commit(self, block: Block) -> None: ...
-
-    def commit_while_silent(self) -> None: ...
-
-    def commit_last(self) -> None: ...
-
-    def renew(self, **found: Any) -> None: ...
-
-    def limit(self, section: RecordSection) -> None: ...
-
-    def stopped(self) -> Event | None:
-        return None

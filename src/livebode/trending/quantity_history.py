@@ -81,9 +81,10 @@ class History:
     undated
         Number of runs that have no date.
     recipe
-        The settings with which the recordings were tracked.
+        The settings with which most recordings were tracked.
     other_recipes
-        Number of runs with other settings, which are left out: values of different settings are no trend.
+        Number of runs of an axis with other settings than most of its runs, which are left out: values of different
+        settings are no trend.
     """
 
     model: str
@@ -119,7 +120,7 @@ class Selection:
     covariates
         Names; None: all that the runs have.
     recipe
-        Begin of the id of the settings. None: those of most runs.
+        Begin of the id of the settings. None: for each axis those of its most runs.
     excluded
         Contents of recordings that are left out.
     """
@@ -171,7 +172,7 @@ def history(lake: Lake, quantity: str, of: Selection) -> History:
 def histories(lake: Lake, of: Selection) -> list[History]:
     """All quantities of the runs that count, in the order of models and names."""
     found = _counted(lake, lake.read("quantities", _COLUMNS, where_of(of)))
-    own = found if of.recipe is None else one_recipe(found, of.recipe)[0]
+    own = found if of.recipe is None else recipe_of_each(found, of.recipe)[0]
     return [
         _history(found.filter((pc.field("model") == model) & (pc.field("name") == name)), of, model, name)
         for model, name in _quantities(own)
@@ -179,9 +180,8 @@ def histories(lake: Lake, of: Selection) -> list[History]:
 
 
 def _history(found: pa.Table, of: Selection, model: str, name: str) -> History:
-    found, recipe, others = one_recipe(found, of.recipe)
-    path = _path(found, LEVELS)
-    found = found.append_column("axis path", path)
+    found, recipe, others = recipe_of_each(found, of.recipe)
+    path = found["axis path"]
     if of.below:
         found = found.filter(pc.or_(pc.equal(path, of.below), pc.starts_with(path, of.below + "/")))
     dated = found.filter(pc.field("recorded_from").is_valid()).sort_by([("recorded_from", "ascending"), *_ascending()])
@@ -254,23 +254,29 @@ def _joined(rows: pa.Table) -> pa.ChunkedArray:
     return pc.binary_join_element_wise(rows["content"], rows["recipe"], "/")
 
 
-def one_recipe(rows: pa.Table, recipe: str | None) -> tuple[pa.Table, str, int]:
-    """The rows with this recipe, or with that of most rows; its id, and the number of other rows."""
-    counts = sorted((-one["counts"], one["values"]) for one in pc.value_counts(rows["recipe"]).to_pylist())
+def recipe_of_each(rows: pa.Table, recipe: str | None) -> tuple[pa.Table, str, int]:
+    """For each axis the rows with this recipe, or with that of its most rows; the most frequent id, and the number of
+    other rows. The rows have a column "axis path" then."""
+    rows = rows.append_column("axis path", _path(rows, LEVELS))
+    named = rows
     if recipe is not None:
-        counts = [(count, own) for count, own in counts if own.startswith(recipe)]
-        if not counts:
+        named = rows.filter(pc.starts_with(rows["recipe"], recipe))
+        if not named.num_rows:
             raise ArchiveError(
                 "recipe-unknown",
                 f"no run was tracked with the recipe {recipe!r}",
                 nearest_name(recipe, pc.unique(rows["recipe"]).to_pylist(), "Recipes"),
                 recipe=recipe,
             )
-    if not counts:
-        return rows, "", 0
-    own = counts[0][1]
-    kept = rows.filter(pc.field("recipe") == own)
-    return kept, own, rows.num_rows - kept.num_rows
+    counts = named.group_by(["axis path", "recipe"]).aggregate([([], "count_all")]).to_pylist()
+    counts.sort(key=lambda one: (-one["count_all"], one["recipe"]))
+    of_axis: dict[str, str] = {}
+    for one in counts:
+        of_axis.setdefault(one["axis path"], one["recipe"])
+    chosen = pa.array([f"{path}/{own}" for path, own in of_axis.items()], pa.string())
+    own = pc.binary_join_element_wise(named["axis path"], named["recipe"], "/")
+    kept = named.filter(pc.is_in(own, value_set=chosen))
+    return kept, counts[0]["recipe"] if counts else "", rows.num_rows - kept.num_rows
 
 
 def where_of(of: Selection) -> pc.Expression:

@@ -103,10 +103,14 @@ def _settings(archive: str) -> ArchiveSettings | None:
 
 
 def _recipe(settings: ArchiveSettings | None) -> str | None:
-    """The recipe of the archive: what is tracked from now on is compared with the baseline."""
+    """The recipe of the archive: what is tracked from now on is compared with the baseline.
+
+    None with several axes: each has the recipe of its most runs.
+    """
     from livebode.configuration.recipe import recipe_id
 
-    return recipe_id(settings.axis()) if settings else None
+    axes = list(settings.axes().values()) if settings else []
+    return recipe_id(axes[0]) if len(axes) == 1 else None
 
 
 def _files(found: Sequence[HealthyRuns], text: str | None, *, each: bool) -> list[Path]:

@@ -79,9 +79,7 @@ def show(outcome: ArchiveOutcome, lake: str, archive: str, seconds: float, *, as
 
 
 def _url(one: Failed) -> str:
-    from livebode.archive.recordings import ArchivedRecording
-
-    return str((one.item.place if isinstance(one.item, ArchivedRecording) else one.item).url)
+    return str(one.place.url)
 
 
 def _plain(one: Failed) -> dict[str, str]:

@@ -152,7 +152,7 @@ def remarks(of: Assessment) -> list[str]:
     if found.undated:
         lines.append(f"{found.undated} runs without a date are left out")
     if found.other_recipes:
-        lines.append(f"{found.other_recipes} runs with other settings than {found.recipe} are left out (--recipe)")
+        lines.append(f"{found.other_recipes} runs with other settings than most of their axis are left out (--recipe)")
     return lines
 
 

@@ -21,6 +21,7 @@ class ArchiveError(LivebodeError):
     area: ClassVar[str] = "archive"
     codes: ClassVar[Mapping[str, str]] = {
         "changed-meanwhile": "A recording changed between two steps of the same archive run.",
+        "cluster-lost": "The scheduler of the cluster does not answer any more.",
         "cluster-unreachable": "The scheduler of the cluster does not answer, or refuses the certificate.",
         "covariate-unknown": "No run has a covariate of that name.",
         "internal": "Tracking a recording ended with an internal error.",
@@ -36,4 +37,5 @@ class ArchiveError(LivebodeError):
         "recording-absent": "A recording that a baseline needs is at none of its places any more, or has changed.",
         "run-unknown": "A run that is excluded is not among those to learn from.",
         "run-without-summary": "A run was tracked by an earlier livebode, which did not store its configuration.",
+        "workers-lost": "The cluster has had no worker for two minutes.",
     }
