@@ -32,7 +32,7 @@ def test_takeovers_with_and_without_states_give_the_parameters_and_alarms_of_one
     total = result.total
     assert result.exact
     assert result.claims == 3 * PARTITIONS
-    assert total.parameters == sum(one.parameters.num_rows for one in found) > 3 * 4 * 20
+    assert total.parameters == sum(one.parameters.num_rows for one in found) == 3 * 3 * 26
     changes = [event for one in found for event in one.events if event["kind"] == "change"]
     assert [event["axis"] for event in changes] == [next(iter(axes))]
 
