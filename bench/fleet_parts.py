@@ -1,111 +1,134 @@
-"""What an axis of a fleet costs its owner with fits and monitoring, by part and by the number of axes together.
+"""Where the time of a message goes in the owner of a partition: each part alone.
 
-    python -m bench.fleet_parts [--axes 40]
+    python -m bench.fleet_parts
 
-The machine of `bench.axes` (tooth-belt axis in motion, three signals at 4 kHz, 7 lines, 20 responses and two fits a
-second, a baseline with a model of the moving machine) as messages of 500 and 100 ms, taken together every 400 ms as an
-owner does. Processor time of the thread, the least of three rounds; the log is not part of it
-(`python -m bench.fleet_path`).
+For each kind of messages: read from the log in one read of many, decode, sequence, track alone and together with 4 or
+16 messages of the axis, and its share of a message of results and of a state. Processor time in µs a message, the
+least of some rounds.
 """
 
 from __future__ import annotations
 
-import argparse
+import asyncio
+import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-import numpy as np
-
-from bench.axes import TARGET_PERCENT, machine
-from livebode.configuration.axis import Axis
-from livebode.core import Block
-from livebode.fleet.axis_stream import AxisStream, outputs_together
-from livebode.fleet.message import write_message
-from livebode.fleet.partition import RESULTS_S
+from bench.fleet_loads import SAMPLES_100, SAMPLES_500, SPECTRA, AxisLoad
+from bench.fleet_path import state_every_s
+from livebode.fleet.axis_stream import AxisStream
+from livebode.fleet.log import FleetLog
+from livebode.fleet.message import read_message
+from livebode.fleet.reader import Reader
 from livebode.fleet.result_message import PendingResults
-from livebode.sources.live import Batch
+from livebode.fleet.server import LogServer
+from livebode.fleet.settings import LogSection
+from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM
+from livebode.sources.live import Sequencer
+from livebode.sources.live.source_events import SourceEvents
 
-BLOCKS_MS, ROUNDS, SECONDS, WARM_S = (500, 100), 3, 12.0, 9.0
-
-
-def owner_cost(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> tuple[float, float, float]:
-    """Milliseconds a second and axis to compute and to encode results, and bytes of results a second and axis.
-
-    The first 16 fits of an axis scan many starts, each alone: they are not counted, and one axis makes them for all.
-    """
-    warm = round(WARM_S / block_s)
-    first = AxisStream(axis, 1)
-    for number, message in enumerate(messages[:warm], 1):
-        first.process(message, number, 1e9 + number * block_s)
-    streams = [AxisStream(axis, 0) for _ in range(axes)]
-    for stream in streams:
-        stream.restore(first.snapshot())
-    computed_s = encoded_s = size = 0.0
-    due_s, each = WARM_S + RESULTS_S, (len(messages) - warm) * block_s
-    for number, message in enumerate(messages[warm:], warm + 1):
-        now_s = number * block_s
-        begun = time.thread_time()
-        for stream in streams:
-            stream.take(message, number, 1e9 + now_s)
-        middle = time.thread_time()
-        done = 0
-        if now_s >= due_s - 1e-9:
-            due_s += RESULTS_S * np.ceil((now_s - due_s) / RESULTS_S + 1e-9)
-            outputs, pending = outputs_together(streams), PendingResults()
-            middle = time.thread_time()
-            for i, (stream, output) in enumerate(zip(streams, outputs)):
-                pending.add(f"hall._.{i}.x", stream, output)
-            done = len(pending.message(number, "bench").to_bytes())
-        computed_s, encoded_s = computed_s + middle - begun, encoded_s + time.thread_time() - middle
-        size += done
-    share = 1000 / (each * axes)
-    return share * computed_s, share * encoded_s, size / (each * axes)
+_MESSAGES, _ROUNDS, _AXES, _WARM = 96, 5, 50, 16
+_TOGETHER = (1, 4, 16)
+HEADING = "| messages | read | decode | sequence | track 1 | 4 | 16 | results | state |\n" + "|---" * 9 + "|"
 
 
-def variants(axis: Axis) -> dict[str, Axis]:
-    """The same axis with more and more parts."""
-    alone = {"fit": None, "monitoring": axis.monitoring.model_copy(update={"baseline": None})}
-    return {
-        "tracking": axis.model_copy(update=alone),
-        "tracking, monitoring": axis.model_copy(update={"fit": None}),
-        "tracking, monitoring, fits": axis,
-    }
+class MessageCosts:
+    """What a message of a kind costs, µs."""
+
+    def __init__(self, load: AxisLoad) -> None:
+        self._load = load
+        self._axes = load.axes(_AXES)
+        self._axis = next(iter(self._axes.values()))
+        self._messages = [load.message(0, number) for number in range(_MESSAGES)]
+        self._batches = [read_message(message, 0.0) for message in self._messages]
+
+    def row(self) -> str:
+        """A line of the table, as Markdown."""
+        tracked = [min(self._track_s(together) for _ in range(_ROUNDS)) for together in _TOGETHER]
+        spent_s = [
+            asyncio.run(self._read_s()),
+            least_s(lambda: [read_message(message, 0.0) for message in self._messages]) / _MESSAGES,
+            least_s(self._sequence) / _MESSAGES,
+            *tracked,
+            self._results_s(),
+            self._state_s(),
+        ]
+        return f"| {self._load.name} | " + " | ".join(f"{one * 1e6:.0f}" for one in spent_s) + " |"
+
+    async def _read_s(self) -> float:
+        with tempfile.TemporaryDirectory() as folder, LogServer(Path(folder), 1) as server:
+            async with FleetLog(LogSection(url=server.url, size_gb=1.0, results_gb=1.0), "bench") as log:
+                await log.create_streams()
+                for number, message in enumerate(self._messages * _ROUNDS):
+                    await log.append(f"{EDGE}.hall._.machine.x", message, str(number))
+                times_s = [await self._read_all_s(log) for _ in range(_ROUNDS)]
+        return min(times_s) / (_MESSAGES * _ROUNDS)
+
+    async def _read_all_s(self, log: FleetLog) -> float:
+        reader, read = Reader(log, LOG_STREAM, f"{LOG}.0.>", 1), 0
+        began_s = time.thread_time()
+        while read < _MESSAGES * _ROUNDS:
+            read += len(await reader.read(1.0))
+        spent_s = time.thread_time() - began_s
+        await reader.close()
+        return spent_s
+
+    def _sequence(self) -> None:
+        sequencer = Sequencer(SourceEvents())
+        for batch in self._batches:
+            sequencer.push(batch)
+
+    def _track_s(self, together: int) -> float:
+        stream, spent_s = AxisStream(self._axis, 1), 0.0
+        for number, message in enumerate(self._messages, 1):
+            stream.take(message, number, 0.0)
+            if number % together == 0:
+                began_s = time.thread_time()
+                stream.output()
+                spent_s += (time.thread_time() - began_s) * (number > _WARM)
+        return spent_s / (_MESSAGES - _WARM)
+
+    def _results_s(self) -> float:
+        outputs = []
+        for key, axis in self._axes.items():
+            stream = AxisStream(axis, 1)
+            for number, message in enumerate(self._messages[:_WARM], 1):
+                output = stream.process(message, number, 0.0)
+            outputs.append((key, stream, output))
+
+        def store() -> None:
+            pending = PendingResults()
+            for key, stream, output in outputs:
+                pending.add(key, stream, output)
+            pending.message(1, "owner").to_bytes()
+
+        return least_s(store) / len(outputs)
+
+    def _state_s(self) -> float:
+        stream = AxisStream(self._axis, 1)
+        for number, message in enumerate(self._messages, 1):
+            stream.process(message, number, 0.0)
+        bytes_per_s = len(self._messages[0]) / self._load.period_s
+        every_s = state_every_s(len(stream.snapshot()), bytes_per_s)
+        return least_s(stream.snapshot) * self._load.period_s / every_s
 
 
-def messages_of(every: Block, block_s: float) -> list[bytes]:
-    """The samples of the machine as messages."""
-    samples = round(every.rate_hz * block_s)
-    count = min(round(SECONDS / block_s), len(every) // samples)
-    data = every.data.astype("f4").astype("f8")
-    parts = (data[:, i * samples : (i + 1) * samples] for i in range(count))
-    return [
-        write_message(Batch(i * samples, part, every.channels, every.rate_hz, epoch=1)) for i, part in enumerate(parts)
-    ]
-
-
-def least(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> tuple[float, ...]:
-    """Of several rounds."""
-    return tuple(np.min([owner_cost(axis, messages, block_s, axes) for _ in range(ROUNDS)], axis=0))
+def least_s(run: Callable[[], object]) -> float:
+    """Processor time, the least of some rounds."""
+    times_s = []
+    for _ in range(_ROUNDS):
+        began_s = time.thread_time()
+        run()
+        times_s.append(time.thread_time() - began_s)
+    return min(times_s)
 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m bench.fleet_parts", description=__doc__)
-    parser.add_argument("--axes", type=int, default=40)
-    asked = parser.parse_args()
-    print("| messages | axes together | parts | compute, ms/s | encode, ms/s | results, B/s |\n" + "|---" * 6 + "|")
-    with TemporaryDirectory() as folder:
-        axis, every = machine(Path(folder))
-        for block_ms in BLOCKS_MS:
-            messages = messages_of(every, block_ms / 1000)
-            for name, one in variants(axis).items():
-                for axes in sorted({1, asked.axes}):
-                    found = least(one, messages, block_ms / 1000, axes)
-                    print(f"| {block_ms} ms | {axes} | {name} | {found[0]:.2f} | {found[1]:.2f} | {found[2]:.0f} |")
-            percent = (found[0] + found[1]) / 10
-            verdict = "met" if percent <= TARGET_PERCENT else "missed"
-            print(f"{block_ms} ms: {percent:.2f} % of a core an axis, target ≤ {TARGET_PERCENT:g} %: {verdict}")
+    print(HEADING)
+    for load in (SAMPLES_500, SAMPLES_100, SPECTRA):
+        print(MessageCosts(load).row(), flush=True)
 
 
 if __name__ == "__main__":

@@ -63,4 +63,5 @@ class PlausibleRange(StatefulBase):
 
 def _limits(largest: Floats) -> Floats:
     """Of the next period. A signal that was zero gives no scale for what is too large."""
-    return np.where(largest > 0, _FACTOR * largest, np.inf)
+    with np.errstate(over="ignore"):  # there is no larger number
+        return np.where(largest > 0, _FACTOR * largest, np.inf)

@@ -113,7 +113,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
             )
         hop, window = self._layout.hop, self._layout.window
         sums, sample = block.sums.take(self._signals, axis=0).take(self._columns, axis=2), block.sample
-        finite = np.isfinite(sums).all(axis=(0, 2))
+        finite = np.asarray(np.isfinite(sums).all(axis=(0, 2)))
         with np.errstate(over="ignore", invalid="ignore"):  # responses from implausible numbers are excluded
             spectrum = (sums if finite.all() else np.where(finite[:, np.newaxis], sums, 0.0)) * self._after
             size = np.abs(spectrum).max(axis=2)

@@ -188,7 +188,8 @@ class AxisStream(StatefulBase):
         found = [*tracked.events, *events]
         detection = self.detection
         if detection is not None and tracked.responses is not None and not self.failure:
-            ready = tracked.responses[tracked.responses.ready]
+            responses = tracked.responses
+            ready = responses if responses.ready.all() else responses[responses.ready]
             found += detection.take_responses(ready, parameters[0] if parameters else None)
         self._remember(found, parameters)
         return Output(

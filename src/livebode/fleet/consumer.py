@@ -21,7 +21,7 @@ MESSAGES_MAX = 1024
 _BYTES_MAX = 2 * PAYLOAD_BYTES_MAX
 """More than any message, or the server would never deliver it."""
 _REQUEST = json.dumps({"batch": MESSAGES_MAX, "max_bytes": _BYTES_MAX, "no_wait": True}).encode()
-_ANSWER_S, _LOOK_S = 5.0, 0.25
+_ANSWER_S, _LOOK_S = 2.0, 0.25
 _ENDS = {"404", "408", "409 Message Size Exceeds MaxBytes"}
 """Status of a request that is answered: nothing more is there, or no more fits."""
 _ACK = "$JS.ACK."
