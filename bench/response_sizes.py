@@ -2,7 +2,8 @@
 
 `python -m bench.response_sizes`: a simulated belt axis that moves, with 1, 7, 21 and 101 lines in a window of 400 at
 4 kHz and a response every 20 samples. All quantities, and value, sigma and coherence alone, which are what a Bode plot
-needs. The last columns are processor times of one response.
+needs. The last columns are processor times of one response. Then the same responses in the messages in which a fleet
+stores results: rounded with a digest of the exact bits, in float64, and long.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ import pyarrow.parquet as pq
 from livebode.core import Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
+from livebode.fleet.result_message import ResultMessage
+from livebode.fleet.wide_rows import AxisRows, grid_of, response_table
 from livebode.records import RESPONSES, as_batch
 from livebode.records.table_file import ColumnTable, TableFile
 from livebode.records.wide_responses import from_wide, to_wide, wide_options
@@ -27,6 +30,7 @@ COUNTS = 1, 7, 21, 101
 AMPLITUDE_N_M, NOISE_RAD_PER_S = 0.3, 0.05
 LEFT_OUT = {"weight_re", "weight_im", "input_coherence", "distortion"}
 TARGET_WIDE, TARGET_LONG, TARGET_LINES = 85, 236, 7
+AXES_IN_MESSAGE, EACH = 20, 8
 
 
 def tracked(count: int) -> Responses:
@@ -64,6 +68,29 @@ def found_of(responses: Responses) -> dict[str, object]:
     return grid | {"quantity": responses.quantity, "unit": responses.unit}
 
 
+def in_messages(responses: Responses) -> str:
+    """Bytes of a response in a message of results of a partition with some axes, by form."""
+    parts = [
+        AxisRows(f"hall.2.machine {i}.x", 1, 0, responses[EACH * i : EACH * (i + 1)]) for i in range(AXES_IN_MESSAGE)
+    ]
+    grids = {part.axis: grid_of(part.responses) for part in parts}
+    rounded = len(ResultMessage(1, "worker:1", rows=response_table(parts), grids=grids).to_bytes())
+    exact = _packed(pa.concat_tables([to_wide(part.responses, lossless=True) for part in parts]))
+    long = _packed(pa.Table.from_batches([as_batch(part.responses) for part in parts]))
+    sizes = (one / (EACH * AXES_IN_MESSAGE) for one in (rounded, exact, long))
+    return "  ".join(f"{size:6.0f}" for size in sizes)
+
+
+def _packed(table: pa.Table) -> int:
+    sink = pa.BufferOutputStream()
+    with (
+        pa.CompressedOutputStream(sink, "zstd") as packed,
+        pa.ipc.new_stream(packed, table.schema) as writer,
+    ):
+        writer.write_table(table.combine_chunks())
+    return len(sink.getvalue())
+
+
 def main() -> None:
     print("bytes of      all quantities             value, sigma, coherence    lossless    processor, µs")
     print("a response    long    wide  long/wide      long    wide  long/wide      wide    write    read")
@@ -85,6 +112,9 @@ def main() -> None:
             from_wide(pq.read_table(path), found_of(responses))
             read = time.process_time()
             print(f"{row}{lossless:7.0f} {1e6 * (written - began) / rows:8.1f} {1e6 * (read - written) / rows:7.1f}")
+            if count == TARGET_LINES:
+                message = in_messages(responses)
+    print(f"in messages of a fleet at {TARGET_LINES} lines, with digest, float64, long: {message} B")
     print(f"target at {TARGET_LINES} lines: {TARGET_WIDE} B against {TARGET_LONG} B, {TARGET_LONG / TARGET_WIDE:.2f}")
 
 

@@ -59,7 +59,7 @@ def rigid(folder: Path, machine: int, seeds: range, changed: int = 0) -> None:
 
 def from_directories(archive: Path, recordings: list[Path]) -> Baseline:
     """What `livebode learn` learns from run directories of these recordings."""
-    axis, runs = ArchiveSettings.read(archive).axis(), []
+    axis, runs = next(iter(ArchiveSettings.read(archive).axes().values())), []
     for path in recordings:
         runs.append(archive.parent / "runs" / path.stem)
         own = axis.model_copy(update={"source": axis.source.model_copy(update={"log": path})})

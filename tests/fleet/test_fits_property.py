@@ -78,7 +78,7 @@ def test_the_fits_are_two_a_second_and_have_derived_quantities_and_margins(alone
     rows, events = alone[0]
     numbers = sorted({number for number, _ in rows})
     assert np.all(np.diff(numbers) == 20)
-    assert len(numbers) == 4
+    assert len(numbers) == 3
     assert any(name.startswith("Js/") for _, name in rows)
     assert any("resonance" in name for _, name in rows)
     assert any("margin" in name for _, name in rows)

@@ -21,7 +21,7 @@ from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.settings import LogSection, machine_key
 from livebode.fleet.status import status_of
-from livebode.fleet.subjects import EDGE, RESULT_STREAM, RESULTS
+from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS
 from livebode.fleet.worker import own_partitions
 from livebode.sources.live import Batch
 from tests.support.forked import server
@@ -120,7 +120,7 @@ def owned_until_current(settings: LogSection, axes: Mapping[str, Axis], response
     thread = threading.Thread(target=own_partitions, args=(settings, axes, range(PARTITIONS), stop))
     thread.start()
     try:
-        asyncio.run(_until_current(settings))
+        asyncio.run(_until_current(settings, axes))
         while responses and stored_responses(settings) < responses:
             time.sleep(0.1)
     finally:
@@ -128,15 +128,19 @@ def owned_until_current(settings: LogSection, axes: Mapping[str, Axis], response
         thread.join()
 
 
-async def _until_current(settings: LogSection) -> None:
-    """Wait until every partition reports that it has waited for nothing since now."""
+async def _until_current(settings: LogSection, axes: Mapping[str, Axis]) -> None:
+    """Wait until every partition reports that it waits for nothing, and has processed all messages of its axes."""
     async with FleetLog(settings, "test") as log:
         began_s = time.time()
         for number in range(PARTITIONS):
             while True:
                 about = await status_of(log, number)
+                newest = {key: await log.last(LOG_STREAM, f"{LOG}.{number}.{key}") for key in axes}
+                due = {key: message.number for key, message in newest.items() if message is not None}
                 if about is not None and about["at_s"] > began_s and not about["waiting"]:
-                    break
+                    done = {key: axis["position"] for key, axis in about["axes"].items()}
+                    if all(done.get(key, 0) >= last for key, last in due.items()):
+                        break
                 await asyncio.sleep(0.05)
 
 

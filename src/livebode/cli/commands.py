@@ -57,7 +57,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "send": "Send the samples of live sources to the log, through a buffer on disk.",
         "status": "Show partitions, axes, backlog and losses of a fleet.",
         "view": "Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.",
-        "check": "Compute all responses of a fleet again from its log, and compare the stored ones bit for bit.",
+        "check": "Compute all results of a fleet again from its log, and compare the stored ones bit for bit.",
         "replay": "Compute the responses of an axis again from the log, and write them as a table.",
         "server": "Write the configuration of nats-server for a fleet.",
         "leaf": "Write the configuration of nats-server as a leaf node: the one way of a site to the log.",

@@ -63,7 +63,7 @@ class Output:
     events: list[Event]
 
 
-class Tracked(NamedTuple):
+class UnfittedOutput(NamedTuple):
     """What is known before fits: the number of the first response, all responses, which of them are fitted, events."""
 
     number: int
@@ -161,7 +161,7 @@ class AxisStream(StatefulBase):
         """The responses, fits and events of all messages taken since the last call."""
         return outputs_together([self])[0]
 
-    def tracked(self) -> Tracked:
+    def tracked(self) -> UnfittedOutput:
         """The same before the fits; `finished` follows."""
         self._track()
         first, responses = self.responses, self._responses
@@ -169,7 +169,7 @@ class AxisStream(StatefulBase):
         self._responses, self._tracked_events = [], []
         self.responses += sum(map(len, responses))
         joined_responses = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
-        return Tracked(first, joined_responses, self._to_fit(joined_responses), events)
+        return UnfittedOutput(first, joined_responses, self._to_fit(joined_responses), events)
 
     @property
     def pipeline(self) -> Pipeline:
@@ -182,7 +182,7 @@ class AxisStream(StatefulBase):
         """What monitors the axis, from the first Block on."""
         return None if self._pipeline is None else self._pipeline.detection
 
-    def finished(self, tracked: Tracked, fitted: Fitted) -> Output:
+    def finished(self, tracked: UnfittedOutput, fitted: Fitted) -> Output:
         """The output, with the fits of the responses that `tracked` lists; monitors both."""
         parameters, events = fitted
         found = [*tracked.events, *events]

@@ -257,4 +257,5 @@ class PartitionOwner:
 
 
 def _axis_status(stream: AxisStream) -> dict[str, Any]:
-    return {"responses": stream.responses, "lost": stream.lost, "failure": stream.failure, "log_s": stream.log_s}
+    counts = {"responses": stream.responses, "lost": stream.lost, "position": stream.position}
+    return counts | {"failure": stream.failure, "log_s": stream.log_s}

@@ -14,7 +14,7 @@ Fitted = tuple[tuple[Parameters, ...], list[Event]]
 
 
 def process_together(fits: Sequence[Fits], batches: Sequence[Responses]) -> list[Fitted]:
-    """Result of `Fits.process` of each axis for its new responses, to rounding; axes that are alike share the work.
+    """Result of `Fits.process` of each axis for its new responses, bit for bit; axes that are alike share the work.
 
     A process with many axes should collect their responses, since a call for one row costs nearly what it costs for
     sixteen (`python -m bench.fits`).

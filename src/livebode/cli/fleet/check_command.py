@@ -1,4 +1,4 @@
-"""`livebode fleet check`: the proof that every response is stored exactly once."""
+"""`livebode fleet check`: the proof that every result is stored exactly once."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from livebode.cli.options import Json
 
 
 def check_command(fleet: Fleet, as_json: Json = False) -> None:
-    """Compute all responses of a fleet again from its log, and compare the stored ones bit for bit.
+    """Compute all results of a fleet again from its log, and compare the stored ones bit for bit.
 
-    The fleet may run meanwhile. Exit code 2 if a response is missing, doubled or different.
+    The fleet may run meanwhile. Exit code 2 if a response, parameter or event is missing, doubled or different.
     """
     from livebode.cli.fleet.verdict import require_exact, verdict
     from livebode.fleet.check import CheckResult, check_results

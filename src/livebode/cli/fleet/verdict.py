@@ -12,10 +12,17 @@ def verdict(result: CheckResult) -> str:
     other = f", {total.other_recipe} with another configuration were not compared" if total.other_recipe else ""
     return (
         f"{total.responses:,} responses (axes: {len(result.axes)}): {total.missing} missing, {total.doubled} doubled, "
-        f"{total.different + total.unexpected} different from one uninterrupted computation{other}; "
-        f"{total.parameters:,} parameters: {total.parameters_missing} missing, {total.parameters_unexpected} "
-        f"unexpected; {total.events:,} events: {total.events_missing} missing, {total.events_unexpected} unexpected"
+        f"{total.different + total.unexpected} different from one uninterrupted computation{other}"
+        + _others(total.parameters, "parameters", total.parameters_missing, total.parameters_unexpected)
+        + _others(total.events, "events", total.events_missing, total.events_unexpected)
     )
+
+
+def _others(count: int, what: str, missing: int, unexpected: int) -> str:
+    """The same of what many fleets have none of."""
+    if not (count or unexpected):
+        return ""
+    return f"; {count:,} {what}: {missing} missing, {unexpected} doubled or different"
 
 
 def require_exact(result: CheckResult) -> None:

@@ -1,0 +1,112 @@
+"""What an axis of a fleet costs its owner with fits and monitoring, by part and by the number of axes together.
+
+    python -m bench.fleet_fits [--axes 40]
+
+The machine of `bench.axes` (tooth-belt axis in motion, three signals at 4 kHz, 7 lines, 20 responses and two fits a
+second, a baseline with a model of the moving machine) as messages of 500 and 100 ms, taken together every 400 ms as an
+owner does. Processor time of the thread, the least of three rounds; the log is not part of it
+(`python -m bench.fleet_path`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from bench.axes import TARGET_PERCENT, machine
+from livebode.configuration.axis import Axis
+from livebode.core import Block
+from livebode.fleet.axis_stream import AxisStream, outputs_together
+from livebode.fleet.message import write_message
+from livebode.fleet.partition import RESULTS_S
+from livebode.fleet.result_message import PendingResults
+from livebode.sources.live import Batch
+
+BLOCKS_MS, ROUNDS, SECONDS, WARM_S = (500, 100), 3, 12.0, 9.0
+
+
+def owner_cost(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> tuple[float, float, float]:
+    """Milliseconds a second and axis to compute and to encode results, and bytes of results a second and axis.
+
+    The first 16 fits of an axis scan many starts, each alone: they are not counted, and one axis makes them for all.
+    """
+    warm = round(WARM_S / block_s)
+    first = AxisStream(axis, 1)
+    for number, message in enumerate(messages[:warm], 1):
+        first.process(message, number, 1e9 + number * block_s)
+    streams = [AxisStream(axis, 0) for _ in range(axes)]
+    for stream in streams:
+        stream.restore(first.snapshot())
+    computed_s = encoded_s = size = 0.0
+    due_s, each = WARM_S + RESULTS_S, (len(messages) - warm) * block_s
+    for number, message in enumerate(messages[warm:], warm + 1):
+        now_s = number * block_s
+        begun = time.thread_time()
+        for stream in streams:
+            stream.take(message, number, 1e9 + now_s)
+        middle = time.thread_time()
+        done = 0
+        if now_s >= due_s - 1e-9:
+            due_s += RESULTS_S * np.ceil((now_s - due_s) / RESULTS_S + 1e-9)
+            outputs, pending = outputs_together(streams), PendingResults()
+            middle = time.thread_time()
+            for i, (stream, output) in enumerate(zip(streams, outputs)):
+                pending.add(f"hall._.{i}.x", stream, output)
+            done = len(pending.message(number, "bench").to_bytes())
+        computed_s, encoded_s = computed_s + middle - begun, encoded_s + time.thread_time() - middle
+        size += done
+    share = 1000 / (each * axes)
+    return share * computed_s, share * encoded_s, size / (each * axes)
+
+
+def variants(axis: Axis) -> dict[str, Axis]:
+    """The same axis with more and more parts."""
+    alone = {"fit": None, "monitoring": axis.monitoring.model_copy(update={"baseline": None})}
+    return {
+        "tracking": axis.model_copy(update=alone),
+        "tracking, monitoring": axis.model_copy(update={"fit": None}),
+        "tracking, monitoring, fits": axis,
+    }
+
+
+def messages_of(every: Block, block_s: float) -> list[bytes]:
+    """The samples of the machine as messages."""
+    samples = round(every.rate_hz * block_s)
+    count = min(round(SECONDS / block_s), len(every) // samples)
+    data = every.data.astype("f4").astype("f8")
+    parts = (data[:, i * samples : (i + 1) * samples] for i in range(count))
+    return [
+        write_message(Batch(i * samples, part, every.channels, every.rate_hz, epoch=1)) for i, part in enumerate(parts)
+    ]
+
+
+def least(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> tuple[float, ...]:
+    """Of several rounds."""
+    return tuple(np.min([owner_cost(axis, messages, block_s, axes) for _ in range(ROUNDS)], axis=0))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m bench.fleet_fits", description=__doc__)
+    parser.add_argument("--axes", type=int, default=40)
+    asked = parser.parse_args()
+    print("| messages | axes together | parts | compute, ms/s | encode, ms/s | results, B/s |\n" + "|---" * 6 + "|")
+    with TemporaryDirectory() as folder:
+        axis, every = machine(Path(folder))
+        for block_ms in BLOCKS_MS:
+            messages = messages_of(every, block_ms / 1000)
+            for name, one in variants(axis).items():
+                for axes in sorted({1, asked.axes}):
+                    found = least(one, messages, block_ms / 1000, axes)
+                    print(f"| {block_ms} ms | {axes} | {name} | {found[0]:.2f} | {found[1]:.2f} | {found[2]:.0f} |")
+            percent = (found[0] + found[1]) / 10
+            verdict = "met" if percent <= TARGET_PERCENT else "missed"
+            print(f"{block_ms} ms: {percent:.2f} % of a core an axis, target ≤ {TARGET_PERCENT:g} %: {verdict}")
+
+
+if __name__ == "__main__":
+    main()
