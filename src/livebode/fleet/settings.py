@@ -44,7 +44,7 @@ class LogSection(_Section):
         Certificate of the authority that signed the server's certificate, in PEM, relative to this file. Default: the
         authorities that this computer trusts.
     access
-        "view" with the key of a viewer, which may read the status only.
+        "view" with the key of a viewer, which may read the status and the acknowledgements only.
     size_gb
         Most data of the machines in the log, in GB; the oldest are deleted then. It must be well below the disk.
     results_gb
@@ -125,7 +125,7 @@ class UsersSection(_Section):
     fleet
         Of workers and of commands that check or replay: everything.
     view
-        Of viewers: the status.
+        Of viewers: the status and the acknowledgements.
     edges
         Of edges, by the path of their axes: "Graz" may send those of a site, "Graz/2/press 4/x" one axis.
     """

@@ -9,9 +9,10 @@ from livebode.configuration.machine_section import MachineSection
 
 LEVELS: Final = 4
 """Site, line, machine, axis."""
-EDGE, LOG, RESULTS, STATES, STATUS = "edge", "in", "res", "state", "status"
-"""First tokens: what an edge publishes, the same after the server's mapping, results, states, and the status."""
-LOG_STREAM, RESULT_STREAM, STATE_STREAM, STATUS_STREAM = "LOG", "RESULTS", "STATES", "STATUS"
+EDGE, LOG, RESULTS, STATES, STATUS, ACTS = "edge", "in", "res", "state", "status", "act"
+"""First tokens: what an edge publishes, the same after the server's mapping, results, states, the status, and what
+persons do with alarms: act.KIND.AXIS."""
+LOG_STREAM, RESULT_STREAM, STATE_STREAM, STATUS_STREAM, ACTS_STREAM = "LOG", "RESULTS", "STATES", "STATUS", "ACTS"
 VIEW_API: Final = "viewer"
 """First token of the requests of a viewer, instead of JetStream's own."""
 _EMPTY = "_"

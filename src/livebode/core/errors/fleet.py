@@ -35,4 +35,5 @@ class FleetError(LivebodeError):
         "server-ended": "The server of the log ended at its start.",
         "server-missing": "The program nats-server is not installed.",
         "server-open": "The server of the log would be open to a network without TLS or keys.",
+        "view-only": "The key of this user may read the log, and store nothing there.",
     }
