@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from livebode.analysis.parameter_track import MARGINS
@@ -101,22 +102,25 @@ def fitted_rows(run: RunRecord) -> list[QuantityRows]:
     """The valid fits of each quantity that is not fixed, margins included; of a run in segments the newest 64 MiB."""
     found: dict[tuple[str, str], QuantityRows] = {}
     for table in run.tables("parameters", _NEWEST_BYTES):
-        columns = {name: table[name].to_numpy(zero_copy_only=False) for name in ("time_s", "value", "sigma")}
-        rows = np.column_stack([columns[name].astype(np.float64) for name in columns])
-        valid = (
-            (table["status"].to_numpy(zero_copy_only=False) == OK) & np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0)
-        )
-        coded = [table[name].combine_chunks().dictionary_encode() for name in ("model", "name", "unit")]
-        models, names, units = (column.dictionary.to_pylist() for column in coded)
-        model, name, unit = (column.indices.to_numpy(zero_copy_only=False) for column in coded)
-        both = np.where(valid, model * len(names) + name, -1)
-        for code in np.unique(both[both >= 0]).tolist():
-            here = np.flatnonzero(both == code)
-            key = models[code // len(names)], names[code % len(names)]
-            quantity = found.get(key) or QuantityRows(*key, units[unit[here[0]]])
-            found[key] = quantity
-            quantity.add(rows[here])
+        add_fits(found, table)
     return list(found.values())
+
+
+def add_fits(found: dict[tuple[str, str], QuantityRows], table: pa.Table) -> None:
+    """Add the valid fits of each quantity that is not fixed, from rows of parameters.parquet, to its model and name."""
+    columns = {name: table[name].to_numpy(zero_copy_only=False) for name in ("time_s", "value", "sigma")}
+    rows = np.column_stack([columns[name].astype(np.float64) for name in columns])
+    valid = (table["status"].to_numpy(zero_copy_only=False) == OK) & np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0)
+    coded = [table[name].combine_chunks().dictionary_encode() for name in ("model", "name", "unit")]
+    models, names, units = (column.dictionary.to_pylist() for column in coded)
+    model, name, unit = (column.indices.to_numpy(zero_copy_only=False) for column in coded)
+    both = np.where(valid, model * len(names) + name, -1)
+    for code in np.unique(both[both >= 0]).tolist():
+        here = np.flatnonzero(both == code)
+        key = models[code // len(names)], names[code % len(names)]
+        quantity = found.get(key) or QuantityRows(*key, units[unit[here[0]]])
+        found[key] = quantity
+        quantity.add(rows[here])
 
 
 def trend_points(run: RunRecord) -> list[TrendPoint]:
