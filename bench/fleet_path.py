@@ -257,10 +257,9 @@ class _Path:
         found, last = [], (await log.extent(RESULT_STREAM)).last
         async for message in stored_messages(log, RESULT_STREAM, f"{RESULTS}.*", last):
             one = ResultMessage.from_bytes(message.data)
-            responses = one.rows.group_by(["axis", "run", "number"]).aggregate([]).num_rows
             size = 0 if one.claim else len(message.data)
             partition = int(message.subject.split(".")[1])
-            found.append(_Result(partition, one.through, message.stored_s, one.claim, responses, size))
+            found.append(_Result(partition, one.through, message.stored_s, one.claim, one.rows.num_rows, size))
         return found
 
     async def _trace(self, log: FleetLog, sent: Generated, results: list[_Result]) -> np.ndarray:

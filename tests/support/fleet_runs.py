@@ -27,7 +27,7 @@ from livebode.sources.live import Batch
 from tests.support.forked import server
 
 RATE_HZ = 1000.0
-WINDOW, SAMPLES, LINES = 100, 50, 5
+WINDOW, SAMPLES = 100, 50
 PARTITIONS = 4
 CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "m/s"))
 EPOCH = 77
@@ -143,7 +143,7 @@ def stored_responses(settings: LogSection) -> int:
             last = (await log.extent(RESULT_STREAM)).last
             return sum(
                 [
-                    ResultMessage.from_bytes(message.data).rows.num_rows // LINES
+                    ResultMessage.from_bytes(message.data).rows.num_rows
                     async for message in stored_messages(log, RESULT_STREAM, f"{RESULTS}.*", last)
                 ]
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,7 +132,8 @@ class Block:
                 argument="channels",
                 shape=list(data.shape),
             )
-        if repeated := sorted({name for name in names if names.count(name) > 1}):
+        if len(set(names)) != len(names):
+            repeated = sorted({name for name in names if names.count(name) > 1})
             raise UsageError(
                 "duplicate",
                 f"channel name {repeated[0]!r} is duplicated",
@@ -139,7 +141,7 @@ class Block:
                 argument="channels",
                 value=repeated[0],
             )
-        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+        if not 0 < self.rate_hz < inf:
             raise UsageError(
                 "out-of-range",
                 f"rate_hz={self.rate_hz} is not a positive number of samples per second",

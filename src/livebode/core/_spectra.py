@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -144,12 +145,12 @@ class SpectraLayout:
                     window=self.window,
                 )
 
-    @property
+    @cached_property
     def bins(self) -> tuple[int, ...]:
         """All bins in the order of the sums: the lines, then the detection lines."""
         return self.lines + self.quiet
 
-    @property
+    @cached_property
     def channels(self) -> tuple[Channel, ...]:
         """Signals and values; a channel that is both appears once."""
         return tuple(dict.fromkeys(self.signals + self.values))

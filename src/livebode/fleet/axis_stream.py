@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from livebode.configuration.axis import Axis
 from livebode.configuration.recipe import recipe_id
@@ -14,19 +14,21 @@ from livebode.estimation.stream_estimator import Follower
 from livebode.fleet.message import read_message
 from livebode.preparation.plan import live_follower
 from livebode.sources.live import LiveBlock, Sequencer
+from livebode.sources.live.joined import joined
 from livebode.sources.live.source_events import SourceEvents
 
 RESPONSE_BYTES = 130
 """Of a response at a line, in a message of results."""
 _OUTPUT_BYTES_MAX = 4 << 20
 """Most bytes of the responses to one message: a message of results must have room for them."""
+_EVENT_BYTES = 1000
 _FAILURE_LETTERS_MAX = 1000
 _logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Output:
-    """What one message of the log gave.
+    """What messages of the log gave.
 
     Attributes
     ----------
@@ -39,6 +41,16 @@ class Output:
     number: int
     responses: Responses | None
     events: list[Event]
+
+
+class _Taken(NamedTuple):
+    """Messages that are tracked together: number in the log of the last one, its last sample and time, their Blocks,
+    and the most bytes of their responses; more than allowed only for a single message."""
+
+    position: int
+    end: tuple[int, float]
+    blocks: list[LiveBlock]
+    size_bytes: int
 
 
 class AxisStream(StatefulBase):
@@ -73,6 +85,9 @@ class AxisStream(StatefulBase):
         settings = axis.source
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
         self._follower: Follower | None = None
+        self._taken: list[_Taken] = []
+        self._responses: list[Responses] = []
+        self._tracked_events: list[Event] = []
 
     @property
     def lost(self) -> int:
@@ -81,25 +96,41 @@ class AxisStream(StatefulBase):
 
     def process(self, message: bytes, position: int, log_s: float) -> Output:
         """The responses and events of the next message; `position` is its number in the log, `log_s` its time there."""
+        self.take(message, position, log_s)
+        return self.output()
+
+    def take(self, message: bytes, position: int, log_s: float) -> int:
+        """Take the next message, to be tracked together with those after it: the cost is by call, not by sample.
+
+        Returns the most bytes that it adds to a message of results. The responses are those of `process`, bit for bit.
+        """
         self.position, self.log_s = position, log_s
-        first = self.responses
-        events: list[Event] = []
-        responses: list[Responses] = []
-        if not self.failure:
-            try:
-                for block in self._blocks(message):
-                    found = self._tracked(block).process(block, events.append)
-                    responses += [found] if len(found) else []
-            except Exception as error:  # a fault of one axis must not stop the others of its partition
-                self._fail(error, events)
-        if sum(found.value.size for found in responses) * RESPONSE_BYTES > _OUTPUT_BYTES_MAX:
-            what = f"message {position} of the log has too many samples: its responses were dropped"
-            sample, time_s = self._events.position
-            events.append(Event("malformed", sample, time_s, what))
-            responses = []
+        if self.failure:
+            return 0
+        before, new = self._events.pending, self._follower is None
+        try:
+            blocks = self._blocks(message)
+            size = self._output_bytes_max(blocks) if blocks else 0
+        except Exception as error:  # a fault of one axis must not stop the others of its partition
+            self._track()
+            self._fail(error)
+            return _EVENT_BYTES
+        if self._taken and self._taken[-1].size_bytes + size <= _OUTPUT_BYTES_MAX:
+            blocks, size = self._taken[-1].blocks + blocks, self._taken.pop().size_bytes + size
+        self._taken.append(_Taken(position, self._events.position, blocks, size))
+        if new:  # what a follower refuses, it refuses at its first message, without those after it
+            self._track()
+        return min(size, _OUTPUT_BYTES_MAX) + _EVENT_BYTES * (self._events.pending - before)
+
+    def output(self) -> Output:
+        """The responses and events of all messages taken since the last call."""
+        self._track()
+        first, responses = self.responses, self._responses
+        events = self._tracked_events + self._events.take()
+        self._responses, self._tracked_events = [], []
         self.responses += sum(map(len, responses))
-        events += self._events.take()
-        return Output(first, Responses.join(responses) if responses else None, events)
+        joined_responses = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
+        return Output(first, joined_responses, events)
 
     def _blocks(self, message: bytes) -> list[LiveBlock]:
         blocks = self._sequencer.poll(self.log_s)
@@ -110,23 +141,48 @@ class AxisStream(StatefulBase):
             return blocks
         return blocks + self._sequencer.push(batch.with_kinds(self._axis.source.kinds))
 
-    def _tracked(self, block: LiveBlock) -> Follower:
+    def _output_bytes_max(self, blocks: list[LiveBlock]) -> int:
+        """Most bytes of the responses that these Blocks complete; [motion] delays them by a chunk and a window."""
         if self._follower is None:
-            self._follower = live_follower(self._axis, block.rate_hz, self._sequencer.schema.spectra)
-        return self._follower
+            self._follower = live_follower(self._axis, blocks[0].rate_hz, self._sequencer.schema.spectra)
+        settings = self._follower.settings
+        samples = sum(block.stop - block.start for block in blocks)
+        if self._axis.motion is not None:
+            samples += round(self._axis.motion.chunk_s * settings.lines.rate_hz) + settings.lines.window
+        return (samples // settings.step + len(blocks) + 1) * len(settings.lines) * RESPONSE_BYTES
 
-    def _fail(self, error: Exception, events: list[Event]) -> None:
+    def _track(self) -> None:
+        taken, self._taken = self._taken, []
+        for part in taken:
+            found: list[Responses] = []
+            if not self.failure:
+                try:
+                    found += map(self._tracked, joined(part.blocks))
+                except Exception as error:
+                    self._fail(error)
+            if sum(one.value.size for one in found) * RESPONSE_BYTES > _OUTPUT_BYTES_MAX:
+                what = f"message {part.position} of the log has too many samples: its responses were dropped"
+                self._tracked_events.append(Event("malformed", *part.end, what))
+                found = []
+            self._responses += [one for one in found if len(one)]
+
+    def _tracked(self, block: LiveBlock) -> Responses:
+        assert self._follower is not None
+        return self._follower.process(block, self._tracked_events.append)
+
+    def _fail(self, error: Exception) -> None:
         if not isinstance(error, LivebodeError):
             _logger.exception("internal error at message %d of the log", self.position)
         self.failure = (str(error) or type(error).__name__)[:_FAILURE_LETTERS_MAX]
-        sample, time_s = self._events.position
-        events.append(Event("axis-failed", sample, time_s, f"the axis is not tracked any more: {self.failure}"))
+        what = f"the axis is not tracked any more: {self.failure}"
+        self._tracked_events.append(Event("axis-failed", *self._events.position, what))
 
     @property
     def _identity(self) -> str:
         return self.recipe
 
     def _state(self) -> dict[str, Any]:
+        assert not self._taken, "a snapshot between take and output would lack samples"
         follower = {} if self._follower is None else {"follower": self._follower.snapshot()}
         return super()._state() | {"sequencer": self._sequencer.snapshot(), **follower}
 

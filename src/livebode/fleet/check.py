@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import blake2b
-from itertools import pairwise
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 
 from livebode.arrow import to_numpy
@@ -18,11 +16,12 @@ from livebode.core.errors import FleetError
 from livebode.fleet.axis_stream import AxisStream
 from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
-from livebode.fleet.result_message import SCHEMA, ResultMessage, response_rows
+from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.subjects import LOG, LOG_STREAM, RESULT_STREAM, RESULTS, axis_path, key_of
+from livebode.fleet.wide_rows import ROWS, AxisRows, response_table
 
 _DIGEST_BYTES = 16
-_NAMES = SCHEMA.names[3:]
+_NAMES = ROWS.names[3:]
 Run = tuple[str, int]
 """Key of an axis, and number of the first message of the run."""
 
@@ -146,7 +145,7 @@ class _Again:
         stream = self._streams[key]
         output = stream.process(data, number, stored_s)
         if output.responses is not None:
-            rows = pa.Table.from_batches([response_rows(key, stream.run, output.number, output.responses)])
+            rows = response_table([AxisRows(key, stream.run, output.number, output.responses)])
             for _, run, response, digest in _digests(rows):
                 self._expected.setdefault((key, run), {})[response] = digest
 
@@ -173,21 +172,20 @@ def _compare(verdict: AxisCheck, expected: Mapping[int, bytes], stored: list[tup
 
 
 def _digests(rows: pa.Table) -> Iterator[tuple[str, int, int, bytes]]:
-    """Axis, run, number and digest of each response in a table, from all bits of all of its rows."""
-    for part in rows.to_batches():
-        numbers, runs = to_numpy(part["number"]), to_numpy(part["run"])
-        keys = part["axis"].to_pylist()
-        table = np.hstack([_bytes(to_numpy(part[name])) for name in _NAMES])
-        begins = [0, *(np.flatnonzero((np.diff(numbers) != 0) | (np.diff(runs) != 0) | _differs(keys)) + 1)]
-        for first, stop in zip(begins, [*begins[1:], len(numbers)]):
-            if stop > first:
-                digest = blake2b(table[first:stop].tobytes(), digest_size=_DIGEST_BYTES).digest()
-                yield keys[first], int(runs[first]), int(numbers[first]), digest
+    """Axis, run, number and digest of each response in a table, from all bits of its row."""
+    rows = rows.combine_chunks()
+    cells = [_cells(rows[name]) for name in _NAMES]
+    place = (rows[name].to_pylist() for name in ("axis", "run", "number"))
+    for index, (key, run, number) in enumerate(zip(*place)):
+        content = b"".join(cell(index) for cell in cells)
+        yield key, run, number, blake2b(content, digest_size=_DIGEST_BYTES).digest()
 
 
-def _differs(keys: list[str]) -> np.ndarray:
-    return np.array([one != other for one, other in pairwise(keys)], dtype=bool)
-
-
-def _bytes(column: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(column).view(np.uint8).reshape(len(column), -1)
+def _cells(column: pa.ChunkedArray[Any]) -> Callable[[int], bytes]:
+    """The bytes of a row of a column of numbers, or of lists of them."""
+    whole = pa.concat_arrays(column.chunks) if column.num_chunks else pa.array([], column.type)
+    if not pa.types.is_list(column.type):
+        numbers = to_numpy(whole)
+        return lambda index: numbers[index].tobytes()
+    values, ends = to_numpy(whole.values), to_numpy(whole.offsets)
+    return lambda index: values[ends[index] : ends[index + 1]].tobytes()

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from livebode.fleet import subjects
 from livebode.fleet.connecting import connected
+from livebode.fleet.consumer import Consumer
 from livebode.fleet.settings import LogSection
 
 _logger = logging.getLogger(__name__)
@@ -79,8 +80,8 @@ class FleetLog:
 
         self._nats = nats
         self.errors: type[Exception] = nats.errors.Error
-        viewer = {"prefix": subjects.VIEW_API} if self.settings.access == "view" else {}
-        self._js = self._connection.jetstream(timeout=_REQUEST_S, **viewer)
+        self._api = subjects.VIEW_API if self.settings.access == "view" else subjects.API
+        self._js = self._connection.jetstream(timeout=_REQUEST_S, prefix=self._api)
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -194,18 +195,24 @@ class FleetLog:
         state = (await self._repeated(lambda: self._js.stream_info(stream, subjects_filter=subject))).state
         return StreamExtent(state.first_seq, state.last_seq, state.bytes, state.subjects or {})
 
-    async def subscription(self, stream: str, subject: str, first: int, inactive_s: float) -> Any:
+    async def consumer(self, stream: str, subject: str, first: int, inactive_s: float) -> Consumer:
         """A consumer of a subject from a number on, without acknowledgements, in the memory of the server."""
         from nats.js import api
 
+        name = uuid.uuid4().hex
         config = api.ConsumerConfig(
+            name=name,
+            filter_subject=subject,
             ack_policy=api.AckPolicy.NONE,
             deliver_policy=api.DeliverPolicy.BY_START_SEQUENCE,
             opt_start_seq=max(1, first),
             inactive_threshold=inactive_s,
             mem_storage=True,
         )
-        return await self._js.pull_subscribe(subject, stream=stream, config=config)
+        await self._js.add_consumer(stream, config)
+        consumer = Consumer(self._connection, self._js, stream, name, f"{self._api}.CONSUMER.MSG.NEXT.{stream}.{name}")
+        await consumer.open()
+        return consumer
 
     async def _repeated(self, request: Callable[[], Awaitable[T]]) -> T:
         pause_s = _RETRY_S

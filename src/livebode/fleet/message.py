@@ -38,10 +38,10 @@ def read_message(message: bytes, arrived_s: float) -> AnyBatch:
     SourceError
         If it is not a layout and a frame of samples or spectra, or damaged.
     """
-    decoder = FrameDecoder()
-    layout = read_header(message).length
-    decoder.decode(message[:layout])
-    batch = decoder.decode(message[layout:], arrived_s)
+    decoder, frames = FrameDecoder(), memoryview(message)
+    layout = read_header(frames).length
+    decoder.decode(frames[:layout])
+    batch = decoder.decode(frames[layout:], arrived_s)
     if batch is None:
         raise damaged_frame("a message has no samples, or not the layout of its samples")
     return batch

@@ -11,6 +11,7 @@ import logging
 import os
 import socket
 import time
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -34,15 +35,17 @@ from livebode.fleet.subjects import (
     key_of,
 )
 
-RESULTS_S = 0.5
-"""Time between two messages of results."""
+RESULTS_S = 0.4
+"""Time between two messages of results. What arrives meanwhile is processed together."""
 STATUS_S = 1.0
+_READ_S = 0.1
 STATE_S_MIN = 2.0
 """Least time between two states of an axis."""
 STATE_SHARE = 0.08
 """Most bytes of states, as a share of the bytes of the machines' data."""
 _PENDING_BYTES_MAX = 1 << 20
-_READ_S = 0.1
+_GOLDEN = 0.618
+"""Multiples of it, without their whole part, are far from each other."""
 _UNKNOWN_MAX = 100
 """Most axes that are not in the fleet and are reported."""
 
@@ -73,7 +76,7 @@ class PartitionOwner:
         self._result = 0
         self._through = 0
         self._stored = _StoredStates()
-        self._due_s = self._status_due_s = 0.0
+        self._status_due_s = 0.0
         self._since_s = time.time()
         self._newest_s = 0.0
         self._page = PageStatus(number, self._owner)
@@ -92,13 +95,14 @@ class PartitionOwner:
         reader = Reader(self._log, LOG_STREAM, f"{LOG}.{self._number}.>", await self._restore())
         try:
             while not stop.is_set():
-                messages: Sequence[StoredMessage] = await reader.read(_READ_S)
-                while True:
+                await asyncio.sleep(0 if reader.pending else self._until_due_s())
+                messages: Sequence[StoredMessage] = await reader.read(_READ_S if reader.pending else 0)
+                while messages:
                     # Never in the loop of the connection, which must answer the server's pings in time.
                     messages = await asyncio.to_thread(self._process, messages)
-                    await self._store(reader.pending + len(messages))
-                    if not messages:
-                        break
+                    if messages:
+                        await self._store_results()
+                await self._store(reader.pending)
             await self._store_results()
             await self._store_states(all_of_them=True)
         finally:
@@ -156,19 +160,32 @@ class PartitionOwner:
 
     def _process(self, messages: Sequence[StoredMessage]) -> Sequence[StoredMessage]:
         """Process messages until their results are enough for a message of results; returns the others."""
+        stored = bisect_right(messages, self._through, key=lambda message: message.number)
+        streams, taken = self._take(messages[:stored] or messages)
+        for key, stream in streams.items():
+            output = stream.output()
+            if not stored:
+                self._pending.add(key, stream, output)
+        return messages[taken:]
+
+    def _take(self, messages: Sequence[StoredMessage]) -> tuple[dict[str, AxisStream], int]:
+        """Hand messages to their axes until the results may be enough; returns these axes, and how many it took.
+
+        Messages that arrived together are tracked together, axis by axis.
+        """
+        streams: dict[str, AxisStream] = {}
+        size = self._pending.nbytes
         for index, message in enumerate(messages):
-            if self._pending.nbytes > _PENDING_BYTES_MAX:
-                return messages[index:]
+            if size > _PENDING_BYTES_MAX:
+                return streams, index
             self._newest_s = message.stored_s
             key = key_of(message.subject)
             stream = self._stream(key, message.number)
-            if stream is None or message.number <= stream.position:
-                continue
-            output = stream.process(message.data, message.number, message.stored_s)
-            self._stored.took(key, len(message.data))
-            if message.number > self._through:  # else it is stored already
-                self._pending.add(key, stream, output)
-        return []
+            if stream is not None and message.number > stream.position:
+                size += stream.take(message.data, message.number, message.stored_s)
+                self._stored.took(key, len(message.data))
+                streams[key] = stream
+        return streams, len(messages)
 
     def _stream(self, key: str, number: int) -> AxisStream | None:
         found = self._streams.get(key)
@@ -182,14 +199,16 @@ class PartitionOwner:
             self._unknown[key] = self._unknown.get(key, 0) + 1
         return found
 
+    def _until_due_s(self) -> float:
+        """Time until results are due. The partitions of a process take turns, so that they do not wait for another."""
+        turn = self._number * _GOLDEN % 1
+        return RESULTS_S * (1 - (time.monotonic() / RESULTS_S - turn) % 1)
+
     async def _store(self, waiting: int) -> None:
-        now_s = time.monotonic()
-        if now_s >= self._due_s or self._pending.nbytes > _PENDING_BYTES_MAX:
-            self._due_s = now_s + RESULTS_S
-            await self._store_results()
-            await self._store_states()
-        if now_s >= self._status_due_s:
-            self._status_due_s = now_s + STATUS_S
+        await self._store_results()
+        await self._store_states()
+        if time.monotonic() >= self._status_due_s:
+            self._status_due_s = time.monotonic() + STATUS_S
             await self._publish_status(waiting)
 
     async def _store_results(self) -> None:

@@ -7,15 +7,15 @@ import contextlib
 import logging
 import time
 from collections.abc import AsyncIterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from livebode.fleet.consumer import Consumer, Delivery
 from livebode.fleet.log import FleetLog, StoredMessage
 
 if TYPE_CHECKING:
     from nats.aio.msg import Msg
 
 _logger = logging.getLogger(__name__)
-_BATCH = 64
 _INACTIVE_S = 60.0
 _READ_S = 0.2
 _DOUBT_S = 1.0
@@ -44,61 +44,60 @@ class Reader:
         """Number after the last message that was returned."""
         self.pending = 0
         """Messages that the server had beyond the last one returned."""
-        self._subscription: Any = None
+        self._consumer: Consumer | None = None
         self._delivered = 0
         self._heard_s = 0.0
 
     async def read(self, timeout_s: float) -> list[StoredMessage]:
-        """The next messages; none if none come in time."""
+        """The next messages, all that have arrived; if none have, wait at most `timeout_s` for them."""
         try:
-            if self._subscription is None:
+            if self._consumer is None:
                 await self._subscribe()
-            found: list[Msg] = await self._subscription.fetch(_BATCH, timeout=timeout_s)
-        except (TimeoutError, self._log.errors) as error:
-            await self._doubt(error, timeout_s)
+            assert self._consumer is not None
+            found = await self._consumer.take(timeout_s)
+            if not found and time.monotonic() - self._heard_s > _DOUBT_S:
+                await self._doubt(self._consumer)
+        except (TimeoutError, self._log.errors):
+            await self.close()
+            await asyncio.sleep(max(timeout_s, _READ_S))
             return []
-        self._heard_s = time.monotonic()
         return await self._checked(found)
 
     async def close(self) -> None:
-        """Remove the consumer."""
-        subscription, self._subscription = self._subscription, None
-        if subscription is not None:
+        """End reading."""
+        consumer, self._consumer = self._consumer, None
+        if consumer is not None:
             with contextlib.suppress(self._log.errors, asyncio.TimeoutError):
-                await subscription.unsubscribe()
+                await consumer.close()
 
     async def _subscribe(self) -> None:
-        self._subscription = await self._log.subscription(self._stream, self._subject, self.next, _INACTIVE_S)
+        self._consumer = await self._log.consumer(self._stream, self._subject, self.next, _INACTIVE_S)
         self._delivered, self._heard_s = 0, time.monotonic()
-        self.pending = (await self._subscription.consumer_info()).num_pending
+        self.pending, _ = await self._consumer.state()
 
     async def _checked(self, found: list[Msg]) -> list[StoredMessage]:
         messages = []
         for message in found:
-            about = message.metadata
-            if about.sequence.consumer != self._delivered + 1:
+            about = Delivery.of(message.reply)
+            if about.delivered != self._delivered + 1:
                 _logger.warning("%s: messages were lost on the way; reading again from %d", self._subject, self.next)
                 await self.close()
                 break
             self._delivered += 1
-            self.pending = about.num_pending
-            stored_s = about.timestamp.timestamp()
-            messages.append(StoredMessage(message.subject, about.sequence.stream, message.data, "", stored_s))
-            self.next = about.sequence.stream + 1
+            messages.append(StoredMessage(message.subject, about.number, message.data, "", about.stored_s))
+            self.next, self.pending = about.number + 1, about.pending
+        if messages:
+            self._heard_s = time.monotonic()
         return messages
 
-    async def _doubt(self, error: Exception, timeout_s: float) -> None:
+    async def _doubt(self, consumer: Consumer) -> None:
         """After a silence, find out whether there is nothing to read or nothing to read it with."""
-        if self._subscription is None:
-            await asyncio.sleep(timeout_s)
-        elif time.monotonic() - self._heard_s > _DOUBT_S or not isinstance(error, asyncio.TimeoutError):
-            try:
-                waiting = (await self._subscription.consumer_info()).num_pending
-                self._heard_s = time.monotonic()
-                if waiting:
-                    await self.close()
-            except (TimeoutError, self._log.errors):
-                await self.close()
+        pending, requests = await consumer.state()
+        self._heard_s = time.monotonic()
+        if pending:
+            await self.close()
+        elif not requests:
+            consumer.ask_again()
 
 
 async def stored_messages(

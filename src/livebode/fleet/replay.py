@@ -4,24 +4,32 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from livebode.arrow import from_numpy, text
 from livebode.configuration.axis import Axis
+from livebode.core import Responses
 from livebode.core.errors import FleetError
 from livebode.core.files import whole_file
 from livebode.core.writing import writing
 from livebode.fleet.axis_stream import AxisStream
 from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
-from livebode.fleet.result_message import SCHEMA, response_rows
 from livebode.fleet.subjects import LOG, LOG_STREAM, axis_path
+from livebode.records.response_table import SCHEMA as RESPONSE_SCHEMA
+from livebode.records.response_table import as_batch
+
+SCHEMA = pa.schema([("axis", pa.string()), ("run", pa.int64()), ("number", pa.int64()), *RESPONSE_SCHEMA])
+"""Columns: key of the axis, number in the log of the first message of its run, number of the response within that run,
+and those of responses.parquet, in full precision."""
 
 
 async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> pa.Table:
     """The responses of the messages of an axis that the log has stored since `from_s` (seconds since 1970).
 
-    The tracker begins at the first of them. The table has the columns of the stored results.
+    The tracker begins at the first of them. The table has the columns of `SCHEMA`.
 
     Raises
     ------
@@ -38,7 +46,7 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> pa.Tab
         stream = stream or AxisStream(axis, message.number)
         output = stream.process(message.data, message.number, message.stored_s)
         if output.responses is not None:
-            batches.append(response_rows(key, stream.run, output.number, output.responses))
+            batches.append(_response_rows(key, stream.run, output.number, output.responses))
     if stream is None:
         raise FleetError(
             "no-data",
@@ -47,6 +55,13 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> pa.Tab
             axis=axis_path(key),
         )
     return pa.Table.from_batches(batches, SCHEMA)
+
+
+def _response_rows(key: str, run: int, number: int, responses: Responses) -> pa.RecordBatch:
+    """The responses of an axis's run that begin with this number."""
+    numbers = np.repeat(np.arange(number, number + len(responses)), len(responses.lines))
+    place = [text([key], np.zeros_like(numbers)), from_numpy(np.full_like(numbers, run)), from_numpy(numbers)]
+    return pa.RecordBatch.from_arrays([*place, *as_batch(responses).columns], schema=SCHEMA)
 
 
 def write_replayed(table: pa.Table, path: Path) -> None:

@@ -1,27 +1,24 @@
-"""Messages of results: the responses of the axes of a partition as one Arrow table, with its events."""
+"""Messages of results: responses and parameters of the axes of a partition, with its events."""
 
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 
-from livebode.arrow import from_numpy
-from livebode.core import Responses
+from livebode.core.errors import FleetError
 from livebode.fleet.axis_stream import RESPONSE_BYTES, AxisStream, Output
-from livebode.records.response_table import SCHEMA as RESPONSE_SCHEMA
-from livebode.records.response_table import as_batch
+from livebode.fleet.wide_rows import PARAMETERS, ROWS, AxisFits, AxisRows, grid_of, parameter_table, response_table
 
-SCHEMA = pa.schema([("axis", pa.string()), ("run", pa.int64()), ("number", pa.int64()), *RESPONSE_SCHEMA])
-"""Columns: key of the axis, number in the log of the first message of its run, number of the response within that run,
-and those of responses.parquet."""
-_META = b"livebode"
 _EVENT_BYTES = 500
 """Of an event without its sentence."""
+_HEAD = struct.Struct("<4sH")
+_MAGIC, _VERSION = b"LBRM", 2
+_LENGTH = struct.Struct("<I")
 
 
 @dataclass(frozen=True)
@@ -37,41 +34,73 @@ class ResultMessage:
     claim
         Whether it only claims the partition, without results.
     rows
-        As in `SCHEMA`.
+        Responses as in `wide_rows.ROWS`, one row for each (axis, run, number), rounded to float32, each with a digest
+        of its exact bits. `from_wide(rows of one axis, grids[axis])` gives them as Responses.
+    parameters
+        As in `wide_rows.PARAMETERS`: one row for each parameter, derived quantity and margin of (axis, run, number).
     events
-        With axis, kind, sample, time_s, message and details each.
+        With axis, run, kind, sample, time_s, message and details each; alarms of monitoring are among them.
     recipes
         Recipe of each axis in it.
+    grids
+        Lines, quantity and unit of each axis in `rows`, as an entry ``found`` of run.json.
     """
 
     through: int
     owner: str
     claim: bool = False
-    rows: pa.Table = field(default_factory=SCHEMA.empty_table)
+    rows: pa.Table = field(default_factory=ROWS.empty_table)
+    parameters: pa.Table = field(default_factory=PARAMETERS.empty_table)
     events: Sequence[Mapping[str, Any]] = ()
     recipes: Mapping[str, str] = field(default_factory=dict)
+    grids: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def to_bytes(self) -> bytes:
-        """Arrow's stream format, compressed; everything except the rows in the metadata of its schema."""
-        about = {name: getattr(self, name) for name in ("through", "owner", "claim", "events", "recipes")}
-        table = self.rows.replace_schema_metadata({_META: json.dumps(about).encode()})
+        """A head with the version, and compressed together JSON and both tables as Arrow streams.
+
+        All in one is much smaller than each buffer of Arrow by itself: these have a few rows.
+        """
+        names = ("through", "owner", "claim", "events", "recipes", "grids")
+        about = json.dumps({name: getattr(self, name) for name in names}).encode()
         sink = pa.BufferOutputStream()
-        with pa.ipc.new_stream(sink, table.schema, options=pa.ipc.IpcWriteOptions(compression="zstd")) as writer:
-            writer.write_table(table)
+        sink.write(_HEAD.pack(_MAGIC, _VERSION))
+        with pa.CompressedOutputStream(sink, "zstd") as packed:
+            packed.write(_LENGTH.pack(len(about)) + about)
+            for table in (self.rows, self.parameters):
+                with pa.ipc.new_stream(packed, table.schema) as writer:
+                    writer.write_table(table)
         return bytes(sink.getvalue())
 
     @classmethod
     def from_bytes(cls, data: bytes) -> ResultMessage:
-        """The message in these bytes."""
-        table = pa.ipc.open_stream(data).read_all()
-        return cls(rows=table, **json.loads(table.schema.metadata[_META]))
+        """The message in these bytes.
+
+        Raises
+        ------
+        FleetError
+            If another version of livebode wrote it in another form.
+        """
+        version = _HEAD.unpack_from(data)[1] if data[: len(_MAGIC)] == _MAGIC and len(data) >= _HEAD.size else 1
+        if version != _VERSION:
+            raise FleetError(
+                "results-of-other-version",
+                f"the results in the log have version {version}, and this livebode reads version {_VERSION}",
+                "continue with the livebode that wrote them, or start nats-server with an empty directory",
+                found=version,
+                readable=_VERSION,
+            )
+        with pa.CompressedInputStream(pa.BufferReader(data[_HEAD.size :]), "zstd") as packed:
+            about = json.loads(packed.read(_LENGTH.unpack(packed.read(_LENGTH.size))[0]))
+            rows, parameters = (pa.ipc.open_stream(packed).read_all() for _ in range(2))
+        return cls(rows=rows, parameters=parameters, **about)
 
 
 class PendingResults:
     """Outputs that are not stored yet."""
 
     def __init__(self) -> None:
-        self._responses: dict[tuple[str, int], list[tuple[int, Responses]]] = {}
+        self._responses: list[AxisRows] = []
+        self._parameters: list[AxisFits] = []
         self._events: list[dict[str, Any]] = []
         self._recipes: dict[str, str] = {}
         self.nbytes = 0
@@ -84,7 +113,7 @@ class PendingResults:
         self._events += [{"axis": key, "run": stream.run, **asdict(event)} for event in output.events]
         self.nbytes += sum(_EVENT_BYTES + len(event.message) for event in output.events)
         if output.responses is not None:
-            self._responses.setdefault((key, stream.run), []).append((output.number, output.responses))
+            self._responses.append(AxisRows(key, stream.run, output.number, output.responses))
             self.nbytes += output.responses.value.size * RESPONSE_BYTES
         if output.responses is not None or output.events:
             self._recipes[key] = stream.recipe
@@ -95,24 +124,12 @@ class PendingResults:
 
     def message(self, through: int, owner: str) -> ResultMessage:
         """All of them as one message."""
-        batches = [
-            response_rows(key, run, outputs[0][0], Responses.join([responses for _, responses in outputs]))
-            for (key, run), outputs in self._responses.items()
-        ]
-        # One batch instead of one for each axis: buffers of a few rows are neither small nor fast to compress.
-        rows = pa.Table.from_batches(batches, SCHEMA).combine_chunks()
-        return ResultMessage(through, owner, rows=rows, events=self._events, recipes=self._recipes)
-
-
-def response_rows(key: str, run: int, number: int, responses: Responses) -> pa.RecordBatch:
-    """The responses as rows of `SCHEMA`, those of an axis's run that begin with this number."""
-    batch = as_batch(responses)
-    numbers = np.repeat(np.arange(number, number + len(responses)), len(responses.lines))
-    columns = [_repeated(key, len(numbers)), from_numpy(np.full_like(numbers, run)), from_numpy(numbers)]
-    return pa.RecordBatch.from_arrays([*columns, *batch.columns], schema=SCHEMA)
-
-
-def _repeated(word: str, times: int) -> pa.Array[Any]:
-    letters = word.encode()
-    ends = np.arange(times + 1, dtype=np.int32) * len(letters)
-    return pa.Array.from_buffers(pa.string(), times, [None, pa.py_buffer(ends), pa.py_buffer(letters * times)])
+        return ResultMessage(
+            through,
+            owner,
+            rows=response_table(self._responses),
+            parameters=parameter_table(self._parameters),
+            events=self._events,
+            recipes=self._recipes,
+            grids={part.axis: grid_of(part.responses) for part in self._responses},
+        )

@@ -10,10 +10,9 @@ from urllib.parse import quote
 from livebode.core.errors import FleetError
 from livebode.fleet.page_status import NAMES, VIEW
 from livebode.fleet.settings import FleetSettings, ServerSection, UsersSection, on_loopback
-from livebode.fleet.subjects import ACTS_STREAM, EDGE, STATUS_STREAM, VIEW_API, axis_path
+from livebode.fleet.subjects import ACTS_STREAM, API, EDGE, STATUS_STREAM, VIEW_API, axis_path
 
 _FLEET, _VIEW = "FLEET", "VIEW"
-_JETSTREAM = "$JS.API"
 _VIEWED = ("STREAM.INFO.*", f"STREAM.MSG.GET.{STATUS_STREAM}", f"STREAM.MSG.GET.{ACTS_STREAM}")
 """Requests of a viewer. A consumer is not one of them: it could deliver to any subject of the log's account."""
 _ONLY_ASKS = json.dumps([f"{VIEW_API}.{request}" for request in _VIEWED])
@@ -52,8 +51,8 @@ class ServerAccess:
             for subject in subjects:
                 senders.setdefault(subject, []).append(_account(path))
         exports = [_service(subject, accounts) for subject, accounts in sorted(senders.items())]
-        exports += [_service(f"{_JETSTREAM}.{request}", [_VIEW]) for request in _VIEWED]
-        viewed = [_import(f"{_JETSTREAM}.{request}", f', to: "{VIEW_API}.{request}"') for request in _VIEWED]
+        exports += [_service(f"{API}.{request}", [_VIEW]) for request in _VIEWED]
+        viewed = [_import(f"{API}.{request}", f', to: "{VIEW_API}.{request}"') for request in _VIEWED]
         for subject in (f"{VIEW}.*", f"{NAMES}.*"):  # what workers publish for the page of the fleet
             exports.append(f"{{stream: {json.dumps(subject)}, accounts: {json.dumps([_VIEW])}}}")
             viewed.append(f"{{stream: {{account: {_FLEET}, subject: {json.dumps(subject)}}}}}")

@@ -13,8 +13,9 @@ EDGE, LOG, RESULTS, STATES, STATUS, ACTS = "edge", "in", "res", "state", "status
 """First tokens: what an edge publishes, the same after the server's mapping, results, states, the status, and what
 persons do with alarms: act.KIND.AXIS."""
 LOG_STREAM, RESULT_STREAM, STATE_STREAM, STATUS_STREAM, ACTS_STREAM = "LOG", "RESULTS", "STATES", "STATUS", "ACTS"
+API: Final = "$JS.API"
 VIEW_API: Final = "viewer"
-"""First token of the requests of a viewer, instead of JetStream's own."""
+"""First tokens of requests to JetStream: its own, and those of a viewer."""
 _EMPTY = "_"
 
 

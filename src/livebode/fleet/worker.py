@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 
 from livebode.configuration.axis import Axis
 from livebode.fleet.log import FleetLog
@@ -30,6 +31,8 @@ async def _own(
     stop: threading.Event,
     kind: type[PartitionOwner],
 ) -> list[bool]:
+    # Partitions compute one after another: several at once would take as long, and each of them until the end.
+    asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
     stopped = asyncio.Event()
 
     async def own(number: int) -> bool:

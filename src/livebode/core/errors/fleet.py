@@ -32,6 +32,7 @@ class FleetError(LivebodeError):
         "log-untrusted": "The server of the log has no TLS, or a certificate that is not trusted.",
         "no-data": "The log has no data of this axis in the time that was asked for.",
         "not-exactly-once": "Stored responses are missing, doubled or different from one uninterrupted computation.",
+        "results-of-other-version": "The results in the log were written by another version of livebode.",
         "server-ended": "The server of the log ended at its start.",
         "server-missing": "The program nats-server is not installed.",
         "server-open": "The server of the log would be open to a network without TLS or keys.",

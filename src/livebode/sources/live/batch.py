@@ -82,7 +82,7 @@ class Batch:
 
     def with_kinds(self, kinds: Mapping[str, QuantityKind]) -> Batch:
         """The same with the declared kinds of its channels."""
-        return replace(self, channels=with_kinds(self.channels, kinds))
+        return replace(self, channels=with_kinds(self.channels, kinds)) if kinds else self
 
     def block(self, number: int, start: int, gap: bool) -> LiveBlock:
         """The samples from the sender's number `start` on, as a Block that begins at `number`."""
@@ -101,7 +101,7 @@ def check_numbers(first_sample: int, rate_hz: float, stamp_s: float | None) -> N
     """SourceError if a sender's number, rate or stamp is invalid."""
     if not 0 <= first_sample < SAMPLE_MAX:
         raise wrong_value("first_sample", first_sample, "is not between 0 and 2^62")
-    if not (np.isfinite(rate_hz) and 0 < rate_hz < 1e9):
+    if not 0 < rate_hz < 1e9:
         raise wrong_value("rate_hz", rate_hz, "is not a number of samples per second between 0 and 1e9")
     if stamp_s is not None and not abs(stamp_s) < 1e11:
         raise wrong_value("stamp_s", stamp_s, "is not a number of seconds since 1970")

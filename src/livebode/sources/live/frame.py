@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,6 +28,10 @@ from livebode.sources.live.framing import (
 )
 from livebode.sources.live.spectra_batch import AnyBatch
 from livebode.sources.live.spectra_frame import read_spectra, read_spectra_text
+
+AnyLayout = tuple[Channel, ...] | SpectraLayout
+_REMEMBERED, _REMEMBERED_BYTES_MAX = 256, 4096
+"""Most layouts that are remembered after they were read, and most bytes of the text of one."""
 
 
 def layout_text(channels: Sequence[Channel]) -> bytes:
@@ -81,7 +86,7 @@ class FrameDecoder:
     LAYOUTS_MAX = 16
 
     def __init__(self) -> None:
-        self._layouts: dict[tuple[int, int], tuple[Channel, ...] | SpectraLayout] = {}
+        self._layouts: dict[tuple[int, int], AnyLayout] = {}
 
     def decode(self, frame: bytes | memoryview, arrived_s: float = float("nan")) -> AnyBatch | None:
         """The batch in a frame; None for a layout, and for samples or spectra whose layout is not known yet.
@@ -117,13 +122,8 @@ class FrameDecoder:
     def _remember(self, header: Header, text: bytes) -> None:
         if len(text) > LAYOUT_BYTES_MAX or zlib.crc32(text) != header.layout:
             raise inconsistent_frame(f"a layout of {len(text)} bytes is too long or not the one that its header names")
-        layout: tuple[Channel, ...] | SpectraLayout
-        if header.kind == LAYOUT:
-            layout = _read_layout_text(text)
-            count = len(layout)
-        else:
-            layout = read_spectra_text(text)
-            count = len(layout.signals) + len(layout.values)
+        read = _short_layout if len(text) <= _REMEMBERED_BYTES_MAX else _read_layout
+        layout, count = read(header.kind, text)
         if count != header.channels:
             raise inconsistent_frame(
                 f"a layout names {count} channels, its header {header.channels}", channels=[count, header.channels]
@@ -133,6 +133,19 @@ class FrameDecoder:
         self._layouts[key] = layout
         while len(self._layouts) > self.LAYOUTS_MAX:
             del self._layouts[next(iter(self._layouts))]
+
+
+def _read_layout(kind: int, text: bytes) -> tuple[AnyLayout, int]:
+    """The layout in the payload of a frame of this kind, and the number of its channels."""
+    if kind == LAYOUT:
+        channels = _read_layout_text(text)
+        return channels, len(channels)
+    layout = read_spectra_text(text)
+    return layout, len(layout.signals) + len(layout.values)
+
+
+# Senders repeat their layout, in a log with each message: reading it costs more than reading the samples.
+_short_layout = lru_cache(maxsize=_REMEMBERED)(_read_layout)
 
 
 def _read_layout_text(text: bytes) -> tuple[Channel, ...]:

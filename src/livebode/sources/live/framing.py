@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from livebode.core import SourceError
 
@@ -26,8 +26,7 @@ LAYOUT_BYTES_MAX = 1 << 16
 SAMPLES_MAX = (1 << 16) - 1
 
 
-@dataclass(frozen=True)
-class Header:
+class Header(NamedTuple):
     """The fields of a frame's header, in their order; `stamp_ns` is 0 where the sender has no clock."""
 
     magic: bytes

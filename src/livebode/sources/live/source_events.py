@@ -65,6 +65,11 @@ class SourceEvents:
         with self._lock:
             return dict(self._counts)
 
+    @property
+    def pending(self) -> int:
+        """Number of Events since the last `take`."""
+        return len(self._events)
+
     def report(
         self, kind: str, message: str, *, sample: int | None = None, rate_hz: float = 0.0, **details: Any
     ) -> None:

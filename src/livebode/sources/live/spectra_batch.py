@@ -100,6 +100,8 @@ class SpectraBatch:
 
     def with_kinds(self, kinds: Mapping[str, QuantityKind]) -> SpectraBatch:
         """The same with the declared kinds of its channels."""
+        if not kinds:
+            return self
         signals, values = (with_kinds(part, kinds) for part in (self.layout.signals, self.layout.values))
         return replace(self, layout=replace(self.layout, signals=signals, values=values))
 

@@ -1,0 +1,51 @@
+"""Blocks that follow each other as one: most of what a tracker costs is by Block, not by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from livebode.sources.live.batch import LiveBlock
+from livebode.sources.live.spectra_batch import LiveSpectra
+
+
+def joined(blocks: Sequence[LiveBlock]) -> list[LiveBlock]:
+    """The same samples or spectra in as few Blocks as possible; a gap begins another one.
+
+    A joined Block has arrived when its last part has.
+    """
+    parts: list[list[LiveBlock]] = []
+    for block in blocks:
+        if parts and _continues(parts[-1][-1], block):
+            parts[-1].append(block)
+        else:
+            parts.append([block])
+    return [_one(part) for part in parts]
+
+
+def _continues(first: LiveBlock, second: LiveBlock) -> bool:
+    if second.gap or second.start != first.stop or second.rate_hz != first.rate_hz:
+        return False
+    if isinstance(first, LiveSpectra):
+        return isinstance(second, LiveSpectra) and second.layout == first.layout
+    return not isinstance(second, LiveSpectra) and second.channels == first.channels
+
+
+def _one(part: list[LiveBlock]) -> LiveBlock:
+    first, last = part[0], part[-1]
+    if first is last:
+        return first
+    data = np.concatenate([block.data for block in part], axis=1)
+    if not isinstance(first, LiveSpectra):
+        return replace(first, data=data, arrived_s=last.arrived_s, origin=last.origin)
+    spectra = [block for block in part if isinstance(block, LiveSpectra)]
+    return replace(
+        first,
+        data=data,
+        sums=np.concatenate([block.sums for block in spectra], axis=1),
+        state=np.concatenate([block.state for block in spectra]),
+        arrived_s=last.arrived_s,
+        origin=last.origin,
+    )
