@@ -58,6 +58,8 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "view": "Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.",
         "check": "Compute all responses of a fleet again from its log, and compare the stored ones bit for bit.",
         "replay": "Compute the responses of an axis again from the log, and write them as a table.",
+        "sink": "Store the results of a fleet in a lake, each once: all of them, their means over minutes and hours, "
+        "and events.",
         "server": "Write the configuration of nats-server for a fleet.",
         "credentials": "Make the key of a user of the log of a fleet.",
         "demo": "Start a log, three workers and 20 simulated axes, kill a worker, and check that nothing is lost.",

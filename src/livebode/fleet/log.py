@@ -41,12 +41,16 @@ class StoredMessage:
 
 @dataclass(frozen=True)
 class StreamExtent:
-    """Numbers of the first and the last message of a stream, its size, and its messages by subject."""
+    """Numbers of the first and the last message of a stream, its size, and its messages by subject.
+
+    When it was created distinguishes it from another one with the same numbers, seconds since 1970.
+    """
 
     first: int
     last: int
     size_bytes: int
     subjects: Mapping[str, int]
+    created_s: float
 
 
 class FleetLog:
@@ -192,8 +196,10 @@ class FleetLog:
 
     async def extent(self, stream: str, subject: str = ">") -> StreamExtent:
         """First and last number, size, and the subjects that match."""
-        state = (await self._repeated(lambda: self._js.stream_info(stream, subjects_filter=subject))).state
-        return StreamExtent(state.first_seq, state.last_seq, state.bytes, state.subjects or {})
+        info = await self._repeated(lambda: self._js.stream_info(stream, subjects_filter=subject))
+        assert info.created is not None
+        state, created_s = info.state, info.created.timestamp()
+        return StreamExtent(state.first_seq, state.last_seq, state.bytes, state.subjects or {}, created_s)
 
     async def consumer(self, stream: str, subject: str, first: int, inactive_s: float) -> Consumer:
         """A consumer of a subject from a number on, without acknowledgements, in the memory of the server."""
