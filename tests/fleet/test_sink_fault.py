@@ -20,7 +20,7 @@ from livebode.fleet import sink_means
 from livebode.fleet.log import FleetLog
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import LogSection, SinkSection
-from livebode.fleet.sink import Sink, SinkTotals
+from livebode.fleet.sink import Sink
 from livebode.fleet.subjects import RESULT_STREAM, axis_path
 from livebode.lake import LEVELS, Lake, StreamTable, stream_table
 from tests.support.command import livebode
@@ -33,6 +33,7 @@ from tests.support.fleet_runs import (
     stored_responses,
 )
 from tests.support.forked import server as forked
+from tests.support.sinks import sink_once
 
 AXES, BATCHES, KILLS = 3, 30, 10
 
@@ -41,16 +42,6 @@ AXES, BATCHES, KILLS = 3, 30, 10
 def server(tmp_path: Path) -> Iterator[LogServer]:
     with LogServer(tmp_path / "log", PARTITIONS) as one:
         yield one
-
-
-def sink_once(log: LogSection, lake: Path, commit_s: float = 60.0) -> SinkTotals:
-    async def store() -> SinkTotals:
-        async with FleetLog(log, "sink") as connection:
-            sink = Sink(connection, SinkSection(lake=str(lake), commit_s=commit_s))
-            await sink.run(asyncio.Event(), once=True)
-            return sink.totals
-
-    return asyncio.run(store())
 
 
 def keys(lake: Path) -> list[tuple[object, ...]]:

@@ -184,11 +184,28 @@ class FleetLog:
 
     async def following(self, stream: str, subject: str, number: int) -> int | None:
         """Number of the first message of a subject that is at least `number`."""
+        found = await self._next(stream, subject, number)
+        return None if found is None else found.number
+
+    async def first_since(self, stream: str, subject: str, at_s: float) -> int:
+        """Number from which on the messages of a subject were stored at this time or later, seconds since 1970."""
+        extent = await self.extent(stream)
+        low, high = extent.first, extent.last + 1
+        while low < high:  # between them is the first one
+            middle = (low + high) // 2
+            found = await self._next(stream, subject, middle)
+            if found is None or found.stored_s >= at_s:
+                high = middle
+            else:
+                low = found.number + 1
+        return low
+
+    async def _next(self, stream: str, subject: str, number: int) -> StoredMessage | None:
         from nats.js.errors import NotFoundError
 
-        async def get() -> int | None:
+        async def get() -> StoredMessage | None:
             try:
-                return (await self._js.get_msg(stream, number, subject=subject, next=True)).seq
+                return _stored(await self._js.get_msg(stream, number, subject=subject, next=True))
             except NotFoundError:
                 return None
 

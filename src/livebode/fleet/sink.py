@@ -13,6 +13,7 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.core import counted
+from livebode.fleet.alarm_samples import AlarmSamples
 from livebode.fleet.log import FleetLog, StoredMessage
 from livebode.fleet.reader import Reader
 from livebode.fleet.settings import SinkSection
@@ -101,14 +102,18 @@ class Sink:
         extent = await self._log.extent(RESULT_STREAM)
         await asyncio.to_thread(self._resume, extent.created_s)
         await asyncio.to_thread(self._clean)
+        self._alarms = AlarmSamples(self._log, self._lake, self._name)
+        await asyncio.to_thread(self._alarms.resume, self._log.settings.age_days)
         reader = Reader(self._log, RESULT_STREAM, f"{RESULTS}.*", self._next)
         try:
             while not stop.is_set() and not (once and max(reader.next, extent.first) > extent.last):
                 messages = await reader.read(_READ_S)
                 await asyncio.to_thread(self._process, messages)
+                await self._alarms.save_due()
         finally:
             await reader.close()
         await asyncio.to_thread(self._commit)
+        await self._alarms.save_due()
 
     def _resume(self, created_s: float) -> None:
         """Find where the lake ends."""
@@ -158,6 +163,7 @@ class Sink:
         self._waiting["fleet_runs"].add(rows.number, self._new_runs(rows))
         for name, table in rows.tables.items():
             self._waiting[name].add(rows.number, table)
+        self._alarms.add(rows.tables["fleet_events"])
         self.totals.responses += rows.tables["fleet_responses"].num_rows
         self.totals.parameters += rows.tables["fleet_parameters"].num_rows
         self.totals.events += rows.tables["fleet_events"].num_rows

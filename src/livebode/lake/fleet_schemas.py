@@ -81,6 +81,22 @@ PARAMETER_MEANS = pa.schema(
 )
 """One row for each run, period and quantity, as in `quantities`."""
 
+FLEET_SAMPLES = pa.schema(
+    [
+        *MACHINE,
+        ("log", pa.string()),
+        ("kind", pa.string()),
+        ("logged", TIME),
+        ("file", pa.string()),
+        ("epoch", pa.string()),
+        ("first_sample", pa.int64()),
+        ("samples", pa.int64()),
+        ("missing", pa.int64()),
+    ]
+)
+"""One row for each file of samples around an alarm, with its path in the lake, and the sender's numbers; a row without
+a file where the log had no samples any more, or a file of an earlier alarm has them."""
+
 FLEET_SCHEMAS: Mapping[str, pa.Schema] = {
     "fleet_runs": FLEET_RUNS,
     "fleet_responses": FLEET_RESPONSES,

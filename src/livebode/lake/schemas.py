@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import pyarrow as pa
 
-from livebode.lake.columns import MACHINE, TIME, in_delta, list_of
-from livebode.lake.fleet_schemas import FLEET_SCHEMAS
+from livebode.lake.columns import LEVELS, MACHINE, TIME, in_delta, list_of
+from livebode.lake.fleet_schemas import FLEET_SAMPLES, FLEET_SCHEMAS
 from livebode.records import parameter_table
 from livebode.records.wide_responses import wide_schema
 
@@ -115,5 +115,6 @@ TABLES: Mapping[str, LakeTable] = {
     "parameters": LakeTable(PARAMETERS),
     "events": LakeTable(EVENTS),
     "quarantine": LakeTable(QUARANTINE, ("content", "recipe", "livebode")),
+    "fleet_samples": LakeTable(FLEET_SAMPLES, ("log", *LEVELS, "kind", "logged")),
     **{name: LakeTable(schema, days=True) for name, schema in FLEET_SCHEMAS.items()},
 }
