@@ -72,8 +72,10 @@ class AxisCosts:
     ----------
     owner_cores, server_cores
         Processor time per second; what a partition costs without data is not included.
-    response_bytes, state_bytes
-        Of one stored response, and of one state.
+    responses_per_s, lake_bytes, mean_bytes
+        Responses; bytes of one with its fit in the lake of the sink, and of their means over a period.
+    state_bytes
+        Of one state.
     partition_cores
         Of a partition without data.
     """
@@ -83,13 +85,15 @@ class AxisCosts:
     result_bytes_per_s: float
     owner_cores: float
     server_cores: float
-    response_bytes: float
+    responses_per_s: float
+    lake_bytes: float
+    mean_bytes: float
     state_bytes: float
     partition_cores: float = 0.0
 
     @classmethod
-    def of(cls, costs: PathCosts) -> AxisCosts:
-        """From a measurement."""
+    def of(cls, costs: PathCosts, sink: SinkCosts) -> AxisCosts:
+        """From measurements."""
         seconds = costs.axis_seconds
         idle_s = costs.idle_s * PARTITIONS * seconds / costs.axes
         return cls(
@@ -98,7 +102,9 @@ class AxisCosts:
             result_bytes_per_s=costs.result_bytes / seconds,
             owner_cores=(costs.owner_s - idle_s) / seconds,
             server_cores=costs.server_s / seconds,
-            response_bytes=costs.result_bytes / max(1, costs.responses),
+            responses_per_s=costs.responses / seconds,
+            lake_bytes=sink.bytes_of(),
+            mean_bytes=sink.bytes_of("_minute"),
             state_bytes=costs.state_size,
             partition_cores=costs.idle_s,
         )
@@ -153,10 +159,10 @@ class FleetSize:
         alarms = given.axes * given.alarms_per_axis_year
         return {
             "log, full rate": given.axes * axis.input_bytes_per_s * full_s * given.copies,
-            "responses, full rate": given.axes * axis.result_bytes_per_s * full_s,
+            "responses, full rate": given.axes * axis.responses_per_s * axis.lake_bytes * full_s,
             "states": given.axes * axis.state_bytes * given.copies,
-            "minute means": given.axes * axis.response_bytes * given.minute_years * YEAR_S / 60,
-            "hour means, a year": given.axes * axis.response_bytes * YEAR_S / 3600,
+            "minute means": given.axes * axis.mean_bytes * given.minute_years * YEAR_S / 60,
+            "hour means, a year": given.axes * axis.mean_bytes * YEAR_S / 3600,
             "alarms, a year": alarms * given.alarm_bytes,
             "raw around alarms, a year": alarms * given.raw_per_alarm_s * axis.input_bytes_per_s,
         }

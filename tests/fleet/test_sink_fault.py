@@ -15,8 +15,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pytest
 
-from livebode.fleet import sink as sink_module
-from livebode.fleet import sink_means
+from livebode.fleet import sink_means, sink_tables
 from livebode.fleet.log import FleetLog
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import LogSection, SinkSection
@@ -67,7 +66,7 @@ def sink_forever(log: LogSection, lake: Path) -> None:
 
 def short_tiers() -> None:
     """Means over one second and two, so that many periods end during a test."""
-    sink_module._TIERS, sink_means._LATE_S = {"minute": 1, "hour": 2}, 0.1  # type: ignore[attr-defined]
+    sink_tables._TIERS, sink_means._LATE_S = {"minute": 1, "hour": 2}, 0.1  # type: ignore[attr-defined]
 
 
 def kill_at(step: int) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from livebode.fleet.log import FleetLog
 from livebode.fleet.settings import LogSection, SinkSection
-from livebode.fleet.sink import Sink, SinkTotals
+from livebode.fleet.sink import Sink
+from livebode.fleet.sink_tables import SinkTotals
 
 
 def sink_once(log: LogSection, lake: Path, commit_s: float = 60.0) -> SinkTotals:

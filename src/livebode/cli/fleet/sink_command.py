@@ -24,7 +24,8 @@ def sink_command(
     """
     from livebode.fleet.log import FleetLog
     from livebode.fleet.settings import FleetSettings
-    from livebode.fleet.sink import Sink, SinkTotals
+    from livebode.fleet.sink import Sink
+    from livebode.fleet.sink_tables import SinkTotals
     from livebode.records import to_json
 
     settings = FleetSettings.read(fleet)
