@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from livebode.configuration.axis import Axis
 from livebode.configuration.recipe import recipe_id
-from livebode.core import Event, LivebodeError, Responses, SourceError
-from livebode.core.state import Stage, StatefulBase
-from livebode.estimation.stream_estimator import Follower
+from livebode.core import Block, Event, LivebodeError, Parameters, Responses, SourceError
+from livebode.core.state import Stage, StatefulBase, restore_parts
+from livebode.fleet.event_limits import EventLimits
+from livebode.fleet.main_quantity import MainQuantity, main_quantity, newest_of
 from livebode.fleet.message import read_message
+from livebode.monitoring.rows import places
 from livebode.preparation.plan import live_follower
+from livebode.runtime.change_detection import ChangeDetection
+from livebode.runtime.fits_together import Fitted, process_together
+from livebode.runtime.pipeline import Pipeline
 from livebode.sources.live import LiveBlock, Sequencer
 from livebode.sources.live.joined import joined
 from livebode.sources.live.source_events import SourceEvents
@@ -23,6 +32,9 @@ _OUTPUT_BYTES_MAX = 4 << 20
 """Most bytes of the responses to one message: a message of results must have room for them."""
 _EVENT_BYTES = 1000
 _FAILURE_LETTERS_MAX = 1000
+FITS_PER_S = 2.0
+"""Fits of an axis."""
+_NO_ROWS = np.zeros(0, dtype=np.int64)
 _logger = logging.getLogger(__name__)
 
 
@@ -36,10 +48,27 @@ class Output:
         Of the first response, counted from the beginning of the axis's run.
     responses
         None if there are none.
+    fitted
+        Numbers of the responses that were fitted, (rows,).
+    parameters
+        Their fits, the quantities derived from them, and the margins, (rows,) each.
+    events
+        Alarms of monitoring among them.
     """
 
     number: int
     responses: Responses | None
+    fitted: NDArray[np.int64]
+    parameters: tuple[Parameters, ...]
+    events: list[Event]
+
+
+class Tracked(NamedTuple):
+    """What is known before fits: the number of the first response, all responses, which of them are fitted, events."""
+
+    number: int
+    responses: Responses | None
+    to_fit: NDArray[np.int64]
     events: list[Event]
 
 
@@ -67,8 +96,8 @@ class AxisStream(StatefulBase):
         Number in the log of its first message.
     """
 
-    _stage = Stage("fleet-axis", 1)
-    _STATE = ("run", "position", "responses", "failure")
+    _stage = Stage("fleet-axis", 2)
+    _STATE = ("run", "position", "responses", "failure", "changes", "changed_s", "log_s", "_fit_period", "_limits")
 
     def __init__(self, axis: Axis, run: int) -> None:
         self._axis = axis
@@ -81,10 +110,16 @@ class AxisStream(StatefulBase):
         """Why it is not tracked any more; empty while it is."""
         self.log_s = 0.0
         """Time of the last message by the clock of the log."""
+        self.changes, self.changed_s = 0, 0.0
+        """Alarms of monitoring since the beginning of the run, and when the newest was raised, by the log's clock."""
+        self.main: MainQuantity | None = None
+        """The newest value of the quantity that a page shows first; None until a fit is valid."""
         self._events = SourceEvents(clock=lambda: self.log_s)
+        self._limits = EventLimits()
+        self._fit_period = 0
         settings = axis.source
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
-        self._follower: Follower | None = None
+        self._pipeline: Pipeline | None = None
         self._taken: list[_Taken] = []
         self._responses: list[Responses] = []
         self._tracked_events: list[Event] = []
@@ -107,7 +142,7 @@ class AxisStream(StatefulBase):
         self.position, self.log_s = position, log_s
         if self.failure:
             return 0
-        before, new = self._events.pending, self._follower is None
+        before, new = self._events.pending, self._pipeline is None
         try:
             blocks = self._blocks(message)
             size = self._output_bytes_max(blocks) if blocks else 0
@@ -123,14 +158,67 @@ class AxisStream(StatefulBase):
         return min(size, _OUTPUT_BYTES_MAX) + _EVENT_BYTES * (self._events.pending - before)
 
     def output(self) -> Output:
-        """The responses and events of all messages taken since the last call."""
+        """The responses, fits and events of all messages taken since the last call."""
+        return outputs_together([self])[0]
+
+    def tracked(self) -> Tracked:
+        """The same before the fits; `finished` follows."""
         self._track()
         first, responses = self.responses, self._responses
         events = self._tracked_events + self._events.take()
         self._responses, self._tracked_events = [], []
         self.responses += sum(map(len, responses))
         joined_responses = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
-        return Output(first, joined_responses, events)
+        return Tracked(first, joined_responses, self._to_fit(joined_responses), events)
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The stages; they exist from the first Block on."""
+        assert self._pipeline is not None
+        return self._pipeline
+
+    @property
+    def detection(self) -> ChangeDetection | None:
+        """What monitors the axis, from the first Block on."""
+        return None if self._pipeline is None else self._pipeline.detection
+
+    def finished(self, tracked: Tracked, fitted: Fitted) -> Output:
+        """The output, with the fits of the responses that `tracked` lists; monitors both."""
+        parameters, events = fitted
+        found = [*tracked.events, *events]
+        detection = self.detection
+        if detection is not None and tracked.responses is not None and not self.failure:
+            ready = tracked.responses[tracked.responses.ready]
+            found += detection.take_responses(ready, parameters[0] if parameters else None)
+        self._remember(found, parameters)
+        return Output(
+            tracked.number, tracked.responses, tracked.number + tracked.to_fit, parameters, self._limits.take(found)
+        )
+
+    def _remember(self, events: list[Event], parameters: tuple[Parameters, ...]) -> None:
+        if changes := sum(event.kind == "change" for event in events):
+            self.changes, self.changed_s = self.changes + changes, self.log_s
+        if parameters:
+            detection = self.detection
+            name = main_quantity(parameters, () if detection is None else detection.watched)
+            self.main = newest_of(parameters, name, detection) or self.main
+
+    def _to_fit(self, responses: Responses | None) -> NDArray[np.int64]:
+        """Which responses are fitted: the first one of each half second by the sender's sample numbers.
+
+        So another owner fits the same ones, however it takes the messages. Half a second is a whole number of windows,
+        and begins where monitoring expects its rows.
+        """
+        if self._pipeline is None or self._pipeline.fits is None or responses is None or self.failure:
+            return _NO_ROWS
+        settings = self._pipeline.follower.settings
+        window, rate_hz = settings.lines.window, settings.lines.rate_hz
+        apart = max(window, settings.step)
+        period = apart * max(1, round(rate_hz / FITS_PER_S / apart))
+        begun = (responses.sample + 1 - places(window, settings.step)[0]) // period
+        first = np.diff(begun, prepend=self._fit_period) != 0
+        self._fit_period = int(begun[-1])
+        return np.flatnonzero(first & responses.ready)
 
     def _blocks(self, message: bytes) -> list[LiveBlock]:
         blocks = self._sequencer.poll(self.log_s)
@@ -143,9 +231,9 @@ class AxisStream(StatefulBase):
 
     def _output_bytes_max(self, blocks: list[LiveBlock]) -> int:
         """Most bytes of the responses that these Blocks complete; [motion] delays them by a chunk and a window."""
-        if self._follower is None:
-            self._follower = live_follower(self._axis, blocks[0].rate_hz, self._sequencer.schema.spectra)
-        settings = self._follower.settings
+        if self._pipeline is None:
+            self._pipeline = self._new_pipeline(blocks[0].rate_hz)
+        settings = self._pipeline.follower.settings
         samples = sum(block.stop - block.start for block in blocks)
         if self._axis.motion is not None:
             samples += round(self._axis.motion.chunk_s * settings.lines.rate_hz) + settings.lines.window
@@ -166,9 +254,26 @@ class AxisStream(StatefulBase):
                 found = []
             self._responses += [one for one in found if len(one)]
 
+    def _new_pipeline(self, rate_hz: float) -> Pipeline:
+        schema = self._sequencer.schema
+        follower = live_follower(self._axis, rate_hz, schema.spectra)
+        return Pipeline.of(self._axis, follower, schema.channels, samples=schema.spectra is None)
+
     def _tracked(self, block: LiveBlock) -> Responses:
-        assert self._follower is not None
-        return self._follower.process(block, self._tracked_events.append)
+        pipeline, events = self.pipeline, self._tracked_events
+        readiness = pipeline.readiness
+        parts: list[Block] = [block]
+        if readiness is not None:
+            events += readiness.take(block)
+            pipeline.follower.set_aside(readiness.spans)
+            parts = readiness.condition.parts(block)
+        if pipeline.detection is not None:
+            for part in parts:
+                events += pipeline.detection.take_samples(part)
+        found = pipeline.follower.process(block, events.append)
+        if pipeline.fits is not None and len(found) and not self.responses:
+            pipeline.fits.process(found[0:0])  # what a model cannot be fitted to, it refuses here
+        return found if readiness is None else readiness.mark(found)
 
     def _fail(self, error: Exception) -> None:
         if not isinstance(error, LivebodeError):
@@ -183,15 +288,32 @@ class AxisStream(StatefulBase):
 
     def _state(self) -> dict[str, Any]:
         assert not self._taken, "a snapshot between take and output would lack samples"
-        follower = {} if self._follower is None else {"follower": self._follower.snapshot()}
-        return super()._state() | {"sequencer": self._sequencer.snapshot(), **follower}
+        parts = {} if self._pipeline is None else {name: part.snapshot() for name, part in self._pipeline.parts.items()}
+        own = {"sequencer": self._sequencer.snapshot(), "source_events": self._events.rates, "stages": list(parts)}
+        return super()._state() | own | parts
 
     def _load(self, state: dict[str, Any]) -> None:
         super()._load(state)
+        self._events.continue_at(state["source_events"])
         self._sequencer.restore(state["sequencer"])
-        self._follower = None
-        if "follower" in state:
+        self._pipeline, self.main = None, None
+        if state["stages"]:
             rate_hz = self._sequencer.schema.rate_hz
             assert rate_hz is not None
-            self._follower = live_follower(self._axis, rate_hz, self._sequencer.schema.spectra)
-            self._follower.restore(state["follower"])
+            self._pipeline = self._new_pipeline(rate_hz)
+            restore_parts(self._pipeline.parts, {name: state[name] for name in self._pipeline.parts})
+
+
+def outputs_together(streams: Sequence[AxisStream]) -> list[Output]:
+    """The output of each stream; the fits of all axes are one computation, in which none depends on the others."""
+    tracked = [stream.tracked() for stream in streams]
+    at = [i for i, one in enumerate(tracked) if len(one.to_fit)]
+    fits, batches = [], []
+    for i in at:
+        found, stages = tracked[i].responses, streams[i].pipeline
+        assert found is not None
+        assert stages.fits is not None
+        fits.append(stages.fits)
+        batches.append(found[tracked[i].to_fit])
+    fitted: dict[int, Fitted] = dict(zip(at, process_together(fits, batches)))
+    return [stream.finished(one, fitted.get(i, ((), []))) for i, (stream, one) in enumerate(zip(streams, tracked))]

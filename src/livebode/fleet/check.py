@@ -1,9 +1,10 @@
-"""`livebode fleet check`: stored responses compared, bit for bit, with one uninterrupted computation from the log."""
+"""`livebode fleet check`: stored results compared, bit for bit, with one uninterrupted computation from the log."""
 
 from __future__ import annotations
 
+import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import blake2b
 from typing import Any
@@ -18,28 +19,33 @@ from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.subjects import LOG, LOG_STREAM, RESULT_STREAM, RESULTS, axis_path, key_of
-from livebode.fleet.wide_rows import ROWS, AxisRows, response_table
+from livebode.fleet.wide_rows import PARAMETERS, ROWS, AxisFits, AxisRows, parameter_table, response_table
 
 _DIGEST_BYTES = 16
 _NAMES = ROWS.names[3:]
 Run = tuple[str, int]
 """Key of an axis, and number of the first message of the run."""
+_FITTED = PARAMETERS.names[2:]
+_OUTSIDE = "state-rejected"
+"""Kind of event that reports a takeover, not the data: one computation without interruption has none."""
 
 
 @dataclass
 class AxisCheck:
-    """Responses of an axis: expected ones, and stored ones that differ from them.
+    """Results of an axis: expected ones, and stored ones that differ from them.
 
     Attributes
     ----------
-    responses
-        Computed again, from the messages whose results must be stored.
+    responses, parameters, events
+        Computed again, from the messages whose results must be stored. Of parameters, a row is one quantity of a fit.
     missing, doubled, different
-        Of these, not stored, stored more than once, stored with other bits.
+        Responses of these that are not stored, stored more than once, stored with other bits.
     unexpected
-        Stored, but not computed again.
+        Responses that are stored, but not computed again.
+    parameters_missing, parameters_unexpected, events_missing, events_unexpected
+        Rows and events that are not stored, or stored more often than computed; one with other bits counts as both.
     other_recipe
-        Stored with another configuration than today's, so not compared.
+        Responses stored with another configuration than today's, so not compared.
     """
 
     responses: int = 0
@@ -47,11 +53,19 @@ class AxisCheck:
     doubled: int = 0
     different: int = 0
     unexpected: int = 0
+    parameters: int = 0
+    parameters_missing: int = 0
+    parameters_unexpected: int = 0
+    events: int = 0
+    events_missing: int = 0
+    events_unexpected: int = 0
     other_recipe: int = 0
 
     @property
     def exact(self) -> bool:
-        return not (self.missing or self.doubled or self.different or self.unexpected)
+        responses = self.missing or self.doubled or self.different or self.unexpected
+        parameters = self.parameters_missing or self.parameters_unexpected
+        return not (responses or parameters or self.events_missing or self.events_unexpected)
 
 
 @dataclass(frozen=True)
@@ -81,10 +95,12 @@ class CheckResult:
 
 
 class _Stored:
-    """Digests of the stored responses, and for each partition the message up to which they are complete."""
+    """Digests of the stored results, and for each partition the message up to which they are complete."""
 
     def __init__(self) -> None:
         self.responses: dict[Run, list[tuple[int, bytes]]] = {}
+        self.parameters: dict[Run, Counter[bytes]] = {}
+        self.events: dict[Run, Counter[bytes]] = {}
         self.recipes: dict[Run, str] = {}
         self.through: dict[str, int] = {}
         self.claims = 0
@@ -95,10 +111,15 @@ class _Stored:
         for key, run, number, digest in _digests(message.rows):
             self.responses.setdefault((key, run), []).append((number, digest))
             self.recipes[key, run] = message.recipes[key]
+        _count(self.parameters, _fitted_digests(message.parameters))
+        for event in message.events:
+            if event["kind"] != _OUTSIDE:
+                _count(self.events, [(event["axis"], event["run"], _event_digest(event))])
+                self.recipes[event["axis"], event["run"]] = message.recipes[event["axis"]]
 
 
 async def check_results(log: FleetLog, axes: Mapping[str, Axis]) -> CheckResult:
-    """Compute all responses again from the log, in one process and without interruption, and compare the stored ones.
+    """Compute all results again from the log, in one process and without interruption, and compare the stored ones.
 
     A fleet may run meanwhile: what is not stored yet is not expected.
 
@@ -131,10 +152,12 @@ class _Again:
     def __init__(self, axes: Mapping[str, Axis], stored: _Stored) -> None:
         self._axes, self._stored = axes, stored
         self._runs: dict[str, list[int]] = {}
-        for key, run in stored.responses:
+        for key, run in stored.recipes:
             self._runs.setdefault(key, []).append(run)
         self._streams: dict[str, AxisStream] = {}
         self._expected: dict[Run, dict[int, bytes]] = {}
+        self._parameters: dict[Run, Counter[bytes]] = {}
+        self._events: dict[Run, Counter[bytes]] = {}
 
     def process(self, subject: str, data: bytes, number: int, stored_s: float) -> None:
         key, partition = key_of(subject), subject.split(".")[1]
@@ -148,17 +171,29 @@ class _Again:
             rows = response_table([AxisRows(key, stream.run, output.number, output.responses)])
             for _, run, response, digest in _digests(rows):
                 self._expected.setdefault((key, run), {})[response] = digest
+        fits = [AxisFits(key, stream.run, output.fitted, one) for one in output.parameters]
+        _count(self._parameters, _fitted_digests(parameter_table(fits)))
+        _count(self._events, [(key, stream.run, _event_digest(asdict(event))) for event in output.events])
 
     def verdicts(self) -> dict[str, AxisCheck]:
         found: dict[str, AxisCheck] = {axis_path(key): AxisCheck() for key in sorted(self._axes)}
-        for key, run in sorted(self._expected.keys() | self._stored.responses.keys()):
-            verdict = found.setdefault(axis_path(key), AxisCheck())
-            stored, expected = self._stored.responses.get((key, run), []), self._expected.get((key, run), {})
-            stream = self._streams.get(key)
-            if stored and (stream is None or self._stored.recipes[key, run] != stream.recipe):
-                verdict.other_recipe += len(stored)
-            else:
-                _compare(verdict, expected, stored)
+        stored = self._stored
+        for run in sorted(self._expected.keys() | self._events.keys() | stored.recipes.keys()):
+            verdict = found.setdefault(axis_path(run[0]), AxisCheck())
+            responses = stored.responses.get(run, [])
+            stream = self._streams.get(run[0])
+            if run in stored.recipes and (stream is None or stored.recipes[run] != stream.recipe):
+                verdict.other_recipe += len(responses)
+                continue
+            _compare(verdict, self._expected.get(run, {}), responses)
+            rows = self._parameters.get(run, Counter()), stored.parameters.get(run, Counter())
+            events = self._events.get(run, Counter()), stored.events.get(run, Counter())
+            verdict.parameters += rows[0].total()
+            verdict.parameters_missing += (rows[0] - rows[1]).total()
+            verdict.parameters_unexpected += (rows[1] - rows[0]).total()
+            verdict.events += events[0].total()
+            verdict.events_missing += (events[0] - events[1]).total()
+            verdict.events_unexpected += (events[1] - events[0]).total()
         return found
 
 
@@ -178,7 +213,28 @@ def _digests(rows: pa.Table) -> Iterator[tuple[str, int, int, bytes]]:
     place = (rows[name].to_pylist() for name in ("axis", "run", "number"))
     for index, (key, run, number) in enumerate(zip(*place)):
         content = b"".join(cell(index) for cell in cells)
-        yield key, run, number, blake2b(content, digest_size=_DIGEST_BYTES).digest()
+        yield key, run, number, _digest(content)
+
+
+def _count(counts: dict[Run, Counter[bytes]], found: Iterable[tuple[str, int, bytes]]) -> None:
+    for key, run, digest in found:
+        counts.setdefault((key, run), Counter())[digest] += 1
+
+
+def _fitted_digests(rows: pa.Table) -> Iterator[tuple[str, int, bytes]]:
+    """Axis, run and digest of each row of parameters."""
+    columns = [rows[name].to_pylist() for name in _FITTED]
+    for key, run, *content in zip(rows["axis"].to_pylist(), rows["run"].to_pylist(), *columns):
+        yield key, run, _digest(repr(content).encode())  # the shortest text of a float is exact
+
+
+def _event_digest(event: Mapping[str, Any]) -> bytes:
+    content = {name: event[name] for name in ("kind", "sample", "time_s", "message", "details")}
+    return _digest(json.dumps(content, sort_keys=True).encode())
+
+
+def _digest(content: bytes) -> bytes:
+    return blake2b(content, digest_size=_DIGEST_BYTES).digest()
 
 
 def _cells(column: pa.ChunkedArray[Any]) -> Callable[[int], bytes]:

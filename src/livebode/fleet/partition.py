@@ -17,7 +17,7 @@ from typing import Any
 
 from livebode.configuration.axis import Axis
 from livebode.core import StateError
-from livebode.fleet.axis_stream import AxisStream
+from livebode.fleet.axis_stream import AxisStream, outputs_together
 from livebode.fleet.log import ClaimLostError, FleetLog, StoredMessage
 from livebode.fleet.page_status import PageStatus
 from livebode.fleet.reader import Reader
@@ -162,8 +162,7 @@ class PartitionOwner:
         """Process messages until their results are enough for a message of results; returns the others."""
         stored = bisect_right(messages, self._through, key=lambda message: message.number)
         streams, taken = self._take(messages[:stored] or messages)
-        for key, stream in streams.items():
-            output = stream.output()
+        for (key, stream), output in zip(streams.items(), outputs_together([*streams.values()])):
             if not stored:
                 self._pending.add(key, stream, output)
         return messages[taken:]

@@ -16,6 +16,7 @@ from livebode.fleet.wide_rows import PARAMETERS, ROWS, AxisFits, AxisRows, grid_
 
 _EVENT_BYTES = 500
 """Of an event without its sentence."""
+_PARAMETER_BYTES = 100
 _HEAD = struct.Struct("<4sH")
 _MAGIC, _VERSION = b"LBRM", 2
 _LENGTH = struct.Struct("<I")
@@ -119,6 +120,9 @@ class PendingResults:
         if output.responses is not None:
             self._responses.append(AxisRows(key, stream.run, output.number, output.responses))
             self.nbytes += output.responses.value.size * RESPONSE_BYTES
+        for parameters in output.parameters:
+            self._parameters.append(AxisFits(key, stream.run, output.fitted, parameters))
+            self.nbytes += parameters.value.size * _PARAMETER_BYTES
         if output.responses is not None or output.events:
             self._recipes[key], self._logged_s[key] = stream.recipe, stream.log_s
 

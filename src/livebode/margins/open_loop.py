@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,8 @@ _LOWEST = 1e-7  # of the rate: far below every corner of a drive's controllers
 _PER_DECADE_OUTSIDE, _PER_DECADE = 30, 150
 _POINTS_IN_A_PEAK = 3.0  # in half the width of a resonance
 _POINTS_MAX = 4000
+_FREQUENCY_STEP, _DAMPING_STEP = 1.25, 2.0  # factors, to which resonances are rounded
+_STEPS_MAX, _NO_PEAK = 1000, 1 << 20
 
 
 @dataclass(frozen=True)
@@ -75,29 +78,45 @@ class OpenLoop:
         poles = self.plant.continuous(values).poles()
         return np.asarray(np.count_nonzero(poles.real > 0, axis=-1))
 
-    def frequencies(self, values: Floats, band_hz: tuple[float, float]) -> Floats:
-        """Frequencies up to half the rate that are dense enough for every crossing and peak of these rows.
+    def grids(self, values: Floats, band_hz: tuple[float, float]) -> Iterator[tuple[NDArray[np.int64], Floats]]:
+        """Rows with the same grid, and its frequencies up to half the rate, dense enough for every crossing and peak.
 
         Logarithmic; denser in and around the band, and around a resonance of the model as dense as its damping
-        requires.
+        requires. Resonances and dampings are rounded to steps, so that similar rows share a grid, which is the one that
+        each of them has alone: its results do not depend on the other rows.
         """
+        peaks = self._peaks(values)
+        kinds, kind = np.unique(peaks, axis=0, return_inverse=True)
+        for number, steps in enumerate(kinds.reshape(len(kinds), -1, 2)):
+            yield np.flatnonzero(kind.ravel() == number), self._grid(steps, band_hz)
+
+    def _grid(self, peaks: NDArray[np.int64], band_hz: tuple[float, float]) -> Floats:
         nyquist = self.rate_hz / 2
         low, high = band_hz[0] / 10, nyquist
         parts = [_spaced(_LOWEST * self.rate_hz, low, _PER_DECADE_OUTSIDE), _spaced(low, high, _PER_DECADE)]
-        for centre_hz, damping in self._peaks(values):
-            span = np.min(centre_hz) / 1.1, min(np.max(centre_hz) * 1.1, nyquist)
+        for frequency_step, damping_step in peaks[peaks[:, 0] != _NO_PEAK]:
+            begin_hz = _FREQUENCY_STEP ** int(frequency_step)
+            span = begin_hz / 1.1, min(begin_hz * _FREQUENCY_STEP * 1.1, nyquist)
             if span[0] < nyquist:
-                parts.append(_spaced(*span, _POINTS_IN_A_PEAK * np.log(10) / max(np.min(damping), 1e-4)))
+                damping = _DAMPING_STEP ** int(damping_step)
+                parts.append(_spaced(*span, _POINTS_IN_A_PEAK * np.log(10) / max(damping, 1e-4)))
         found = np.unique(np.concatenate(parts))
         return np.asarray(found[found <= nyquist])
 
-    def _peaks(self, values: Floats) -> list[tuple[Floats, Floats]]:
-        """Frequency, Hz, and damping ratio of each mode and each pair of zeros, over the rows."""
+    def _peaks(self, values: Floats) -> NDArray[np.int64]:
+        """Step of the frequency and of the damping ratio of each mode and each pair of zeros, (rows, 2·peaks)."""
         names = (*self.plant.names, *self.plant.derived_names)
         every = np.concatenate([values, self.plant.derived(values)], axis=-1) if self.plant.derived_names else values
         column = {name: every[..., i] for i, name in enumerate(names)}
         pairs = [(column[n], np.abs(column[f"{n}_damping"])) for n in names if f"{n}_damping" in column]
-        return [(f[kept], z[kept]) for f, z in pairs if (kept := np.isfinite(f) & np.isfinite(z) & (f > 0)).any()]
+        found = np.full((len(values), 2 * len(pairs)), _NO_PEAK)
+        for i, (frequency_hz, damping) in enumerate(pairs):
+            kept = np.isfinite(frequency_hz) & np.isfinite(damping) & (frequency_hz > 0)
+            steps = np.log(frequency_hz[kept]) / np.log(_FREQUENCY_STEP)
+            found[kept, 2 * i] = np.floor(steps).clip(-_STEPS_MAX, _STEPS_MAX)
+            steps = np.log(np.maximum(damping[kept], 1e-4)) / np.log(_DAMPING_STEP)
+            found[kept, 2 * i + 1] = np.floor(steps).clip(-_STEPS_MAX, _STEPS_MAX)
+        return found
 
 
 def _spaced(low: float, high: float, per_decade: float) -> Floats:

@@ -68,8 +68,9 @@ def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> M
         )
     found = _nothing(fits)
     rows = np.flatnonzero(fits.ok)
-    for part in _parts(rows):
-        _read(found, part, fits.value[part], fits.covariance[part], loop, band_hz)
+    for alike, frequency_hz in loop.grids(fits.value[rows], band_hz) if rows.size else ():
+        for part in _parts(rows[alike]):
+            _read(found, part, fits.value[part], fits.covariance[part], loop, band_hz, frequency_hz)
     return found
 
 
@@ -100,9 +101,9 @@ def _read(
     covariance: Floats,
     loop: OpenLoop,
     band: tuple[float, float],
+    f: Floats,
 ) -> None:
-    """Write the margins of `rows` into `found`."""
-    f = loop.frequencies(values, band)
+    """Write the margins of `rows` into `found`; `f` is the grid that they share, (frequencies,)."""
     grid = loop.at(values, f)
     steady = stable(grid, f, loop.unstable_poles(values))
     found.status[rows[~steady]] = UNSTABLE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 from livebode.core import Block, Event, Parameters, Responses, Stage, StatefulBase, UsageError, counted
@@ -84,7 +84,8 @@ class Monitor(StatefulBase):
         else:
             share = mean_s * len(baseline.tables)
             self._tables = {t.what: TableMonitor(t, share, self._step_s) for t in baseline.tables}
-        self._parameters = next((t.names for t in baseline.tables if t.what == "parameters"), ())
+        self.parameters = next((t.names for t in baseline.tables if t.what == "parameters"), ())
+        """Names of the parameters that it compares with a table."""
         self._apart = {
             name: NonOverlappingWindows(apart, places(lines.window, settings.step)[0]) for name in self._tables
         }
@@ -110,7 +111,7 @@ class Monitor(StatefulBase):
             events += self._tables["lines"].process(self._apart["lines"].of_responses(responses))
         if "parameters" in self._tables and parameters is not None and len(parameters):
             events += self._tables["parameters"].process(
-                self._apart["parameters"].of_parameters(parameters.only(self._parameters))
+                self._apart["parameters"].of_parameters(parameters.only(self.parameters))
             )
         return self._counted(events)
 
@@ -125,17 +126,31 @@ class Monitor(StatefulBase):
                 self._counts[event.kind] += 1
         return events
 
+    @property
+    def judged(self) -> int:
+        """Windows judged so far."""
+        return self._machine.detector.judged if self._machine else max(t.judged for t in self._tables.values())
+
+    @property
+    def active(self) -> bool:
+        """Whether a change is active."""
+        return bool(self._machine.standing()) if self._machine else any(t.standing for t in self._tables.values())
+
+    def deviation(self, name: str) -> float:
+        """Newest relative deviation of a parameter from its table; NaN where it is not known."""
+        table = self._tables.get("parameters")
+        return nan if table is None or name not in self.parameters else table.newest(self.parameters.index(name))
+
     def summary(self) -> dict[str, Any]:
         """Result of the run: judged time, numbers of raised and cleared alarms, and active changes."""
         standing = (
             self._machine.standing() if self._machine else [name for name, t in self._tables.items() if t.standing]
         )
-        judged = self._machine.detector.judged if self._machine else max(t.judged for t in self._tables.values())
         summary = {
             "false_alarm_interval_days": self.false_alarm_interval_s / 86400,
             "judged_by": "model" if self._machine else "tables",
             "covariates": list(self._baseline.covariates),
-            "judged_s": judged * self._step_s,
+            "judged_s": self.judged * self._step_s,
             "changes": self._counts["change"] + any(isinstance(s, dict) and s["what"] == "machine" for s in standing),
             "cleared": self._counts["change-cleared"],
             "standing": standing,

@@ -53,7 +53,12 @@ class TableMonitor(StatefulBase):
         self._standing = np.zeros(size, dtype=bool)
         self._seen_in = np.zeros(table.count.size, dtype=bool)
         self._found = -1
+        self._newest = np.full(size, np.nan)
         self._forget()
+
+    def newest(self, component: int) -> float:
+        """Relative deviation of a component in the newest judged row; NaN before the first one."""
+        return float(self._newest[component])
 
     def _forget(self) -> None:
         size = self._table.accuracy.smallest.size
@@ -70,6 +75,8 @@ class TableMonitor(StatefulBase):
         cell, known = self._table.place(rows)
         deviation, own, more = self._table.deviation_parts(rows, cell)
         judged = np.flatnonzero(rows.ok & known)
+        if judged.size:
+            self._newest = deviation[judged[-1]]
         variance = np.full(own.shape, np.inf)
         variance[judged] = self._noise.process(deviation[judged], own[judged], more[judged])
         information = 1 / variance / self._table.accuracy.inflation

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import nan
 from typing import TYPE_CHECKING, Any
 
 from livebode.configuration.axis import Axis, MonitoringSection
@@ -43,6 +44,25 @@ class ChangeDetection:
     def baseline(self) -> str | None:
         """Name of what it compares with; None if it detects nothing."""
         return None if self._monitor is None else self._baseline
+
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """Parameters that it compares, the first one first."""
+        return () if self._monitor is None else self._monitor.parameters
+
+    @property
+    def active(self) -> bool:
+        """Whether a change is active."""
+        return self._monitor is not None and self._monitor.active
+
+    @property
+    def judges(self) -> bool:
+        """Whether it has judged anything yet."""
+        return self._monitor is not None and self._monitor.judged > 0
+
+    def deviation(self, name: str) -> float:
+        """Newest relative deviation of a parameter from the baseline; NaN where it is not known."""
+        return nan if self._monitor is None else self._monitor.deviation(name)
 
     @property
     def compared_with(self) -> dict[str, Any]:

@@ -12,7 +12,9 @@ def verdict(result: CheckResult) -> str:
     other = f", {total.other_recipe} with another configuration were not compared" if total.other_recipe else ""
     return (
         f"{total.responses:,} responses (axes: {len(result.axes)}): {total.missing} missing, {total.doubled} doubled, "
-        f"{total.different + total.unexpected} different from one uninterrupted computation{other}"
+        f"{total.different + total.unexpected} different from one uninterrupted computation{other}; "
+        f"{total.parameters:,} parameters: {total.parameters_missing} missing, {total.parameters_unexpected} "
+        f"unexpected; {total.events:,} events: {total.events_missing} missing, {total.events_unexpected} unexpected"
     )
 
 

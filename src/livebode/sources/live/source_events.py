@@ -6,7 +6,7 @@ import logging
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from livebode.core import Event
@@ -69,6 +69,19 @@ class SourceEvents:
     def pending(self) -> int:
         """Number of Events since the last `take`."""
         return len(self._events)
+
+    @property
+    def rates(self) -> dict[str, Any]:
+        """Where it is, and which events it may create when, as plain data; `continue_at` takes it."""
+        tokens = {kind: list(self._tokens[kind]) for kind in sorted(self._tokens)}
+        return {"tokens": tokens, "held": dict(sorted(self._held.items())), "position": list(self.position)}
+
+    def continue_at(self, rates: Mapping[str, Any]) -> None:
+        """Continue where another one was; ValueError, TypeError or LookupError if that is not plain data of `rates`."""
+        tokens = {str(kind): (float(room), float(then)) for kind, (room, then) in rates["tokens"].items()}
+        held = Counter({str(kind): int(count) for kind, count in rates["held"].items()})
+        sample, time_s = rates["position"]
+        self._tokens, self._held, self.position = tokens, held, (int(sample), float(time_s))
 
     def report(
         self, kind: str, message: str, *, sample: int | None = None, rate_hz: float = 0.0, **details: Any

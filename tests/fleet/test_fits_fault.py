@@ -1,0 +1,78 @@
+"""Takeovers of axes with fits, margins and monitoring on a real log: parameters and alarms are those of one owner."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from livebode.core.errors import FleetError
+from livebode.fleet.log import FleetLog
+from livebode.fleet.reader import stored_messages
+from livebode.fleet.result_message import ResultMessage
+from livebode.fleet.server import LogServer
+from livebode.fleet.settings import LogSection
+from livebode.fleet.subjects import RESULT_STREAM, RESULTS, STATE_STREAM
+from tests.support.fitted_fleet import fitted_axes, fitted_sent, healthy_baseline
+from tests.support.fleet_runs import PARTITIONS, checked, log_section, owned_until_current
+
+
+def test_takeovers_with_and_without_states_give_the_parameters_and_alarms_of_one_owner(tmp_path: Path) -> None:
+    axes = fitted_axes(3, healthy_baseline(tmp_path))
+    with LogServer(tmp_path, PARTITIONS) as server:
+        settings = log_section(server.url)
+        for part in (range(7), range(7, 11), range(11, 16)):
+            fitted_sent(settings, axes, part)
+            if part.start == 11:  # computes all fits again, and stores none of them again
+                asyncio.run(_purge(settings))
+            owned_until_current(settings, axes)
+        result = checked(settings, axes)
+        found = asyncio.run(_results(settings))
+    total = result.total
+    assert result.exact
+    assert result.claims == 3 * PARTITIONS
+    assert total.parameters == sum(one.parameters.num_rows for one in found) > 3 * 4 * 20
+    changes = [event for one in found for event in one.events if event["kind"] == "change"]
+    assert [event["axis"] for event in changes] == [next(iter(axes))]
+
+
+def test_a_removed_message_of_results_is_missing_with_its_parameters_and_events(tmp_path: Path) -> None:
+    axes = fitted_axes(1)
+    with LogServer(tmp_path, PARTITIONS) as server:
+        settings = log_section(server.url)
+        for part in (range(6), range(6, 12)):
+            fitted_sent(settings, axes, part)
+            owned_until_current(settings, axes)
+        assert checked(settings, axes).exact
+        asyncio.run(_remove_first(settings))
+        total = checked(settings, axes).total
+    assert total.missing > 0
+    assert total.parameters_missing > 0
+    assert total.unexpected == total.parameters_unexpected == total.events_unexpected == 0
+
+
+def test_results_of_another_version_are_refused_with_a_sentence() -> None:
+    with pytest.raises(FleetError, match="version 1, and this livebode reads version 2"):
+        ResultMessage.from_bytes(b"\xff\xff\xff\xff an Arrow stream")
+
+
+async def _purge(settings: LogSection) -> None:
+    async with FleetLog(settings, "test") as log:
+        await log._js.purge_stream(STATE_STREAM)
+
+
+async def _remove_first(settings: LogSection) -> None:
+    async with FleetLog(settings, "test") as log:
+        last = (await log.extent(RESULT_STREAM)).last
+        async for message in stored_messages(log, RESULT_STREAM, f"{RESULTS}.*", last):
+            if ResultMessage.from_bytes(message.data).parameters.num_rows:
+                await log._js.delete_msg(RESULT_STREAM, message.number)
+                return
+
+
+async def _results(settings: LogSection) -> list[ResultMessage]:
+    async with FleetLog(settings, "test") as log:
+        last = (await log.extent(RESULT_STREAM)).last
+        found = stored_messages(log, RESULT_STREAM, f"{RESULTS}.*", last)
+        return [ResultMessage.from_bytes(message.data) async for message in found]
