@@ -19,6 +19,8 @@ import numpy as np
 
 from bench.fleet_loads import SAMPLES_500, SPECTRA, AxisLoad
 from bench.fleet_path import LOAD, PathCosts, measured, state_every_s
+from bench.fleet_sink import SinkCosts
+from bench.fleet_sink import measured as measured_sink
 from livebode.fleet.axis_stream import AxisStream
 from studies.fleet_queue import WorkerCosts, arrivals, caught_up_s, stored_times
 
@@ -230,7 +232,7 @@ def simulated_trace(costs: PathCosts, worker: WorkerCosts) -> np.ndarray:
     trace, open_s = costs.trace, float(np.min(costs.trace["arrived_s"]))
     if costs.killed_s:
         open_s = costs.claimed_s
-        state_s = costs.killed_s - AxisCosts.of(costs).state_every_s
+        state_s = costs.killed_s - _state_every_s(costs)
         trace = trace[(trace["partition"] % _OWNERS == 0) & (trace["arrived_s"] > state_s)]
     found = []
     for owner in range(_OWNERS):
@@ -239,6 +241,10 @@ def simulated_trace(costs: PathCosts, worker: WorkerCosts) -> np.ndarray:
             found.append(part.copy())
             found[-1]["stored_s"] = stored_s
     return np.concatenate(found)
+
+
+def _state_every_s(costs: PathCosts) -> float:
+    return state_every_s(costs.state_size, costs.input_bytes / costs.axis_seconds)
 
 
 def caught_up_after_s(costs: PathCosts) -> float:
@@ -272,7 +278,7 @@ def _at_load(costs: PathCosts, worker: WorkerCosts) -> str:
     axes = partitions * costs.axes // PARTITIONS
     about = {"axes": axes, "partitions": partitions, "period_s": costs.load.period_s}
     lags_s = predicted_lags_s(worker, seconds=_SIMULATED_S, jitter_s=_JITTER_S, **about)
-    waiting_s = _SILENCE_S + AxisCosts.of(costs).state_every_s / 2
+    waiting_s = _SILENCE_S + _state_every_s(costs) / 2
     again_s = caught_up_s(own * partitions, waiting_s)
     return (
         f"| {costs.load.name} | {axes:,} | {partitions} | {own * partitions:.0%} | {np.quantile(lags_s, 0.99):.2f} "
@@ -294,7 +300,8 @@ def main() -> None:
     print("| assumption | value |\n|---|---|")
     print(*(f"| {name} | {value} |" for name, value in given.rows()), sep="\n")
     print(f"\n| {given.axes:,} axes | {spectra.load.name} | {samples.load.name} |\n|---|---|---|")
-    both = zip(FleetSize(AxisCosts.of(spectra), given).rows(), FleetSize(AxisCosts.of(samples), given).rows())
+    sink = measured_sink()
+    both = zip(*(FleetSize(AxisCosts.of(one, sink), given).rows() for one in (spectra, samples)))
     print(*(f"| {name} | {first} | {second} |" for (name, first), (_, second) in both), sep="\n")
     print(f"\n{asked.axes} axes of spectra on {_OWNERS} owners and this computer:")
     workers = {one.load: worker_costs(one, tracking_s(one.load, one.axes)) for one in (spectra, samples)}
