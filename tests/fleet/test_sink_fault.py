@@ -17,12 +17,15 @@ import pytest
 
 from livebode.fleet import sink_means, sink_tables
 from livebode.fleet.log import FleetLog
+from livebode.fleet.reader import stored_messages
+from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import LogSection, SinkSection
 from livebode.fleet.sink import Sink
-from livebode.fleet.subjects import RESULT_STREAM, axis_path
+from livebode.fleet.subjects import RESULT_STREAM, RESULTS, axis_path
 from livebode.lake import LEVELS, Lake, StreamTable, stream_table
 from tests.support.command import livebode
+from tests.support.fitted_fleet import fitted_axes, fitted_sent
 from tests.support.fleet_runs import (
     PARTITIONS,
     fleet_axes,
@@ -188,3 +191,22 @@ def test_the_command_needs_a_lake_and_prints_what_it_has_stored(server: LogServe
     assert f"{2 * BATCHES} responses" in livebode("fleet", "sink", fleet, "--once").out
     assert isinstance(Lake(str(tmp_path / "lake")).read("fleet_responses"), pa.Table)
     assert len(keys(tmp_path / "lake")) == 2 * BATCHES
+
+
+def test_fits_of_the_log_are_in_the_lake_with_the_numbers_of_their_responses(server: LogServer, tmp_path: Path) -> None:
+    log, axes, lake = log_section(server.url), fitted_axes(1), tmp_path / "lake"
+    fitted_sent(log, axes, range(16))
+    owned_until_current(log, axes)
+    sink_once(log, lake)
+    names = ["run", "number", "model", "name", "value", "sigma", "status"]
+    stored = pa.concat_tables(one.parameters.select(names) for one in asyncio.run(_results(log)))
+    found = Lake(str(lake)).read("fleet_parameters", names)
+    assert sorted(map(str, found.to_pylist())) == sorted(map(str, stored.to_pylist()))
+    assert found.num_rows > 4 * 7
+
+
+async def _results(log: LogSection) -> list[ResultMessage]:
+    async with FleetLog(log, "test") as connection:
+        last = (await connection.extent(RESULT_STREAM)).last
+        messages = stored_messages(connection, RESULT_STREAM, f"{RESULTS}.*", last)
+        return [ResultMessage.from_bytes(message.data) async for message in messages]
