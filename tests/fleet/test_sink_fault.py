@@ -37,7 +37,7 @@ from tests.support.fleet_runs import (
 from tests.support.forked import server as forked
 from tests.support.sinks import sink_once
 
-AXES, BATCHES, KILLS = 3, 30, 10
+AXES, BATCHES, KILLS = 3, 30, 7
 
 
 @pytest.fixture

@@ -70,7 +70,7 @@ def means(messages: Sequence[SinkRows], kills: Sequence[int] = ()) -> list[Close
         at = stop
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(st.lists(st.integers(1, MESSAGES - 1), max_size=6), st.sampled_from([0.1, 4.0, 9.0, 100.0]))
 def test_means_are_the_same_wherever_a_sink_was_killed(kills: list[int], lag_s: float) -> None:
     messages = [message(number, (0.3, lag_s)) for number in range(1, MESSAGES + 1)]
