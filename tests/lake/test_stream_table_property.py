@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.lake import FLEET_EVENTS, Lake, StreamTable
+from tests.support.object_storage import BUCKET, object_storage
 
 FIRST = dt.datetime(2026, 11, 20, tzinfo=dt.UTC)
 EVERYTHING = pc.scalar(True)
@@ -86,3 +87,18 @@ def test_rows_of_a_file_that_was_joined_remain_for_readers_of_the_older_version(
     assert table.join_before(dt.date(2030, 1, 1)) == 2
     assert table.vacuum() == 0
     assert numbers(lake) == [1, 2, 3, 4]
+
+
+def test_rows_in_object_storage_are_appended_once_deleted_and_joined() -> None:
+    with object_storage():
+        url = f"s3://{BUCKET}/fleet"
+        table, other = (StreamTable(Lake(url), "fleet_events") for _ in range(2))
+        for last in (10, 30):
+            table.append("a", last, until(last))
+            other.append("a", last + 2, until(last + 2))
+        assert numbers(Lake(url)) == list(range(1, 33))
+        assert table.delete_before(FIRST.date() + dt.timedelta(days=1)) == 3
+        assert table.join_before(dt.date(2030, 1, 1)) == 2
+        assert other.position("a") == 32
+        assert numbers(Lake(url)) == list(range(24, 33))
+        assert sorted(Lake(url).read("fleet_events", ["sample"])["sample"].to_pylist()) == list(range(24, 33))
