@@ -45,7 +45,7 @@ class Plant:
     """A fleet in partitions, and its messages of each second; a feed too."""
 
     def __init__(self, axes: int, partitions: int) -> None:
-        self.fleet, self.name, self.trouble = DemoFleet(axes), "bench", ""
+        self.fleet, self.name, self.trouble, self.may_act = DemoFleet(axes), "bench", "", True
         self.parts = np.array_split(np.arange(len(self.fleet.paths)), partitions)
         self.alarms: list[int] = []
         self.names, self.tables = [], []

@@ -19,6 +19,8 @@ import numpy as np
 
 from bench.fleet_loads import SAMPLES_500, SPECTRA, AxisLoad
 from bench.fleet_path import LOAD, PathCosts, measured, state_every_s
+from bench.fleet_sink import SinkCosts
+from bench.fleet_sink import measured as measured_sink
 from livebode.fleet.axis_stream import AxisStream
 from studies.fleet_queue import WorkerCosts, arrivals, caught_up_s, stored_times
 
@@ -72,8 +74,10 @@ class AxisCosts:
     ----------
     owner_cores, server_cores
         Processor time per second; what a partition costs without data is not included.
-    response_bytes, state_bytes
-        Of one stored response, and of one state.
+    responses_per_s, lake_bytes, mean_bytes
+        Responses; bytes of one with its fit in the lake of the sink, and of their means over a period.
+    state_bytes
+        Of one state.
     partition_cores
         Of a partition without data.
     """
@@ -83,13 +87,15 @@ class AxisCosts:
     result_bytes_per_s: float
     owner_cores: float
     server_cores: float
-    response_bytes: float
+    responses_per_s: float
+    lake_bytes: float
+    mean_bytes: float
     state_bytes: float
     partition_cores: float = 0.0
 
     @classmethod
-    def of(cls, costs: PathCosts) -> AxisCosts:
-        """From a measurement."""
+    def of(cls, costs: PathCosts, sink: SinkCosts) -> AxisCosts:
+        """From measurements."""
         seconds = costs.axis_seconds
         idle_s = costs.idle_s * PARTITIONS * seconds / costs.axes
         return cls(
@@ -98,7 +104,9 @@ class AxisCosts:
             result_bytes_per_s=costs.result_bytes / seconds,
             owner_cores=(costs.owner_s - idle_s) / seconds,
             server_cores=costs.server_s / seconds,
-            response_bytes=costs.result_bytes / max(1, costs.responses),
+            responses_per_s=costs.responses / seconds,
+            lake_bytes=sink.bytes_of(),
+            mean_bytes=sink.bytes_of("_minute"),
             state_bytes=costs.state_size,
             partition_cores=costs.idle_s,
         )
@@ -153,10 +161,10 @@ class FleetSize:
         alarms = given.axes * given.alarms_per_axis_year
         return {
             "log, full rate": given.axes * axis.input_bytes_per_s * full_s * given.copies,
-            "responses, full rate": given.axes * axis.result_bytes_per_s * full_s,
+            "responses, full rate": given.axes * axis.responses_per_s * axis.lake_bytes * full_s,
             "states": given.axes * axis.state_bytes * given.copies,
-            "minute means": given.axes * axis.response_bytes * given.minute_years * YEAR_S / 60,
-            "hour means, a year": given.axes * axis.response_bytes * YEAR_S / 3600,
+            "minute means": given.axes * axis.mean_bytes * given.minute_years * YEAR_S / 60,
+            "hour means, a year": given.axes * axis.mean_bytes * YEAR_S / 3600,
             "alarms, a year": alarms * given.alarm_bytes,
             "raw around alarms, a year": alarms * given.raw_per_alarm_s * axis.input_bytes_per_s,
         }
@@ -224,7 +232,7 @@ def simulated_trace(costs: PathCosts, worker: WorkerCosts) -> np.ndarray:
     trace, open_s = costs.trace, float(np.min(costs.trace["arrived_s"]))
     if costs.killed_s:
         open_s = costs.claimed_s
-        state_s = costs.killed_s - AxisCosts.of(costs).state_every_s
+        state_s = costs.killed_s - _state_every_s(costs)
         trace = trace[(trace["partition"] % _OWNERS == 0) & (trace["arrived_s"] > state_s)]
     found = []
     for owner in range(_OWNERS):
@@ -233,6 +241,10 @@ def simulated_trace(costs: PathCosts, worker: WorkerCosts) -> np.ndarray:
             found.append(part.copy())
             found[-1]["stored_s"] = stored_s
     return np.concatenate(found)
+
+
+def _state_every_s(costs: PathCosts) -> float:
+    return state_every_s(costs.state_size, costs.input_bytes / costs.axis_seconds)
 
 
 def caught_up_after_s(costs: PathCosts) -> float:
@@ -266,7 +278,7 @@ def _at_load(costs: PathCosts, worker: WorkerCosts) -> str:
     axes = partitions * costs.axes // PARTITIONS
     about = {"axes": axes, "partitions": partitions, "period_s": costs.load.period_s}
     lags_s = predicted_lags_s(worker, seconds=_SIMULATED_S, jitter_s=_JITTER_S, **about)
-    waiting_s = _SILENCE_S + AxisCosts.of(costs).state_every_s / 2
+    waiting_s = _SILENCE_S + _state_every_s(costs) / 2
     again_s = caught_up_s(own * partitions, waiting_s)
     return (
         f"| {costs.load.name} | {axes:,} | {partitions} | {own * partitions:.0%} | {np.quantile(lags_s, 0.99):.2f} "
@@ -288,7 +300,8 @@ def main() -> None:
     print("| assumption | value |\n|---|---|")
     print(*(f"| {name} | {value} |" for name, value in given.rows()), sep="\n")
     print(f"\n| {given.axes:,} axes | {spectra.load.name} | {samples.load.name} |\n|---|---|---|")
-    both = zip(FleetSize(AxisCosts.of(spectra), given).rows(), FleetSize(AxisCosts.of(samples), given).rows())
+    sink = measured_sink()
+    both = zip(*(FleetSize(AxisCosts.of(one, sink), given).rows() for one in (spectra, samples)))
     print(*(f"| {name} | {first} | {second} |" for (name, first), (_, second) in both), sep="\n")
     print(f"\n{asked.axes} axes of spectra on {_OWNERS} owners and this computer:")
     workers = {one.load: worker_costs(one, tracking_s(one.load, one.axes)) for one in (spectra, samples)}

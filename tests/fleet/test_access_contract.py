@@ -17,6 +17,7 @@ from nats.js.errors import NoStreamResponseError, ServiceUnavailableError
 
 from livebode.core import ConfigError
 from livebode.core.errors import FleetError
+from livebode.dashboard.fleet_alarms import FleetAct
 from livebode.dashboard.fleet_feed import NatsFeed
 from livebode.fleet.connecting import security
 from livebode.fleet.credentials import write_credentials
@@ -26,7 +27,7 @@ from livebode.fleet.page_status import VIEW
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import FleetSettings, LogSection
 from livebode.fleet.status import fleet_status
-from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULTS, STATUS, STATUS_STREAM
+from livebode.fleet.subjects import ACTS, EDGE, LOG, LOG_STREAM, RESULTS, STATUS, STATUS_STREAM, axis_path
 from tests.support.command import livebode
 from tests.support.fleet_runs import PARTITIONS, batch
 from tests.support.secure_fleet import SecureFleet, secure_fleet
@@ -158,13 +159,15 @@ def test_a_viewer_reads_the_status_and_changes_nothing(fleet: SecureFleet) -> No
 
     async def look(log: FleetLog) -> None:
         assert [one["owner"] for one in (await fleet_status(log, fleet.axes))["partitions"]] == ["a:1"]
-        for subject in (f"{STATUS}.0", f"{EDGE}.{own}", f"{LOG}.0.{own}", f"{RESULTS}.0"):
-            with pytest.raises(NoStreamResponseError):
-                await log._js.publish(subject, b"forged", timeout=1)
-        with pytest.raises(ServiceUnavailableError):
+        for subject in (f"{STATUS}.0", f"{EDGE}.{own}", f"{LOG}.0.{own}", f"{RESULTS}.0", f"{ACTS}.acknowledge.{own}"):
+            with pytest.raises((NoStreamResponseError, TimeoutError)):
+                await log._js.publish(subject, b"forged", timeout=SILENCE_S)
+        with pytest.raises((ServiceUnavailableError, TimeoutError)):
             await log._js.purge_stream(STATUS_STREAM)
-        with pytest.raises(ServiceUnavailableError):
+        with pytest.raises((ServiceUnavailableError, TimeoutError)):
             await log._js.pull_subscribe(f"{STATUS}.0", stream=STATUS_STREAM)
+        with pytest.raises((ServiceUnavailableError, TimeoutError)):
+            await log._js.get_msg(LOG_STREAM, 1)
         for reply in (f"{LOG}.0.{own}", "$JS.API.STREAM.PURGE.STATUS"):
             await log._connection.publish("viewer.STREAM.INFO.STATUS", b"", reply=reply)
         await log._connection.flush()
@@ -173,7 +176,7 @@ def test_a_viewer_reads_the_status_and_changes_nothing(fleet: SecureFleet) -> No
     async def page() -> list[bytes]:
         heard: list[bytes] = []
         view = fleet.log("view", "view")
-        feed = NatsFeed(view.url, "fleet", **security(view))
+        feed = NatsFeed(view.url, "fleet", may_act=False, **security(view))
         running = asyncio.create_task(feed.run(heard.append, heard.append))
         async with FleetLog(fleet.log("fleet"), "test") as log:
             while not heard:
@@ -187,6 +190,41 @@ def test_a_viewer_reads_the_status_and_changes_nothing(fleet: SecureFleet) -> No
     _as(fleet.log("view", "view"), look)
     assert asyncio.run(page())[0] == b"page"
     assert _stored(fleet) == {}
+
+
+def test_a_viewer_reads_acknowledgements_and_writes_none(fleet: SecureFleet) -> None:
+    path = axis_path(fleet.keys[0])
+    stored, later = (FleetAct("acknowledge", path, raised, 0, by="Ada").to_bytes() for raised in (1, 2))
+
+    async def page() -> list[bytes]:
+        heard: list[bytes] = []
+        shown: list[bytes] = []
+        writer, view = fleet.log("fleet"), fleet.log("view", "view")
+        operator = NatsFeed(writer.url, "fleet", **security(writer))
+        viewer = NatsFeed(view.url, "fleet", may_act=False, **security(view))
+        jobs = [asyncio.create_task(feed.run(shown.append, heard.append)) for feed in (operator, viewer)]
+        own = FleetAct.of(stored)
+        assert own is not None
+        while not heard:  # from the operator's own subscription, when the stream is there
+            with contextlib.suppress(FleetError, AttributeError):
+                await operator.publish(own)
+            await asyncio.sleep(0.05)
+        while heard.count(stored) < 2:
+            await asyncio.sleep(0.05)
+        with pytest.raises(FleetError, match="key of a viewer"):
+            await viewer.publish(own)
+        for subject in (f"{VIEW}.0", f"{ACTS}.acknowledge.x"):  # to other viewers, and to the log
+            await viewer._connection.publish(subject, b"forged")
+        await viewer._connection.flush()
+        await operator.publish(FleetAct("acknowledge", path, 2, 0, by="Ada"))
+        while heard.count(later) < 2:
+            await asyncio.sleep(0.05)
+        for job in jobs:
+            job.cancel()
+        await asyncio.gather(*jobs, return_exceptions=True)
+        return heard + shown
+
+    assert b"forged" not in asyncio.run(page())
 
 
 def test_a_key_that_is_not_among_the_users_is_refused_with_its_file(fleet: SecureFleet) -> None:

@@ -16,7 +16,9 @@ AXIS = AxisCosts(
     result_bytes_per_s=200.0,
     owner_cores=0.0003,
     server_cores=0.0001,
-    response_bytes=100.0,
+    responses_per_s=2.0,
+    lake_bytes=100.0,
+    mean_bytes=100.0,
     state_bytes=2400.0,
     partition_cores=0.001,
 )

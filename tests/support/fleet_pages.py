@@ -22,7 +22,7 @@ class DrivenFeed:
     """Sends the state of a fleet that a test sets, ten times a second, except of dead partitions."""
 
     def __init__(self, fleet: DemoFleet, after_s: float) -> None:
-        self.fleet, self.name, self.trouble = fleet, "plant", ""
+        self.fleet, self.name, self.trouble, self.may_act = fleet, "plant", "", True
         self.status = fleet.status(after_s, time.time())
         self.dead: set[int] = set()
         self._acts: list[bytes] = []

@@ -59,6 +59,8 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "view": "Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.",
         "check": "Compute all results of a fleet again from its log, and compare the stored ones bit for bit.",
         "replay": "Compute the responses of an axis again from the log, and write them as a table.",
+        "sink": "Store the results of a fleet in a lake, each once: all of them, their means over minutes and hours, "
+        "and events.",
         "server": "Write the configuration of nats-server for a fleet.",
         "leaf": "Write the configuration of nats-server as a leaf node: the one way of a site to the log.",
         "credentials": "Make the key of a user of the log of a fleet.",

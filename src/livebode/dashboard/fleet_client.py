@@ -108,7 +108,7 @@ class FleetClient(BrowserSocket):
         view = self._view
         return {
             "name": view.feed.name,
-            "role": self._role,
+            "role": self._role if view.feed.may_act else "viewer",
             "layout": view.board.layout,
             "axes": len(view.board.axes),
             "plan": view.plan is not None,

@@ -140,7 +140,7 @@ class DemoFeed:
     """
 
     def __init__(self, fleet: DemoFleet, silent: Iterable[int] = (), began_s: float | None = None) -> None:
-        self.fleet, self.name, self.trouble = fleet, "demo", ""
+        self.fleet, self.name, self.trouble, self.may_act = fleet, "demo", "", True
         self._silent = set(silent)
         self._hear_act: Hear = lambda _: None
         self.began_s = time.time() if began_s is None else began_s

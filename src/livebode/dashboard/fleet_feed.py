@@ -11,12 +11,11 @@ from livebode.core.errors import FleetError
 from livebode.core.installing import not_installed
 from livebode.dashboard.fleet_alarms import FleetAct
 from livebode.fleet.page_status import NAMES, VIEW
-from livebode.fleet.subjects import axis_token
+from livebode.fleet.subjects import ACTS, ACTS_STREAM, VIEW_API, axis_token
 
-ACT_SUBJECT = "act"
-"""Subjects act.KIND.AXIS, of which the stream ACTS retains the newest."""
-_ACTS_STREAM = "ACTS"
 _CONNECT_S = 3.0
+_POLL_S = 1.0
+"""Between two requests of a viewer for new acts."""
 Hear = Callable[[bytes], None]
 
 
@@ -29,10 +28,13 @@ class StatusFeed(Protocol):
         Of the fleet, for the title of the page.
     trouble
         Why no messages can arrive at the moment; empty while they can.
+    may_act
+        Whether acts can be stored: not with the key of a viewer.
     """
 
     name: str
     trouble: str
+    may_act: bool
 
     async def run(self, hear: Hear, hear_act: Hear) -> None:
         """Pass each status message to `hear` and each act to `hear_act`, those from before first."""
@@ -48,12 +50,16 @@ class NatsFeed:
     ----------
     url
         Address of nats-server; several are joined by commas.
+    name
+        Of the fleet.
+    may_act
+        False with the key of a viewer.
     options
         Of the connection of nats-py: credentials and TLS.
     """
 
-    def __init__(self, url: str, name: str, **options: Any) -> None:
-        self._url, self.name, self._options = url, name, options
+    def __init__(self, url: str, name: str, *, may_act: bool = True, **options: Any) -> None:
+        self._url, self.name, self.may_act, self._options = url, name, may_act, options
         self.trouble = ""
         self._connection: Any = None
 
@@ -109,39 +115,68 @@ class NatsFeed:
 
     async def run(self, hear: Hear, hear_act: Hear) -> None:
         """Subscribe, and deliver until it is cancelled."""
-        from nats.js import api
-
         if self._connection is None:
             await self.connect()
 
         async def status(message: Any) -> None:
             hear(message.data)
 
+        for subject in (VIEW, NAMES):
+            await self._connection.subscribe(f"{subject}.*", cb=status)
+        try:
+            await (self._follow_acts(hear_act) if self.may_act else self._ask_for_acts(hear_act))
+        finally:
+            await self.close()
+
+    async def _follow_acts(self, hear_act: Hear) -> None:
+        """Receive the acts that are stored and all later ones."""
+        from nats.js import api
+
         async def act(message: Any) -> None:
             hear_act(message.data)
 
         js = self._connection.jetstream()
-        with contextlib.suppress(self._errors):  # it exists, or this account may only read
+        with contextlib.suppress(self._errors):  # it exists
             await js.add_stream(
-                name=_ACTS_STREAM, subjects=[f"{ACT_SUBJECT}.>"], max_msgs_per_subject=1, storage=api.StorageType.FILE
+                name=ACTS_STREAM, subjects=[f"{ACTS}.>"], max_msgs_per_subject=1, storage=api.StorageType.FILE
             )
         try:
-            await js.subscribe(f"{ACT_SUBJECT}.>", cb=act, ordered_consumer=True)
+            await js.subscribe(f"{ACTS}.>", cb=act, ordered_consumer=True)
         except self._errors as error:
             self.trouble = f"acknowledgements cannot be read: {error}"
-        for subject in (VIEW, NAMES):
-            await self._connection.subscribe(f"{subject}.*", cb=status)
-        try:
-            await asyncio.Event().wait()
-        finally:
-            await self.close()
+        await asyncio.Event().wait()
+
+    async def _ask_for_acts(self, hear_act: Hear) -> None:
+        """The same with the key of a viewer, which has no consumer: ask for the next one, again and again."""
+        from nats.js.errors import NotFoundError
+
+        js, number, reported = self._connection.jetstream(prefix=VIEW_API), 1, ""
+        while True:
+            try:
+                found = await js.get_msg(ACTS_STREAM, number, subject=f"{ACTS}.>", next=True)
+                hear_act(found.data or b"")
+                number, pause_s = found.seq + 1, 0.0
+            except NotFoundError:  # none yet
+                pause_s = _POLL_S
+            except (TimeoutError, self._errors) as error:
+                reported = f"acknowledgements cannot be read: {error or type(error).__name__}"
+                self.trouble, pause_s = self.trouble or reported, _POLL_S
+            else:
+                self.trouble = "" if self.trouble == reported else self.trouble
+            await asyncio.sleep(pause_s)
 
     async def publish(self, act: FleetAct) -> None:
         """Store an act in the log."""
+        if not self.may_act:
+            raise FleetError(
+                "view-only",
+                "this page was opened with the key of a viewer, which stores nothing in the log",
+                "open it with a key of users.fleet, and without log.access",
+            )
         levels = ".".join(map(axis_token, act.path.split("/")))
         kind = "acknowledge" if act.act == "acknowledge" else "shelf"
         try:
-            await self._connection.jetstream().publish(f"{ACT_SUBJECT}.{kind}.{levels}", act.to_bytes(), timeout=2.0)
+            await self._connection.jetstream().publish(f"{ACTS}.{kind}.{levels}", act.to_bytes(), timeout=2.0)
         except (TimeoutError, self._errors) as error:
             raise FleetError(
                 "log-unreachable",

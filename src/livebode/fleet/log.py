@@ -43,12 +43,16 @@ class StoredMessage:
 
 @dataclass(frozen=True)
 class StreamExtent:
-    """Numbers of the first and the last message of a stream, its size, and its messages by subject."""
+    """Numbers of the first and the last message of a stream, its size, and its messages by subject.
+
+    When it was created distinguishes it from another one with the same numbers, seconds since 1970.
+    """
 
     first: int
     last: int
     size_bytes: int
     subjects: Mapping[str, int]
+    created_s: float
 
 
 class FleetLog:
@@ -209,11 +213,28 @@ class FleetLog:
 
     async def following(self, stream: str, subject: str, number: int) -> int | None:
         """Number of the first message of a subject that is at least `number`."""
+        found = await self._next(stream, subject, number)
+        return None if found is None else found.number
+
+    async def first_since(self, stream: str, subject: str, at_s: float) -> int:
+        """Number from which on the messages of a subject were stored at this time or later, seconds since 1970."""
+        extent = await self.extent(stream)
+        low, high = extent.first, extent.last + 1
+        while low < high:  # between them is the first one
+            middle = (low + high) // 2
+            found = await self._next(stream, subject, middle)
+            if found is None or found.stored_s >= at_s:
+                high = middle
+            else:
+                low = found.number + 1
+        return low
+
+    async def _next(self, stream: str, subject: str, number: int) -> StoredMessage | None:
         from nats.js.errors import NotFoundError
 
-        async def get() -> int | None:
+        async def get() -> StoredMessage | None:
             try:
-                return (await self._js.get_msg(stream, number, subject=subject, next=True)).seq
+                return _stored(await self._js.get_msg(stream, number, subject=subject, next=True))
             except NotFoundError:
                 return None
 
@@ -221,8 +242,10 @@ class FleetLog:
 
     async def extent(self, stream: str, subject: str = ">") -> StreamExtent:
         """First and last number, size, and the subjects that match."""
-        state = (await self._repeated(lambda: self._js.stream_info(stream, subjects_filter=subject))).state
-        return StreamExtent(state.first_seq, state.last_seq, state.bytes, state.subjects or {})
+        info = await self._repeated(lambda: self._js.stream_info(stream, subjects_filter=subject))
+        assert info.created is not None
+        state, created_s = info.state, info.created.timestamp()
+        return StreamExtent(state.first_seq, state.last_seq, state.bytes, state.subjects or {}, created_s)
 
     async def consumer(self, stream: str, subject: str, first: int, inactive_s: float) -> Consumer:
         """A consumer of a subject from a number on, without acknowledgements, in the memory of the server."""

@@ -45,6 +45,8 @@ class ResultMessage:
         Recipe of each axis in it.
     grids
         Lines, quantity and unit of each axis in `rows`, as an entry ``found`` of run.json.
+    logged_s
+        When the log received the newest samples of each axis that are in it, seconds since 1970.
     """
 
     through: int
@@ -55,13 +57,14 @@ class ResultMessage:
     events: Sequence[Mapping[str, Any]] = ()
     recipes: Mapping[str, str] = field(default_factory=dict)
     grids: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    logged_s: Mapping[str, float] = field(default_factory=dict)
 
     def to_bytes(self) -> bytes:
         """A head with the version, and compressed together JSON and both tables as Arrow streams.
 
         All in one is much smaller than each buffer of Arrow by itself: these have a few rows.
         """
-        names = ("through", "owner", "claim", "events", "recipes", "grids")
+        names = ("through", "owner", "claim", "events", "recipes", "grids", "logged_s")
         about = json.dumps({name: getattr(self, name) for name in names}).encode()
         sink = pa.BufferOutputStream()
         sink.write(_HEAD.pack(_MAGIC, _VERSION))
@@ -104,6 +107,7 @@ class PendingResults:
         self._parameters: list[AxisFits] = []
         self._events: list[dict[str, Any]] = []
         self._recipes: dict[str, str] = {}
+        self._logged_s: dict[str, float] = {}
         self.nbytes = 0
 
     def __bool__(self) -> bool:
@@ -120,7 +124,7 @@ class PendingResults:
             self._parameters.append(AxisFits(key, stream.run, output.fitted, parameters))
             self.nbytes += parameters.value.size * _PARAMETER_BYTES
         if output.responses is not None or output.events:
-            self._recipes[key] = stream.recipe
+            self._recipes[key], self._logged_s[key] = stream.recipe, stream.log_s
 
     def add_event(self, key: str, event: Mapping[str, Any]) -> None:
         """Append an event that no message of the log causes."""
@@ -136,4 +140,5 @@ class PendingResults:
             events=self._events,
             recipes=self._recipes,
             grids={part.axis: grid_of(part.responses) for part in self._responses},
+            logged_s=self._logged_s,
         )

@@ -10,15 +10,16 @@ from urllib.parse import quote
 from livebode.core.errors import FleetError
 from livebode.fleet.page_status import NAMES, VIEW
 from livebode.fleet.settings import FleetSettings, ServerSection, UsersSection, on_loopback
-from livebode.fleet.subjects import API, EDGE, VIEW_API, axis_path
+from livebode.fleet.subjects import ACTS_STREAM, API, EDGE, STATUS_STREAM, VIEW_API, axis_path
 from livebode.sources.live.framing import FRAME_BYTES_MAX
 
 _FLEET, _VIEW = "FLEET", "VIEW"
 _CONNECTIONS_MORE, _SUBSCRIPTIONS = 4, 4
 _MESSAGE_BYTES_MAX = 2 * FRAME_BYTES_MAX
 """Of an edge: a frame with the names of the channels, and one of samples."""
-_VIEWED = ("STREAM.INFO.*", "STREAM.MSG.GET.*")
+_VIEWED = ("STREAM.INFO.*", f"STREAM.MSG.GET.{STATUS_STREAM}", f"STREAM.MSG.GET.{ACTS_STREAM}")
 """Requests of a viewer. A consumer is not one of them: it could deliver to any subject of the log's account."""
+_ONLY_ASKS = json.dumps([f"{VIEW_API}.{request}" for request in _VIEWED])
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,8 @@ class ServerAccess:
             viewed.append(f"{{stream: {{account: {_FLEET}, subject: {json.dumps(subject)}}}}}")
         text = ["accounts {", f"  {_FLEET} {{", "    jetstream: enabled", f"    {mappings}", _users(self.users.fleet)]
         text += [_list("exports", exports), "  }", f"  {_VIEW} {{", _users(self.users.view), _list("imports", viewed)]
+        # Else a viewer could publish a status of its own to the pages of other viewers.
+        text += [f"    default_permissions: {{ publish: {_ONLY_ASKS} }}"]
         for path, subjects in edges.items():
             keys, leaves = self.users.edges.get(path, ()), self.users.leaves.get(path, ())
             text += ["  }", f"  {json.dumps(_account(path))} {{", _users(keys, leaves)]

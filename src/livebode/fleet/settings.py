@@ -18,6 +18,7 @@ from livebode.configuration.toml_file import one_line, read_table
 from livebode.core import ConfigError
 from livebode.core.errors import FleetError
 from livebode.fleet.subjects import axis_key
+from livebode.locations import location
 
 PARTITIONS_MAX = 1024
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -44,7 +45,8 @@ class LogSection(_Section):
         Certificate of the authority that signed the server's certificate, in PEM, relative to this file. Default: the
         authorities that this computer trusts.
     access
-        "view" with the key of a viewer, which may read the status only; "send" for edges behind a leaf node.
+        "view" with the key of a viewer, which may read the status and the acknowledgements only; "send" for edges
+        behind a leaf node.
     size_gb
         Most data of the machines in the log, in GB; the oldest are deleted then. It must be well below the disk.
     results_gb
@@ -165,7 +167,7 @@ class UsersSection(_Section):
     fleet
         Of workers and of commands that check or replay: everything.
     view
-        Of viewers: the status.
+        Of viewers: the status and the acknowledgements.
     edges
         Of edges, by the path of their axes: "Graz" may send those of a site, "Graz/2/press 4/x" one axis.
     leaves
@@ -193,6 +195,44 @@ class EdgeSection(_Section):
     buffer_gb: Positive = 2.0
 
 
+class SinkSection(_Section):
+    """[sink]: what `livebode fleet sink` stores of the results, and for how long.
+
+    Parameters
+    ----------
+    lake
+        Directory, relative to this file, or URL of the lake, such as "s3://plant/lake".
+    full_rate_days
+        How long every response and every fit is retained.
+    minute_days
+        How long means over a minute are retained. Those over an hour, events and raw data around alarms remain.
+    commit_s
+        Longest time from reading a result until it is in the lake: a short one gives many small files.
+    """
+
+    lake: Annotated[str, Field(min_length=1)] | None = None
+    full_rate_days: Positive = 7.0
+    minute_days: Positive = 730.0
+    commit_s: Positive = 60.0
+
+    @property
+    def url(self) -> str:
+        """The lake; ConfigError if it is missing."""
+        if self.lake is None:
+            raise ConfigError(
+                "key-missing",
+                "'sink.lake' is missing",
+                'add [sink] with lake = "DIRECTORY" or a URL such as "s3://plant/lake"',
+                key="sink.lake",
+            )
+        return self.lake
+
+    def beside(self, folder: Path) -> SinkSection:
+        """With a path of the lake relative to a folder."""
+        place = None if self.lake is None else location(self.lake)
+        return self.model_copy(update={"lake": str(folder / place)}) if isinstance(place, Path) else self
+
+
 class FleetSettings(_Section):
     """A fleet.
 
@@ -211,6 +251,7 @@ class FleetSettings(_Section):
     workers: Annotated[int, Field(ge=1, le=256)] = 2
     log: LogSection = LogSection()
     edge: EdgeSection = EdgeSection()
+    sink: SinkSection = SinkSection()
     server: ServerSection = ServerSection()
     leaf: LeafSection | None = None
     users: UsersSection = UsersSection()
@@ -247,6 +288,7 @@ class FleetSettings(_Section):
                 "leaf": leaf,
                 "axes": [str(folder / pattern) for pattern in self.axes],
                 "edge": edge,
+                "sink": self.sink.beside(folder),
                 "log": self.log.beside(folder),
                 "server": _beside(self.server, folder, "certificate", "key", "authority"),
             }

@@ -9,9 +9,10 @@ from livebode.configuration.machine_section import MachineSection
 
 LEVELS: Final = 4
 """Site, line, machine, axis."""
-EDGE, LOG, RESULTS, STATES, STATUS = "edge", "in", "res", "state", "status"
-"""First tokens: what an edge publishes, the same after the server's mapping, results, states, and the status."""
-LOG_STREAM, RESULT_STREAM, STATE_STREAM, STATUS_STREAM = "LOG", "RESULTS", "STATES", "STATUS"
+EDGE, LOG, RESULTS, STATES, STATUS, ACTS = "edge", "in", "res", "state", "status", "act"
+"""First tokens: what an edge publishes, the same after the server's mapping, results, states, the status, and what
+persons do with alarms: act.KIND.AXIS."""
+LOG_STREAM, RESULT_STREAM, STATE_STREAM, STATUS_STREAM, ACTS_STREAM = "LOG", "RESULTS", "STATES", "STATUS", "ACTS"
 API: Final = "$JS.API"
 VIEW_API: Final = "viewer"
 """First tokens of requests to JetStream: its own, and those of a viewer."""
@@ -27,13 +28,22 @@ def axis_key(machine: MachineSection) -> str:
     return ".".join(axis_token(name) for name in (machine.site, machine.line, machine.machine, machine.axis))
 
 
+def axis_names(key: str) -> list[str | None]:
+    """The names of the levels, from the four tokens.
+
+    >>> axis_names("Ulm%202._.press%2E4.x")
+    ['Ulm 2', None, 'press.4', 'x']
+    """
+    return [None if token == _EMPTY else unquote(token) for token in key.split(".")]
+
+
 def axis_path(key: str) -> str:
     """The path of a machine as a person reads it, from its four tokens.
 
     >>> axis_path("Ulm%202._.press%2E4.x")
     'Ulm 2/press.4/x'
     """
-    return "/".join(unquote(token) for token in key.split(".") if token != _EMPTY)
+    return "/".join(name for name in axis_names(key) if name)
 
 
 def key_of(subject: str) -> str:

@@ -33,14 +33,14 @@ def compact(lake: Lake) -> list[Compacted]:
     """Join small files of each table, and remove files older than a week that are not in it.
 
     A file in a table that was replaced, and a file that a process wrote before it was killed, remain for a week: a
-    reader may use the first, and a running archive may still commit the second.
+    reader may use the first, and a running archive may still commit the second. `livebode fleet sink` joins its own.
 
     Raises
     ------
     ArchiveError
         If a table cannot be read or written.
     """
-    return [found for name in TABLES if (found := _compacted(lake, name)) is not None]
+    return [found for name, one in TABLES.items() if not one.days and (found := _compacted(lake, name)) is not None]
 
 
 def _compacted(lake: Lake, name: str) -> Compacted | None:

@@ -1,7 +1,6 @@
 """The columns of the tables of a lake.
 
-A result belongs to a content (SHA-256 of the recording's bytes) and a recipe (id of the settings). Lists have the item
-name of Delta, "element".
+A result belongs to a content (SHA-256 of the recording's bytes) and a recipe (id of the settings).
 """
 
 from __future__ import annotations
@@ -11,38 +10,28 @@ from dataclasses import dataclass
 
 import pyarrow as pa
 
+from livebode.lake.columns import LEVELS, MACHINE, TIME, in_delta, list_of
+from livebode.lake.fleet_schemas import FLEET_SAMPLES, FLEET_SCHEMAS
 from livebode.records import parameter_table
 from livebode.records.wide_responses import wide_schema
 
-_TIME = pa.timestamp("us", tz="UTC")
 _KEY = [("content", pa.string()), ("recipe", pa.string())]
-_MACHINE = [(level, pa.string()) for level in ("site", "line", "machine", "axis")]
-
-
-def _list(kind: pa.DataType) -> pa.DataType:
-    return pa.list_(pa.field("element", kind))
-
-
-def _in_delta(kind: pa.DataType) -> pa.DataType:
-    """The type in Delta, whose lists have any length."""
-    return _list(kind.value_type) if pa.types.is_fixed_size_list(kind) else kind
-
 
 RUNS = pa.schema(
     [
         *_KEY,
-        *_MACHINE,
+        *MACHINE,
         ("url", pa.string()),
-        ("recorded_from", _TIME),
-        ("recorded_to", _TIME),
+        ("recorded_from", TIME),
+        ("recorded_to", TIME),
         ("clock", pa.string()),
         ("duration_s", pa.float64()),
         ("rate_hz", pa.float64()),
         ("window", pa.int64()),
         ("quantity", pa.string()),
         ("unit", pa.string()),
-        ("frequencies_hz", _list(pa.float64())),
-        ("quiet_bins", _list(pa.int64())),
+        ("frequencies_hz", list_of(pa.float64())),
+        ("quiet_bins", list_of(pa.int64())),
         ("responses", pa.int64()),
         ("parameters", pa.int64()),
         ("events", pa.int64()),
@@ -55,15 +44,15 @@ RUNS = pa.schema(
 """One row for each result, which is written last: a result without it does not count."""
 
 FILES = pa.schema(
-    [("url", pa.string()), ("size_bytes", pa.int64()), ("version", pa.string()), ("content", pa.string()), *_MACHINE]
+    [("url", pa.string()), ("size_bytes", pa.int64()), ("version", pa.string()), ("content", pa.string()), *MACHINE]
 )
 """One row for each place where a content was found; the version of a file changes with its content."""
 
 QUANTITIES = pa.schema(
     [
         *_KEY,
-        *_MACHINE,
-        ("recorded_from", _TIME),
+        *MACHINE,
+        ("recorded_from", TIME),
         ("model", pa.string()),
         ("name", pa.string()),
         ("unit", pa.string()),
@@ -78,7 +67,7 @@ QUANTITIES = pa.schema(
 )
 """One row for each run and quantity: what a trend reads. The covariates are means over the run."""
 
-RESPONSES = pa.schema([*_KEY, *((field.name, _in_delta(field.type)) for field in wide_schema(1))])
+RESPONSES = pa.schema([*_KEY, *((field.name, in_delta(field.type)) for field in wide_schema(1))])
 """One row for each response, in wide form; the lists have a value for each of the run's frequencies_hz."""
 
 PARAMETERS = pa.schema([*_KEY, *((field.name, field.type) for field in parameter_table.SCHEMA)])
@@ -100,7 +89,7 @@ QUARANTINE = pa.schema(
     [
         *_KEY,
         ("url", pa.string()),
-        *_MACHINE,
+        *MACHINE,
         ("code", pa.string()),
         ("sentence", pa.string()),
         ("livebode", pa.string()),
@@ -111,10 +100,14 @@ QUARANTINE = pa.schema(
 
 @dataclass(frozen=True)
 class LakeTable:
-    """The columns of a table, and those by which two rows are the same; none if each result has a file of its own."""
+    """The columns of a table, and those by which two rows are the same; none if each result has a file of its own.
+
+    The rows of one that is divided by `days` come from a stream, and its commits contain the position there.
+    """
 
     schema: pa.Schema
     key: tuple[str, ...] = ()
+    days: bool = False
 
 
 TABLES: Mapping[str, LakeTable] = {
@@ -125,4 +118,6 @@ TABLES: Mapping[str, LakeTable] = {
     "parameters": LakeTable(PARAMETERS),
     "events": LakeTable(EVENTS),
     "quarantine": LakeTable(QUARANTINE, ("content", "recipe", "livebode")),
+    "fleet_samples": LakeTable(FLEET_SAMPLES, ("log", *LEVELS, "kind", "logged")),
+    **{name: LakeTable(schema, days=True) for name, schema in FLEET_SCHEMAS.items()},
 }

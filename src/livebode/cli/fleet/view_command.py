@@ -70,7 +70,7 @@ def _feed(fleet: Path | None, demo: int | None) -> StatusFeed:
     from livebode.fleet.settings import FleetSettings
 
     log = FleetSettings.read(fleet).log
-    feed = NatsFeed(log.url, fleet.stem, **security(log))
+    feed = NatsFeed(log.url, fleet.stem, may_act=log.access != "view", **security(log))
     asyncio.run(_tried(feed))
     return feed
 

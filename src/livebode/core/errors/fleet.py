@@ -43,4 +43,5 @@ class FleetError(LivebodeError):
         "server-missing": "The program nats-server is not installed.",
         "server-open": "The server of the log would be open to a network without TLS or keys.",
         "servers-missing": "The log is to have more copies than there are servers.",
+        "view-only": "The key of this user may read the log, and store nothing there.",
     }
