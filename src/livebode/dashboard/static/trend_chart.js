@@ -144,18 +144,23 @@ export class TrendChart {
     this.title.replaceChildren(text, element("span", {}, tr("last: {value}", { value: now })));
     this.card.dataset.name = model ? `${model}/${name}` : name;
     const [from, to] = [points[0], last].map((point) => (point ? dateTime(point.at) : "–"));
-    const about = tr("{quantity}, {count} runs from {from} to {to}; last: {value}", {
-      quantity: text,
-      count: points.length,
-      from,
-      to,
-      value: now,
-    });
-    this.plot.setAttribute("aria-label", about);
+    this.plot.setAttribute("aria-label", this.about({ quantity: text, count: points.length, from, to, value: now }));
     this.made ??= this.build();
     this.made.setData([points.map(({ at }) => at), points.map(({ value }) => value)]);
     this.read();
   }
+
+  /** @param {Record<"quantity" | "from" | "to" | "value", string> & {count: number}} facts */
+  about(facts) {
+    return tr("{quantity}, {count} runs from {from} to {to}; last: {value}", facts);
+  }
+
+  /**
+   * What is drawn below the points.
+   *
+   * @param {Chart} _u
+   */
+  ground(_u) {}
 
   /** @param {Chart} u */
   paint(u) {
@@ -164,6 +169,7 @@ export class TrendChart {
     ctx.beginPath();
     ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
     ctx.clip();
+    this.ground(u);
     const scale = devicePixelRatio;
     ctx.lineWidth = scale;
     ctx.strokeStyle = colour("baseline");
