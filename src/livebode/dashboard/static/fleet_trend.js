@@ -6,7 +6,7 @@ import { reason } from "./link.js";
 import { element } from "./make.js";
 import { recognised } from "./recognition.js";
 import { json } from "./runs_feed.js";
-import { dateTime, quantity as words } from "./runs_words.js";
+import { day, quantity as words } from "./runs_words.js";
 import { afterNumber, pair, signed } from "./words.js";
 
 /** @import { Range } from "./chart.js" */
@@ -136,7 +136,7 @@ function said(answer) {
   const found =
     answer.state === "shown"
       ? slope(answer)
-      : [tr("The lake has no value of this axis in the last year. It needs a fitted model, and livebode fleet sink.")];
+      : [tr("The lake has no value of this axis in the last year: fit a model, and run livebode fleet sink.")];
   if (answer.stopped) found.push(tr("The lake answers slowly: earlier values were not read."));
   return found.join(" ");
 }
@@ -150,8 +150,8 @@ function slope({ trend, days, days_min: least, quantities, chosen, points }) {
       percent = trend.percent === null ? "" : ` (${signed(trend.percent * trend.per_month, 2)}\u00a0%)`;
     found.push(
       Math.abs(trend.per_month) > trend.bound_95
-        ? tr("Since {time} it changes by {change} a month{percent}.", {
-            time: dateTime(trend.since_s),
+        ? tr("Since {date} it changes by {change} a month{percent}.", {
+            date: day(trend.since_s),
             change,
             percent,
           })
@@ -162,6 +162,6 @@ function slope({ trend, days, days_min: least, quantities, chosen, points }) {
       tr("A trend needs values on {least} days, over four weeks at least; there are {days}.", { least, days }),
     );
   if (points.some((point) => point[5]))
-    found.push(tr("Hollow points: computed with other settings, and not part of the trend."));
+    found.push(tr("Hollow or grey points: computed with other settings, and not part of the trend."));
   return found;
 }

@@ -3,16 +3,20 @@
 import { tr } from "./language.js";
 import { bounded, dateTime } from "./runs_words.js";
 import { colour } from "./theme.js";
-import { TrendChart } from "./trend_chart.js";
+import { dot, stroke, TrendChart } from "./trend_chart.js";
 import { plain } from "./words.js";
 
 /** @import { Chart, Range } from "./chart.js" */
+/** @import { Point } from "./trends_data.js" */
 /** @typedef {[at: number, value: number, bound: number]} LinePoint */
+
+const ROOM_PX = 5; // of a point with its bars
 
 export class AxisTrendChart extends TrendChart {
   /** @type {LinePoint[]} the trend; empty without one */
   line = [];
   zoomed = false;
+  crowded = false;
 
   /**
    * @param {HTMLElement} host
@@ -28,7 +32,28 @@ export class AxisTrendChart extends TrendChart {
   }
 
   /** @override @param {Chart} u */
-  ground(u) {
+  paint(u) {
+    this.crowded = ROOM_PX * this.inside.length > u.width;
+    super.paint(u);
+  }
+
+  // Bars of points that are close would cover each other, and the trend.
+  /** @override @param {Chart} u @param {Point} point @param {boolean} chosen */
+  point(u, point, chosen) {
+    if (chosen || !this.crowded) {
+      super.point(u, point, chosen);
+      return;
+    }
+    const { at, value, bound, written } = point;
+    u.ctx.lineWidth = devicePixelRatio;
+    u.ctx.strokeStyle = colour("band");
+    stroke(u, at, value - bound, value + bound);
+    u.ctx.fillStyle = colour(written ? "muted" : "measured");
+    dot(u, at, value, 1.2);
+  }
+
+  /** @override @param {Chart} u */
+  finish(u) {
     const { ctx } = u,
       { line } = this;
     if (!line.length) return;
