@@ -26,13 +26,13 @@ def write_year(place: Path, path: str, stiffness: float, *, days: int = 365, tie
     stiffness
         At the end, N/m.
     days
-        How long, but for a standstill of two weeks.
+        How long; without each seventh day, and a standstill of two weeks.
     tier
         Which means.
     """
     now, rng = datetime.now(UTC).replace(minute=0, second=0, microsecond=0), np.random.default_rng(7)
     hours = [now - timedelta(hours=hour) for hour in range(24 * days, 0, -1)]
-    working = [at for at in hours if at.weekday() < 6 and not 150 < (now - at).days < 164]
+    working = [at for at in hours if (now - at).days % 7 != 6 and not 150 < (now - at).days < 164]
     month = np.array([(now - at).total_seconds() for at in working]) / (365.25 / 12 * 86400)
     day = rng.normal(0, 0.002, days + 2)[np.array([(now - at).days for at in working], np.intp)]
     level = stiffness * (1 + LOST_A_MONTH * month + day + rng.normal(0, 0.0015, len(month)))

@@ -28,6 +28,7 @@ export class AxisDialog {
     this.acts = acts;
     this.onPath = onPath;
     this.dialog.addEventListener("close", () => {
+      if (this.dialog.open) return; // for another axis, before this event came
       this.path = "";
       this.trend.close();
       feed.watch({ axis: null });

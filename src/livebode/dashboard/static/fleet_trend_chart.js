@@ -83,7 +83,7 @@ export class AxisTrendChart extends TrendChart {
     const { at, value, bound, low, high, written } = point;
     const within = tr("90 %: {low} … {high}", { low: plain(low), high: plain(high) });
     const text = `${dateTime(at)}: ${bounded(value, bound, this.quantity.unit)} (${within})`;
-    this.readout.textContent = written ? `${text} · ${tr("other settings")}` : text;
+    this.readout.textContent = written ? [text, tr("other settings")].join(" · ") : text;
   }
 
   // Escape closes the dialog, unless there is a part of the year to leave.
