@@ -14,7 +14,6 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from examples.screenshots.fleet_year import write_year
 from examples.screenshots.machines import Afterwards, Tracked, at_standstill, healthy
 from livebode.core import Lines
 from livebode.dashboard import Dashboard, Serving
@@ -22,6 +21,7 @@ from livebode.monitoring import Baseline
 from livebode.runtime import Destination
 from livebode.runtime.demo import RATE_HZ, demo, demo_baseline, demo_settings
 from livebode.runtime.documents import ClockSet
+from tools.fleet_year import write_year
 from tools.run_copies import copy_run
 
 SECONDS, MOMENT_S = 40.0, 25.7

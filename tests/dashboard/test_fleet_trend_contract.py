@@ -16,7 +16,6 @@ import pyarrow as pa
 import pytest
 from playwright.sync_api import Browser
 
-from examples.screenshots.fleet_year import LOST_A_MONTH, write_year
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.fleet_demo import DemoFeed, DemoFleet
 from livebode.dashboard.fleet_trend import POINTS_MAX
@@ -27,6 +26,7 @@ from tests.support.axe import violations, with_axe
 from tests.support.browser import Tab
 from tests.support.fleet_pages import fleet_page
 from tests.support.guarded import TOKEN, VIEWER
+from tools.fleet_year import LOST_A_MONTH, write_year
 
 STIFFNESS = 1.3e6
 FLEET = DemoFleet(12)

@@ -25,6 +25,8 @@ from livebode.locations import delta_options, location, read_bytes, write_whole
 
 _FILE_BYTES_MIN, _FILE_BYTES_MAX = 32 << 20, 128 << 20
 """Smaller files of a day are joined, up to the larger size together."""
+_GROUP_ROWS = 1 << 16
+"""Who reads one axis of a joined file decodes as many rows at least."""
 _READERS_HOURS = 24
 """A file that is not in the table any more remains so long for those who read an older version."""
 _ORDER = ("site", "line", "machine", "axis", "log", "run", "model", "name", "logged", "logged_from", "number")
@@ -174,7 +176,7 @@ class StreamTable:
             own = rows.filter(pc.equal(rows["day"], pa.scalar(day, pa.date32())))
             buffer = pa.BufferOutputStream()
             with parquet_writer(buffer, self.schema) as writer:
-                writer.write_table(own.cast(self.schema))
+                writer.write_table(own.cast(self.schema), row_group_size=_GROUP_ROWS)
             data = buffer.getvalue().to_pybytes()
             name = f"{day}-{hashlib.sha256(data).hexdigest()}.parquet"
             write_whole(self._place / name, data)
