@@ -129,17 +129,19 @@ def test_only_axes_of_the_fleet_are_shown_and_only_to_those_who_may(page: Page) 
 
 
 def test_without_a_usable_lake_one_sentence_says_why(tmp_path: Path) -> None:
-    (tmp_path / "lake" / "fleet_parameters_hour" / "_delta_log").mkdir(parents=True)
-    (tmp_path / "lake" / "fleet_parameters_hour" / "_delta_log" / f"{0:020}.json").write_text("damaged")
     for place, expected in (("", "no lake"), (str(tmp_path / "nothing"), "no values")):
-        one = Page(place)
-        with one.dashboard:
+        with (one := Page(place)).dashboard:
             assert one.trend(OWN)[1]["state"] == expected
-    one = Page(str(tmp_path / "lake"))
-    with one.dashboard:
-        status, answer = one.trend(OWN)
-        assert status == 400
-        assert "the table fleet_parameters_hour of the lake" in answer["error"]
+    write_year(tmp_path / "data", OWN, STIFFNESS, days=1)
+    (tmp_path / "log" / "fleet_parameters_hour" / "_delta_log").mkdir(parents=True)
+    (tmp_path / "log" / "fleet_parameters_hour" / "_delta_log" / f"{0:020}.json").write_text("damaged")
+    for file in (tmp_path / "data" / "fleet_parameters_hour").glob("*.parquet"):
+        file.write_bytes(b"damaged" * 100)
+    for name in ("log", "data"):
+        with (one := Page(str(tmp_path / name))).dashboard:
+            status, answer = one.trend(OWN)
+            assert status == 400, name
+            assert "the table fleet_parameters_hour of the lake" in answer["error"]
 
 
 def test_a_person_reads_the_year_with_mouse_and_keys(browser: Browser, lake: Path) -> None:
