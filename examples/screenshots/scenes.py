@@ -7,10 +7,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 from playwright.sync_api import Page
 
-from examples.screenshots.studio import DESK, HALL, LANDSCAPE, MOMENT_S, PHONE, Studio, picture
+from examples.screenshots.studio import AXIS, DESK, HALL, LANDSCAPE, MOMENT_S, PHONE, Studio, picture
 from livebode.core import Event, Lines
 from livebode.dashboard import Dashboard, Serving
 from livebode.runtime.demo import RATE_HZ
@@ -266,6 +267,28 @@ def fleet_axis(studio: Studio) -> bytes:
     page = _fleet(studio, "#list=alarms")
     page.locator("#events .state").first.click()
     return picture(page)
+
+
+def _year(studio: Studio, **options: Any) -> bytes:
+    page = _fleet(studio, "#" + urlencode({"axis": AXIS}), **options)
+    page.locator("#axis-trend .u-over").wait_for()
+    page.locator("#axis-trend .said").scroll_into_view_if_needed()
+    return picture(page)
+
+
+@scene
+def fleet_year(studio: Studio) -> bytes:
+    return _year(studio, color_scheme="light")
+
+
+@scene
+def fleet_year_dark(studio: Studio) -> bytes:
+    return _year(studio, color_scheme="dark")
+
+
+@scene
+def fleet_year_phone(studio: Studio) -> bytes:
+    return _year(studio, size=PHONE, color_scheme="light", **MOBILE)
 
 
 @scene

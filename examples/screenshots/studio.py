@@ -21,6 +21,7 @@ from livebode.monitoring import Baseline
 from livebode.runtime import Destination
 from livebode.runtime.demo import RATE_HZ, demo, demo_baseline, demo_settings
 from livebode.runtime.documents import ClockSet
+from tools.fleet_year import write_year
 from tools.run_copies import copy_run
 
 SECONDS, MOMENT_S = 40.0, 25.7
@@ -28,6 +29,7 @@ DESK, PHONE, LANDSCAPE, HALL = (1440, 900), (390, 844), (844, 390), (1920, 1080)
 BEGUN, DAY_S = 1_760_000_000.0, 86400.0
 DRAWN = "() => window.livebode?.bode.curves.measured && livebode.tracking.made.data[0].length"
 _PLAN = Path(__file__).with_name("hall.svg")
+AXIS = "Brno/body/gantry 1/x"
 _DRAW_MS = 1500  # the page draws its map every 600 ms
 
 
@@ -119,14 +121,17 @@ class Studio(ExitStack):
 
     @cached_property
     def fleet_url(self) -> str:
-        """A simulated fleet with a floor plan; one of its partitions has no worker."""
+        """A simulated fleet with a floor plan, and a year of AXIS; one of its partitions has no worker."""
         from livebode.dashboard.fleet_demo import DemoFeed, DemoFleet
         from livebode.dashboard.fleet_view import FleetView
         from livebode.dashboard.floor_plan import floor_plan
 
-        feed = DemoFeed(DemoFleet(10_000), silent=[3], began_s=time.time() - 150)
+        fleet, lake = DemoFleet(10_000), self.folder / "lake"
+        feed = DemoFeed(fleet, silent=[3], began_s=time.time() - 150)
+        status = fleet.status(150.0, time.time())
+        write_year(lake, AXIS, float(status["value"][fleet.paths.index(AXIS)]))
         dashboard = Dashboard(Serving("127.0.0.1", 0))
-        dashboard.view_fleet(FleetView(feed, floor_plan(_PLAN)))
+        dashboard.view_fleet(FleetView(feed, floor_plan(_PLAN), lake=str(lake)))
         return self.enter_context(dashboard).url
 
     def page(

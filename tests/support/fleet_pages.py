@@ -74,10 +74,12 @@ def expected_looks(status: np.ndarray) -> list[int]:
 
 
 @contextmanager
-def fleet_page(axes: int, after_s: float = 130.0, plan: str | None = None) -> Iterator[tuple[str, DrivenFeed]]:
+def fleet_page(
+    axes: int, after_s: float = 130.0, plan: str | None = None, lake: str = ""
+) -> Iterator[tuple[str, DrivenFeed]]:
     """Address and feed of a page that is served."""
     feed = DrivenFeed(DemoFleet(axes), after_s)
     dashboard = Dashboard(Serving("127.0.0.1", 0))
-    dashboard.view_fleet(FleetView(feed, plan))
+    dashboard.view_fleet(FleetView(feed, plan, lake=lake))
     with dashboard:
         yield dashboard.url, feed

@@ -16,7 +16,9 @@ from livebode.dashboard.admission import serve_browser
 from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
 from livebode.dashboard.fleet_client import FleetClient
+from livebode.dashboard.fleet_trend import AxisTrends
 from livebode.dashboard.fleet_view import FleetView
+from livebode.records import to_json
 
 Order = Callable[[Request], Awaitable[bytes | Response]]
 
@@ -39,6 +41,7 @@ class FleetPages:
     def __init__(self, view: FleetView, board: Board, file: Callable[[str], Response], order: Order) -> None:
         self._view, self._board, self._file, self._order = view, board, file, order
         self._paths: tuple[int, bytes] = -1, b""
+        self._trends = AxisTrends(view.lake)
 
     @property
     def routes(self) -> list[BaseRoute]:
@@ -47,6 +50,7 @@ class FleetPages:
             Route("/", self.page),
             Route("/api/axes", self.axes),
             Route("/api/plan", self.plan),
+            Route("/api/trend", self.trend),
             Route("/api/acknowledge", self.acknowledge, methods=["POST"]),
             Route("/api/shelve", self.shelve, methods=["POST"]),
             Route("/api/unshelve", self.unshelve, methods=["POST"]),
@@ -73,6 +77,16 @@ class FleetPages:
         if self._view.plan is None:
             return JSONResponse({"error": "there is no floor plan"}, 404)
         return Response(self._view.plan, media_type="image/svg+xml")
+
+    async def trend(self, request: Request) -> Response:
+        """A quantity of an axis of this fleet over the last year."""
+        if self._role(request) is None:
+            return _unknown()
+        path, axes = request.query_params.get("axis", ""), self._view.board.axes
+        if (row := axes.row(path)) is None:
+            raise ServerError("request-malformed", "the fleet has no such axis", "reload the page")
+        asked = path, request.query_params.get("quantity", ""), axes.names[row].parameter
+        return Response(to_json(await self._board.elsewhere(self._trends.plain, *asked)), media_type="application/json")
 
     async def acknowledge(self, request: Request) -> Response:
         return await self._act(request, "acknowledge")

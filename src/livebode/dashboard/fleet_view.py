@@ -31,11 +31,14 @@ class FleetView:
         SVG of a floor plan; None without one.
     trends
         Address of a page of trends, to which "#axis=PATH" is appended; empty without one.
+    lake
+        Directory or URL of the lake with the results of the fleet; empty without one.
     """
 
     feed: StatusFeed
     plan: str | None = None
     trends: str = ""
+    lake: str = ""
     board: FleetBoard = field(default_factory=FleetBoard)
     pulse: Pulse = field(default_factory=Pulse)
     browsers: int = 0

@@ -243,7 +243,7 @@ class Lake:
         """Within, an error of a table is an ArchiveError that names it."""
         try:
             yield
-        except (DeltaError, OSError) as error:
+        except (DeltaError, OSError, pa.ArrowInvalid) as error:  # the last one of a damaged file
             raise ArchiveError(
                 "lake-unusable",
                 f"the table {name} of the lake {self.url!r} cannot be used: {str(error).splitlines()[0]}",

@@ -25,6 +25,8 @@ from livebode.locations import delta_options, location, read_bytes, write_whole
 
 _FILE_BYTES_MIN, _FILE_BYTES_MAX = 32 << 20, 128 << 20
 """Smaller files of a day are joined, up to the larger size together."""
+_GROUP_ROWS = 1 << 16
+"""Who reads one axis of a joined file decodes as many rows at least."""
 _READERS_HOURS = 24
 """A file that is not in the table any more remains so long for those who read an older version."""
 _ORDER = ("site", "line", "machine", "axis", "log", "run", "model", "name", "logged", "logged_from", "number")
@@ -116,6 +118,20 @@ class StreamTable:
             parts = [self._part(file, columns, where) for file in _files(table) if file.day >= since]
             return pa.concat_tables([self.schema.empty_table().select(columns), *parts])
 
+    def newest_first(self, columns: list[str], where: pc.Expression, since: date) -> Iterator[pa.Table]:
+        """The same file by file from the newest day on, so that a reader with little time may stop.
+
+        Raises
+        ------
+        ArchiveError
+            If the table cannot be read.
+        """
+        with self._lake.reported(self.name):
+            table = self._lake.opened(self.name)
+            files = [] if table is None else [file for file in _files(table) if file.day >= since]
+            for file in sorted(files, key=lambda file: file.day, reverse=True):
+                yield self._part(file, columns, where)
+
     def delete_before(self, day: date) -> int:
         """Remove the rows of earlier days, and return the number of their files."""
         with self._lake.reported(self.name):
@@ -149,8 +165,10 @@ class StreamTable:
             return len(table.vacuum(_READERS_HOURS, dry_run=False, enforce_retention_duration=False, full=True))
 
     def _part(self, file: _File, columns: list[str], where: pc.Expression | None) -> pa.Table:
-        source = pa.BufferReader(read_bytes(self._place / file.name))
-        return pq.read_table(source, columns=columns, filters=where, schema=self.schema)
+        place = self._place / file.name
+        # Of a file here only the columns and the groups of rows that may match are read.
+        source = place if isinstance(place, Path) else pa.BufferReader(read_bytes(place))
+        return pq.read_table(source, columns=columns, filters=where, schema=self.schema, partitioning=None)
 
     def _written(self, rows: pa.Table) -> Iterator[_File]:
         """Write the rows of each day to a file."""
@@ -158,7 +176,7 @@ class StreamTable:
             own = rows.filter(pc.equal(rows["day"], pa.scalar(day, pa.date32())))
             buffer = pa.BufferOutputStream()
             with parquet_writer(buffer, self.schema) as writer:
-                writer.write_table(own.cast(self.schema))
+                writer.write_table(own.cast(self.schema), row_group_size=_GROUP_ROWS)
             data = buffer.getvalue().to_pybytes()
             name = f"{day}-{hashlib.sha256(data).hexdigest()}.parquet"
             write_whole(self._place / name, data)

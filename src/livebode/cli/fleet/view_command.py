@@ -54,25 +54,30 @@ def view_command(
     from livebode.dashboard.floor_plan import floor_plan
 
     drawing = None if plan is None else floor_plan(plan)
-    dashboard.view_fleet(FleetView(_feed(fleet, demo), drawing, trends))
+    feed, lake = _demo(demo or 1) if fleet is None else _log(fleet)
+    dashboard.view_fleet(FleetView(feed, drawing, trends, lake))
     with dashboard:
         print_line(f"the fleet is at {dashboard.url}")
         wait_for_the_end()
 
 
-def _feed(fleet: Path | None, demo: int | None) -> StatusFeed:
-    if fleet is None:
-        from livebode.dashboard.fleet_demo import DemoFeed, DemoFleet
+def _demo(axes: int) -> tuple[StatusFeed, str]:
+    from livebode.dashboard.fleet_demo import DemoFeed, DemoFleet
 
-        return DemoFeed(DemoFleet(demo or 1))
+    return DemoFeed(DemoFleet(axes)), ""
+
+
+def _log(fleet: Path) -> tuple[StatusFeed, str]:
+    """The feed of a log, and its lake."""
     from livebode.dashboard.fleet_feed import NatsFeed
     from livebode.fleet.connecting import security
     from livebode.fleet.settings import FleetSettings
 
-    log = FleetSettings.read(fleet).log
+    settings = FleetSettings.read(fleet)
+    log = settings.log
     feed = NatsFeed(log.url, fleet.stem, may_act=log.access != "view", **security(log))
     asyncio.run(_tried(feed))
-    return feed
+    return feed, settings.sink.lake or ""
 
 
 async def _tried(feed: StatusFeed) -> None:

@@ -1,6 +1,7 @@
 // @ts-check
 // The dialog of one axis: its values, its alarm, and links to its own pages.
 import { chip, persons } from "./fleet_acts.js";
+import { AxisTrend } from "./fleet_trend.js";
 import { kindWords, LOOKS, since, span, thousands, value } from "./fleet_words.js";
 import { tr } from "./language.js";
 import { byId as $, element } from "./make.js";
@@ -14,6 +15,7 @@ const ALARMS = ["alarm", "returned", "acknowledged", "shelved"];
 
 export class AxisDialog {
   dialog = $("axis", HTMLDialogElement);
+  trend = new AxisTrend($("axis-trend"));
   shown = "";
 
   /**
@@ -26,7 +28,9 @@ export class AxisDialog {
     this.acts = acts;
     this.onPath = onPath;
     this.dialog.addEventListener("close", () => {
+      if (this.dialog.open) return; // for another axis, before this event came
       this.path = "";
+      this.trend.close();
       feed.watch({ axis: null });
       onPath("");
     });
@@ -46,6 +50,7 @@ export class AxisDialog {
     this.buttons([]);
     this.feed.watch({ axis });
     this.onPath(this.path);
+    this.trend.open(this.path);
     if (!this.dialog.open) this.dialog.showModal();
   }
 

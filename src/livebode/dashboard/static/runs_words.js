@@ -15,6 +15,7 @@ const DATE = new Intl.DateTimeFormat(LOCALE, {
   minute: "2-digit",
   hourCycle: "h23",
 });
+const DAY = new Intl.DateTimeFormat(LOCALE, { year: "numeric", month: "2-digit", day: "2-digit" });
 const ZONE = new Intl.DateTimeFormat(language.code === "en" ? "en-GB" : language.code, { timeZoneName: "short" });
 
 /**
@@ -27,6 +28,9 @@ export function dateTime(unixS) {
   const zone = ZONE.formatToParts(date).find(({ type }) => type === "timeZoneName")?.value ?? "";
   return `${DATE.format(date).replace(",", "")} ${zone}`;
 }
+
+/** @param {number} unixS */
+export const day = (unixS) => DAY.format(new Date(1000 * unixS));
 
 /** @param {RunRow} run */
 export function began(run) {

@@ -68,7 +68,7 @@ export class TrendChart {
     const made = chart(
       this.plot,
       {
-        padding: [6, 8, 0, 0],
+        padding: [6, 24, 0, 0],
         scales: { x: { time: true, range: () => this.range }, y: { range: () => this.reach() } },
         axes: [
           axis("", { size: 20, space: 74, values: (_u, splits, _i, _space, step) => dateTicks(splits, step) }),
@@ -144,18 +144,23 @@ export class TrendChart {
     this.title.replaceChildren(text, element("span", {}, tr("last: {value}", { value: now })));
     this.card.dataset.name = model ? `${model}/${name}` : name;
     const [from, to] = [points[0], last].map((point) => (point ? dateTime(point.at) : "–"));
-    const about = tr("{quantity}, {count} runs from {from} to {to}; last: {value}", {
-      quantity: text,
-      count: points.length,
-      from,
-      to,
-      value: now,
-    });
-    this.plot.setAttribute("aria-label", about);
+    this.plot.setAttribute("aria-label", this.about({ quantity: text, count: points.length, from, to, value: now }));
     this.made ??= this.build();
     this.made.setData([points.map(({ at }) => at), points.map(({ value }) => value)]);
     this.read();
   }
+
+  /** @param {Record<"quantity" | "from" | "to" | "value", string> & {count: number}} facts */
+  about(facts) {
+    return tr("{quantity}, {count} runs from {from} to {to}; last: {value}", facts);
+  }
+
+  /**
+   * What is drawn above the points.
+   *
+   * @param {Chart} _u
+   */
+  finish(_u) {}
 
   /** @param {Chart} u */
   paint(u) {
@@ -178,6 +183,7 @@ export class TrendChart {
     ctx.fillStyle = colour("muted");
     for (const detail of this.details) for (const [i, at] of detail.at.entries()) dot(u, at, detail.value[i], 1.2);
     for (const [i, point] of this.quantity.points.entries()) this.point(u, point, i === this.at);
+    this.finish(u);
     ctx.restore();
   }
 
@@ -266,7 +272,7 @@ export class TrendChart {
  * @param {number} low
  * @param {number} high
  */
-function stroke(u, at, low, high) {
+export function stroke(u, at, low, high) {
   const x = u.valToPos(at, "x", true);
   const bottom = low === -Infinity ? u.bbox.top + u.bbox.height : u.valToPos(low, "y", true);
   const top = high === Infinity ? u.bbox.top : u.valToPos(high, "y", true);
@@ -282,7 +288,7 @@ function stroke(u, at, low, high) {
  * @param {number} value
  * @param {number} radius
  */
-function dot(u, at, value, radius, edge = false) {
+export function dot(u, at, value, radius, edge = false) {
   u.ctx.beginPath();
   u.ctx.arc(u.valToPos(at, "x", true), u.valToPos(value, "y", true), radius * devicePixelRatio, 0, 2 * Math.PI);
   u.ctx.fill();
