@@ -170,6 +170,29 @@ def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
     assert capfd.readouterr().err == ""
 
 
+def test_a_web_socket_that_its_browser_is_closing_ends_with_the_dashboard(tmp_path: Path) -> None:
+    """Under TLS the connection remains until the browser has answered; the thread of the dashboard must not fail."""
+    authority = Authority(tmp_path, "authority")
+    tls, trust = authority.sign("dashboard"), ssl.create_default_context(cafile=str(authority.file))
+    with Dashboard(Serving("127.0.0.1", 0, tls=tls)) as dashboard:
+        dashboard.hub("axis")
+        host = dashboard.url.removeprefix("https://").rstrip("/")
+        address = ("127.0.0.1", int(host.rpartition(":")[2]))
+        browser = trust.wrap_socket(socket.create_connection(address, timeout=20), server_hostname="127.0.0.1")
+        browser.sendall(
+            f"GET /live HTTP/1.1\r\nHost: {host}\r\nOrigin: https://{host}\r\nUpgrade: websocket\r\n"
+            "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode()
+        )
+        assert b"101" in browser.recv(1 << 16)
+        goodbye, answer_of_server = b"\x88\x82\0\0\0\0\x03\xe8", b"\x88\x02\x03\xe8"
+        browser.sendall(goodbye)
+        received = b""
+        while answer_of_server not in received:
+            received += browser.recv(1 << 16)
+    browser.close()
+
+
 def test_a_body_that_does_not_come_is_not_waited_for(
     watched: Watched, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -125,6 +125,7 @@ class Dashboard:
 
             from livebode.dashboard.patience import IDLE_S, PatientProtocol
             from livebode.dashboard.server import Server
+            from livebode.dashboard.web_socket import WebSocketProtocol
         except ImportError as error:
             raise not_installed(
                 f"the dashboard needs {error.name}, which is not installed",
@@ -138,7 +139,7 @@ class Dashboard:
             loop="asyncio",
             interface="asgi3",
             http=PatientProtocol,
-            ws="websockets-sansio",
+            ws=WebSocketProtocol,
             lifespan="off",
             log_config=None,
             access_log=False,

@@ -36,7 +36,7 @@ _LATE_S = 5.0
 _FOLDER = "fleet_alarm_samples"
 
 
-class Alarm(NamedTuple):
+class RaisedAlarm(NamedTuple):
     """An alarm of an axis by its key; when the log received the samples that raised it, seconds since 1970."""
 
     axis: str
@@ -62,7 +62,7 @@ class AlarmSamples:
 
     def __init__(self, log: FleetLog, lake: Lake, name: str) -> None:
         self._log, self._lake, self._name = log, lake, name
-        self._waiting: set[Alarm] = set()
+        self._waiting: set[RaisedAlarm] = set()
         self._until_s: dict[str, float] = {}
 
     def resume(self, days: float) -> None:
@@ -82,7 +82,7 @@ class AlarmSamples:
         """Take rows of events; those that are not alarms of an axis are ignored."""
         for *levels, kind, logged in _tuples(events.select([*LEVELS, "kind", "logged"])):
             if kind in KINDS and any(levels):
-                self._waiting.add(Alarm(".".join(map(axis_token, levels)), kind, logged.timestamp()))
+                self._waiting.add(RaisedAlarm(".".join(map(axis_token, levels)), kind, logged.timestamp()))
 
     async def save_due(self) -> None:
         """Save the samples of alarms that were raised more than a minute ago.
@@ -101,13 +101,13 @@ class AlarmSamples:
                 await asyncio.to_thread(self._note, alarm, rows)
                 self._waiting.discard(alarm)
 
-    async def _messages(self, alarm: Alarm) -> list[StoredMessage]:
+    async def _messages(self, alarm: RaisedAlarm) -> list[StoredMessage]:
         subject = f"{LOG}.*.{alarm.axis}"
         first = await self._log.first_since(LOG_STREAM, subject, alarm.logged_s - AROUND_S)
         stop = await self._log.first_since(LOG_STREAM, subject, alarm.logged_s + AROUND_S)
         return [one async for one in stored_messages(self._log, LOG_STREAM, subject, stop - 1, first)]
 
-    def _saved(self, alarm: Alarm, messages: Sequence[StoredMessage]) -> list[dict[str, Any]]:
+    def _saved(self, alarm: RaisedAlarm, messages: Sequence[StoredMessage]) -> list[dict[str, Any]]:
         """Write a file for each epoch of the sender, and return their rows."""
         rows = []
         for batches in _alike(_batches(messages)):
@@ -125,7 +125,7 @@ class AlarmSamples:
             rows.append({name: about[name] for name in FLEET_SAMPLES.names if name in about} | {"file": file})
         return rows
 
-    def _note(self, alarm: Alarm, rows: Sequence[dict[str, Any]]) -> None:
+    def _note(self, alarm: RaisedAlarm, rows: Sequence[dict[str, Any]]) -> None:
         own = {"log": self._name, "kind": alarm.kind, "logged": _time(alarm.logged_s)}
         own |= dict(zip(LEVELS, axis_names(alarm.axis)))
         found = [own | row for row in rows or [{"samples": 0}]]

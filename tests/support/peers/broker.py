@@ -69,7 +69,8 @@ class Mosquitto:
 class Nats(Mosquitto):
     """nats-server, which rejects MQTT 5."""
 
-    name, runs, subscribed = "nats-server", "Server is ready", "[SUBACK"
+    name, runs, subscribed, left = "nats-server", "Server is ready", "[SUBACK", "[DELSUB"
+    """Also what it logs when a client leaves."""
 
     def written(self, lines: tuple[str, ...], folder: Path) -> str:
         return "\n".join(
