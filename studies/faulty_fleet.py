@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import random
-import signal
 import sys
 import threading
 import time
@@ -94,7 +93,7 @@ class FaultyFleet:
 
     def __exit__(self, *_: object) -> None:
         self._running.close()
-        self._process.send_signal(signal.SIGINT)
+        self._process.terminate()
         with contextlib.suppress(psutil.TimeoutExpired):
             self._process.wait(10)
         for process in [*self._children(), self._process, *self._workers]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,8 @@ from livebode.fleet.settings import FleetSettings
 from livebode.sources.live.ndjson import encode_line
 from tests.support.command import livebode
 from tests.support.fleet_runs import PARTITIONS, SAMPLES, batch, owned_until_current
+from tests.support.forked import Command
+from tests.support.peers.peer import PATIENCE_S, until
 
 AXIS = """[machine]
 site = "Graz"
@@ -83,6 +86,22 @@ def test_what_a_source_sends_is_tracked_checked_listed_and_replayed(
     later = livebode("fleet", "replay", fleet, "Graz/x", "--from", "2100-01-01")
     assert (later.code, "no data of Graz/x" in later.err) == (2, True)
     assert "no axis 'Graz/y'" in livebode("fleet", "replay", fleet, "Graz/y").err
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_sink_and_a_sender_end_in_order_at_the_signal_of_a_service_manager(fleet: Path, number: int) -> None:
+    with fleet.open("a") as file:
+        file.write('[sink]\nlake = "lake"\n')
+    axis = fleet.with_name("axis.toml")
+    with Command("fleet", "sink", fleet) as sink, Command("fleet", "send", axis, fleet) as sender:
+        sender.stdin.write(encode_line(batch(0, 0)))
+        sender.stdin.flush()
+        for one, last in ((sink, b"0 events stored\n"), (sender, b"the log has stored 1 messages\n")):
+            until(lambda one=one: b"Ctrl-C ends" in one.printed, "its first line")
+            one.send_signal(number)
+            one.wait(PATIENCE_S)  # its standard input is open: nothing else ends it
+            out, err = one.communicate()
+            assert (one.returncode, out[-len(last) :], err) == (0, last, b"")
 
 
 def test_the_configuration_of_the_server_has_the_limits_and_the_partitions(tmp_path: Path) -> None:

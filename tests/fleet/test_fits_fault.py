@@ -5,11 +5,16 @@ from __future__ import annotations
 import asyncio
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 
+from livebode.configuration.axis import Axis
 from livebode.core.errors import FleetError
 from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
+from livebode.fleet.replay import ReplayedAxis, replayed, write_replayed
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import LogSection
@@ -29,6 +34,13 @@ def test_takeovers_with_and_without_states_give_the_parameters_and_alarms_of_one
             owned_until_current(settings, axes)
         result = checked(settings, axes)
         found = asyncio.run(_results(settings))
+        again = {key: asyncio.run(_replayed(settings, key, axis)) for key, axis in axes.items()}
+    for key, one in again.items():
+        files = write_replayed(one, tmp_path / "axis.parquet")
+        assert [path.name for path in files] == ["axis.parquet", "axis-parameters.parquet"]
+        stored = pa.concat_tables(message.parameters for message in found).filter(pc.field("axis") == key)
+        parameters = pq.read_table(tmp_path / "axis-parameters.parquet")
+        assert sorted(map(repr, parameters.to_pylist())) == sorted(map(repr, stored.to_pylist()))
     total = result.total
     assert result.exact
     assert result.claims == 3 * PARTITIONS
@@ -55,6 +67,11 @@ def test_a_removed_message_of_results_is_missing_with_its_parameters_and_events(
 def test_results_of_another_version_are_refused_with_a_sentence() -> None:
     with pytest.raises(FleetError, match="version 1, and this livebode reads version 2"):
         ResultMessage.from_bytes(b"\xff\xff\xff\xff an Arrow stream")
+
+
+async def _replayed(settings: LogSection, key: str, axis: Axis) -> ReplayedAxis:
+    async with FleetLog(settings, "test") as log:
+        return await replayed(log, key, axis, 0.0)
 
 
 async def _purge(settings: LogSection) -> None:

@@ -22,6 +22,7 @@ from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import LogSection, SinkSection
 from livebode.fleet.sink import Sink
+from livebode.fleet.status import fleet_status
 from livebode.fleet.subjects import RESULT_STREAM, RESULTS, axis_path
 from livebode.lake import LEVELS, Lake, StreamTable, stream_table
 from tests.support.command import livebode
@@ -167,6 +168,38 @@ def test_what_the_log_deleted_before_it_was_read_is_an_event_with_its_extent(ser
     assert f"to {before - 2})" in message
     assert sink_once(log, lake).deleted == 0
     assert len(set(keys(lake))) == len(keys(lake))
+
+
+def test_the_status_says_how_far_a_sink_is_behind_and_warns_before_results_are_deleted(
+    server: LogServer, tmp_path: Path
+) -> None:
+    log, axes, lake = log_section(server.url), fleet_axes(1), tmp_path / "lake"
+    sent(log, axes, BATCHES)
+    assert asyncio.run(_status(log))["sinks"] == []
+    sink_once(log, lake)
+    owned_until_current(log, axes)
+    last, size_bytes = asyncio.run(_extent(log)), asyncio.run(_size_bytes(log))
+    (behind,) = asyncio.run(_status(log))["sinks"]
+    assert (behind["lake"], behind["through"], behind["behind"]) == (str(lake), 0, last)
+    assert behind["behind_s"] > 0
+    for room, warned in ((1.3, True), (1.6, False)):
+        full = log.model_copy(update={"results_gb": room * size_bytes / 1e9})
+        alarms = [alarm for alarm in asyncio.run(_status(full))["alarms"] if "sink" in alarm]
+        assert [f"{1 / room:.0%} of log.results_gb" in alarm for alarm in alarms] == [True] * warned
+    sink_once(log, lake)
+    assert asyncio.run(_status(log))["sinks"] == [
+        {"lake": str(lake), "through": last, "behind": 0, "behind_s": 0.0, "results_share": 0.0}
+    ]
+
+
+async def _status(log: LogSection) -> dict[str, Any]:
+    async with FleetLog(log, "test") as connection:
+        return await fleet_status(connection, {})
+
+
+async def _size_bytes(log: LogSection) -> int:
+    async with FleetLog(log, "test") as connection:
+        return (await connection.extent(RESULT_STREAM)).size_bytes
 
 
 async def _extent(log: LogSection) -> int:

@@ -67,6 +67,12 @@ class Command:
     def poll(self) -> int | None:
         return self._process.exitcode
 
+    @property
+    def printed(self) -> bytes:
+        """Its standard output until now."""
+        out = self._printed[0]
+        return out.read_bytes() if out.exists() else b""
+
     def wait(self, timeout: float | None = None) -> int:
         self._process.join(timeout)
         if self._process.exitcode is None:

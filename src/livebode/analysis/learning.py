@@ -153,6 +153,13 @@ def learnable_axis(configuration: dict[str, Any], place: str) -> Axis:
             "learn from a directory that `livebode run` wrote",
             path=place,
         )
+    if "output_only" in configuration:
+        raise BaselineError(
+            "run-without-responses",
+            f"{place!r} has modes of the output alone, and no response to learn from",
+            "learn from a run with an excitation",
+            path=place,
+        )
     axis = Axis.of(configuration, place)
     if not axis.tracking.periodic:
         raise BaselineError(

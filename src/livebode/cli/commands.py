@@ -58,7 +58,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "status": "Show partitions, axes, backlog and losses of a fleet.",
         "view": "Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.",
         "check": "Compute all results of a fleet again from its log, and compare the stored ones bit for bit.",
-        "replay": "Compute the responses of an axis again from the log, and write them as a table.",
+        "replay": "Compute the responses and fits of an axis again from the log, and write them as tables.",
         "sink": "Store the results of a fleet in a lake, each once: all of them, their means over minutes and hours, "
         "and events.",
         "server": "Write the configuration of nats-server for a fleet.",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -10,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from livebode.configuration.axis import ServeSection
+from livebode.core.ending import calls_at_end
 from livebode.runtime import Subscriber
 
 if TYPE_CHECKING:
@@ -57,10 +57,6 @@ def served(
 def wait_for_the_end() -> None:
     """Wait for Ctrl-C or SIGTERM."""
     ended = threading.Event()
-    before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
+    with calls_at_end(ended.set):
         while not ended.wait(0.2):  # a wait without a timeout blocks the signal on some platforms
             pass
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -11,7 +11,7 @@ from livebode.fitting.rational import fit_rational
 from livebode.fitting.rational_model import Rational, rational_of
 from livebode.fitting.recordings import Between, RecordingsMean
 from livebode.fitting.three_mass import ThreeMass
-from livebode.fitting.together import fit_together
+from livebode.fitting.together import fit_each, fit_together
 from livebode.fitting.unknown_gain import TwoMassGain
 
 __all__ = [
@@ -34,6 +34,7 @@ __all__ = [
     "best_of",
     "fit",
     "fit_common_poles",
+    "fit_each",
     "fit_of",
     "fit_rational",
     "fit_together",

@@ -78,23 +78,40 @@ def fit_rows(
     """
     dof = 2.0 * np.count_nonzero(measured.use, axis=1) - problem.size
     if dof.size and (dof > 0).all():
-        return _fitted(problem, measured, noise_dof, start, epsilon, dof)
+        return _fitted_apart(problem, measured, noise_dof, start, epsilon, dof)
     some = np.flatnonzero(dof > 0)
-    whole = _none(problem, measured, dof)
+    whole = _none(problem, measured, dof, NO_RESPONSE)
     if some.size:
         begin, eps = (None if x is None else x[some] for x in (start, epsilon))
-        found = _fitted(problem, measured[some], noise_dof[some], begin, eps, dof[some])
+        found = _fitted_apart(problem, measured[some], noise_dof[some], begin, eps, dof[some])
         for kept, other in zip(whole, found):
             kept[some] = other
     return whole
 
 
-def _none(problem: Problem, measured: Measured, dof: Floats) -> FittedRows:
-    """Rows without a fit."""
+def _fitted_apart(
+    problem: Problem, measured: Measured, noise_dof: Floats, start: Floats | None, epsilon: Floats | None, dof: Floats
+) -> FittedRows:
+    """All rows at once; if that is not possible, each by itself: one row without a solution disturbs no other."""
+    try:
+        return _fitted(problem, measured, noise_dof, start, epsilon, dof)
+    except np.linalg.LinAlgError:
+        if len(dof) == 1:
+            return _none(problem, measured, dof, NOT_CONVERGED)
+    parts = []
+    for i in range(len(dof)):
+        row = slice(i, i + 1)
+        begin, eps = (None if x is None else x[row] for x in (start, epsilon))
+        parts.append(_fitted_apart(problem, measured[np.array([i])], noise_dof[row], begin, eps, dof[row]))
+    return FittedRows(*(np.concatenate(columns) for columns in zip(*parts)))
+
+
+def _none(problem: Problem, measured: Measured, dof: Floats, word: str) -> FittedRows:
+    """Rows without a fit, with this status."""
     rows, n = len(dof), len(problem.model.names)
     nan = np.full(rows, np.nan)
     return FittedRows(
-        np.full((rows, n), np.nan), np.full((rows, n, n), np.nan), np.full(rows, NO_RESPONSE, dtype=_WORD), nan,
+        np.full((rows, n), np.nan), np.full((rows, n, n), np.nan), np.full(rows, word, dtype=_WORD), nan,
         nan.copy(), dof, np.full(measured.value.shape, np.nan, dtype=np.complex128), np.full((rows, n), np.nan),
     )  # fmt: skip
 

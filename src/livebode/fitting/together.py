@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from livebode.core import Emit, Parameters, Responses, ignore
 from livebode.fitting.fitter import Fitter
-from livebode.fitting.tasks import fitted_together
+from livebode.fitting.rows import FittedRows
+from livebode.fitting.tasks import FitTask, fitted_together
 
 
 def fit_together(
@@ -27,7 +28,7 @@ def fit_together(
     Raises
     ------
     LivebodeError
-        As `Fitter.process`; some of the other fitters may already have taken rows.
+        As `Fitter.process`; the other fitters have taken their rows.
 
     Examples
     --------
@@ -35,14 +36,47 @@ def fit_together(
     >>> fit_together([], [])
     []
     """
+    found, errors = fit_each(fitters, batches, emits)
+    for error in errors.values():
+        raise error
+    return [found[i] for i in range(len(fitters))]
+
+
+def fit_each(
+    fitters: Sequence[Fitter], batches: Sequence[Responses], emits: Sequence[Emit] | None = None
+) -> tuple[dict[int, Parameters], dict[int, Exception]]:
+    """As `fit_together`, by the position of the fitter; and why others raise, which disturbs no other fitter."""
     emits = emits or [ignore] * len(fitters)
     parts: list[list[Parameters]] = [[] for _ in fitters]
     done = [0] * len(fitters)
+    errors: dict[int, Exception] = {}
     waiting = list(range(len(fitters)))
     while waiting:
-        tasks = [fitters[i].task(batches[i][done[i] :]) for i in waiting]
-        for i, task, found in zip(waiting, tasks, fitted_together(tasks)):
-            parts[i].append(fitters[i].take(task, found, emits[i]))
-            done[i] += len(task.responses)
-        waiting = [i for i in waiting if done[i] < len(batches[i])]
-    return [Parameters.join(one) for one in parts]
+        tasks: dict[int, FitTask] = {}
+        for i in waiting:
+            try:
+                tasks[i] = fitters[i].task(batches[i][done[i] :])
+            except Exception as error:
+                errors[i] = error
+        for i, found in _fitted(tasks, errors).items():
+            try:
+                parts[i].append(fitters[i].take(tasks[i], found, emits[i]))
+            except Exception as error:
+                errors[i] = error
+            done[i] += len(tasks[i].responses)
+        waiting = [i for i in waiting if i not in errors and done[i] < len(batches[i])]
+    return {i: Parameters.join(parts[i]) for i in range(len(fitters)) if i not in errors}, errors
+
+
+def _fitted(tasks: dict[int, FitTask], errors: dict[int, Exception]) -> dict[int, FittedRows]:
+    """The rows of all tasks at once; if that raises, of each by itself."""
+    try:
+        return dict(zip(tasks, fitted_together(list(tasks.values()))))
+    except Exception:
+        found = {}
+        for i, task in tasks.items():
+            try:
+                found[i] = task.fitted()
+            except Exception as error:
+                errors[i] = error
+        return found

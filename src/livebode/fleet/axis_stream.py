@@ -35,6 +35,8 @@ _FAILURE_LETTERS_MAX = 1000
 FITS_PER_S = 2.0
 """Fits of an axis."""
 _NO_ROWS = np.zeros(0, dtype=np.int64)
+_NO_RECIPE = "unreadable"
+"""In place of the recipe of an axis whose files cannot be read: the same for every owner."""
 _logger = logging.getLogger(__name__)
 
 
@@ -101,7 +103,11 @@ class AxisStream(StatefulBase):
 
     def __init__(self, axis: Axis, run: int) -> None:
         self._axis = axis
-        self.recipe = recipe_id(axis)
+        self._refusal: Exception | None = None
+        try:
+            self.recipe = recipe_id(axis)
+        except Exception as error:  # its first message reports it: a stream without one has nothing to store it with
+            self.recipe, self._refusal = _NO_RECIPE, error
         self.run = run
         self.position = run - 1
         """Number in the log of the last message that was processed."""
@@ -144,6 +150,8 @@ class AxisStream(StatefulBase):
             return 0
         before, new = self._events.pending, self._pipeline is None
         try:
+            if self._refusal is not None:
+                raise self._refusal
             blocks = self._blocks(message)
             size = self._output_bytes_max(blocks) if blocks else 0
         except Exception as error:  # a fault of one axis must not stop the others of its partition
@@ -182,19 +190,27 @@ class AxisStream(StatefulBase):
         """What monitors the axis, from the first Block on."""
         return None if self._pipeline is None else self._pipeline.detection
 
-    def finished(self, tracked: UnfittedOutput, fitted: Fitted) -> Output:
-        """The output, with the fits of the responses that `tracked` lists; monitors both."""
-        parameters, events = fitted
+    def finished(self, tracked: UnfittedOutput, fitted: Fitted | Exception) -> Output:
+        """The output, with the fits of the responses that `tracked` lists, or why there are none; monitors both."""
+        parameters, events = ((), []) if isinstance(fitted, Exception) else fitted
         found = [*tracked.events, *events]
-        detection = self.detection
-        if detection is not None and tracked.responses is not None and not self.failure:
-            responses = tracked.responses
-            ready = responses if responses.ready.all() else responses[responses.ready]
-            found += detection.take_responses(ready, parameters[0] if parameters else None)
+        try:
+            if isinstance(fitted, Exception):
+                raise fitted
+            found += self._monitored(tracked.responses, parameters)
+        except Exception as error:
+            self._fail(error)
+            found, self._tracked_events = found + self._tracked_events, []
         self._remember(found, parameters)
         return Output(
             tracked.number, tracked.responses, tracked.number + tracked.to_fit, parameters, self._limits.take(found)
         )
+
+    def _monitored(self, responses: Responses | None, parameters: tuple[Parameters, ...]) -> list[Event]:
+        if self.detection is None or responses is None or self.failure:
+            return []
+        ready = responses if responses.ready.all() else responses[responses.ready]
+        return self.detection.take_responses(ready, parameters[0] if parameters else None)
 
     def _remember(self, events: list[Event], parameters: tuple[Parameters, ...]) -> None:
         if changes := sum(event.kind == "change" for event in events):
@@ -316,5 +332,5 @@ def outputs_together(streams: Sequence[AxisStream]) -> list[Output]:
         assert stages.fits is not None
         fits.append(stages.fits)
         batches.append(found[tracked[i].to_fit])
-    fitted: dict[int, Fitted] = dict(zip(at, process_together(fits, batches)))
+    fitted: dict[int, Fitted | Exception] = dict(zip(at, process_together(fits, batches)))
     return [stream.finished(one, fitted.get(i, ((), []))) for i, (stream, one) in enumerate(zip(streams, tracked))]

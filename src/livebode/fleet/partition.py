@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from livebode.configuration.axis import Axis
-from livebode.core import StateError
 from livebode.fleet.axis_stream import AxisStream, outputs_together
 from livebode.fleet.log import ClaimLostError, FleetLog, StoredMessage
 from livebode.fleet.page_status import PageStatus
@@ -137,13 +136,13 @@ class PartitionOwner:
         stream = AxisStream(self._axes[key], 0)
         try:
             stream.restore(state.data)
-        except StateError as error:
+        except Exception as error:  # what its configuration has become may not be one that can be tracked
             return await self._begin_again(subject, error)
         self._streams[key] = stream
         self._stored.restored(key, len(state.data))
         return await self._log.following(LOG_STREAM, subject, stream.position + 1)
 
-    async def _begin_again(self, subject: str, error: StateError) -> int | None:
+    async def _begin_again(self, subject: str, error: Exception) -> int | None:
         """An axis whose state cannot be restored begins a new run after what is stored, with an event that says why."""
         first = await self._log.following(LOG_STREAM, subject, self._through + 1)
         key = key_of(subject)

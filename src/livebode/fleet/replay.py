@@ -1,8 +1,9 @@
-"""`livebode fleet replay`: the responses of one axis, computed again from the log, as a table."""
+"""`livebode fleet replay`: the responses and fits of one axis, computed again from the log, as tables."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -18,6 +19,7 @@ from livebode.fleet.axis_stream import AxisStream
 from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.subjects import LOG, LOG_STREAM, axis_path
+from livebode.fleet.wide_rows import AxisFits, parameter_table
 from livebode.records.response_table import SCHEMA as RESPONSE_SCHEMA
 from livebode.records.response_table import as_batch
 
@@ -26,10 +28,18 @@ SCHEMA = pa.schema([("axis", pa.string()), ("run", pa.int64()), ("number", pa.in
 and those of responses.parquet, in full precision."""
 
 
-async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> pa.Table:
-    """The responses of the messages of an axis that the log has stored since `from_s` (seconds since 1970).
+class ReplayedAxis(NamedTuple):
+    """Responses with the columns of `SCHEMA`; fits, derived quantities and margins with those of
+    `wide_rows.PARAMETERS`, None without [fit]."""
 
-    The tracker begins at the first of them. The table has the columns of `SCHEMA`.
+    responses: pa.Table
+    parameters: pa.Table | None
+
+
+async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> ReplayedAxis:
+    """What the messages of an axis give that the log has stored since `from_s` (seconds since 1970).
+
+    The tracker begins at the first of them.
 
     Raises
     ------
@@ -39,7 +49,7 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> pa.Tab
     subject = f"{LOG}.*.{key}"
     through = (await log.extent(LOG_STREAM)).last
     stream: AxisStream | None = None
-    batches = []
+    batches, fits = [], []
     async for message in stored_messages(log, LOG_STREAM, subject, through):
         if message.stored_s < from_s:
             continue
@@ -47,6 +57,7 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> pa.Tab
         output = stream.process(message.data, message.number, message.stored_s)
         if output.responses is not None:
             batches.append(_response_rows(key, stream.run, output.number, output.responses))
+        fits += [AxisFits(key, stream.run, output.fitted, one) for one in output.parameters]
     if stream is None:
         raise FleetError(
             "no-data",
@@ -54,7 +65,8 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> pa.Tab
             "choose an earlier beginning; see age_days and size_gb in [log]",
             axis=axis_path(key),
         )
-    return pa.Table.from_batches(batches, SCHEMA)
+    parameters = None if axis.fit is None else parameter_table(fits)
+    return ReplayedAxis(pa.Table.from_batches(batches, SCHEMA), parameters)
 
 
 def _response_rows(key: str, run: int, number: int, responses: Responses) -> pa.RecordBatch:
@@ -64,7 +76,15 @@ def _response_rows(key: str, run: int, number: int, responses: Responses) -> pa.
     return pa.RecordBatch.from_arrays([*place, *as_batch(responses).columns], schema=SCHEMA)
 
 
-def write_replayed(table: pa.Table, path: Path) -> None:
-    """Write the table as a Parquet file; OutputError if that is not possible."""
-    with writing(path), whole_file(path) as partial:
-        pq.write_table(table, partial)
+def write_replayed(found: ReplayedAxis, path: Path) -> dict[Path, int]:
+    """Write the responses as a Parquet file, and beside it the parameters; OutputError if that is not possible.
+
+    Returns the rows of each file, NAME.parquet and NAME-parameters.parquet.
+    """
+    tables = {path: found.responses}
+    if found.parameters is not None:
+        tables[path.with_stem(f"{path.stem}-parameters")] = found.parameters
+    for place, table in tables.items():
+        with writing(place), whole_file(place) as partial:
+            pq.write_table(table, partial)
+    return {place: table.num_rows for place, table in tables.items()}

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import json
+from hashlib import sha256
 
 from livebode.fleet.alarm_samples import AlarmSamples
 from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import Reader
 from livebode.fleet.settings import SinkSection
 from livebode.fleet.sink_tables import SinkTables, SinkTotals
-from livebode.fleet.subjects import RESULT_STREAM, RESULTS
+from livebode.fleet.subjects import RESULT_STREAM, RESULTS, SINK, STATUS
 
 _READ_S = 0.2
+_DIGITS = 16
 
 
 class Sink:
@@ -29,7 +32,8 @@ class Sink:
     """
 
     def __init__(self, log: FleetLog, settings: SinkSection) -> None:
-        self._log, self._tables = log, SinkTables(settings)
+        self._log, self._tables, self._lake = log, SinkTables(settings), settings.url
+        self._reported = (-1, 0.0)
 
     @property
     def totals(self) -> SinkTotals:
@@ -57,7 +61,17 @@ class Sink:
                 for events in await asyncio.to_thread(tables.process, messages):
                     alarms.add(events)
                 await alarms.save_due()
+                await self._report()
         finally:
             await reader.close()
         await asyncio.to_thread(tables.commit)
         await alarms.save_due()
+        await self._report()
+
+    async def _report(self) -> None:
+        """Store in the log how far the lake is, for `livebode fleet status`."""
+        if (through := self._tables.through) != self._reported:
+            self._reported = through
+            about = {"lake": self._lake, "through": through[0], "stored_s": through[1]}
+            name = f"{SINK}{sha256(self._lake.encode()).hexdigest()[:_DIGITS]}"
+            await self._log.append(f"{STATUS}.{name}", json.dumps(about).encode())

@@ -91,7 +91,7 @@ class SinkTables:
         self._stream = f"livebode {RESULT_STREAM} {self.name}"
         main = self._waiting[_BY_MESSAGE[-1]].table
         self._through = self._committed = main.position(self._stream)
-        self._stored_s = main.position(f"{self._stream} stored") / 1000
+        self._stored_s = self._committed_s = main.position(f"{self._stream} stored") / 1000
         self._tiers = []
         firsts = [self._committed + 1]
         for name, period_s in _TIERS.items():
@@ -105,6 +105,12 @@ class SinkTables:
         self._due_s = time.monotonic() + self._settings.commit_s
         self.clean()
         return self._next
+
+    @property
+    def through(self) -> tuple[int, float]:
+        """Number of the message up to which the lake has the results, and when the log stored what was read last."""
+        waits = any(self._waiting[name] for name in _BY_MESSAGE)
+        return self._committed if waits else self._through, self._committed_s if waits else self._stored_s
 
     def process(self, messages: list[StoredMessage]) -> list[pa.Table]:
         """Add the next messages, and commit if it is time; returns the events that are new."""
@@ -187,7 +193,7 @@ class SinkTables:
             if waiting:
                 waiting.commit(self._stream, self._through)
         main.commit(self._stream, self._through, {f"{self._stream} stored": round(self._stored_s * 1000)})
-        self._committed = self._through
+        self._committed, self._committed_s = self._through, self._stored_s
 
     def clean(self) -> None:
         """Delete what is older than it is retained, and join the small files of earlier days."""

@@ -16,6 +16,7 @@ from livebode.fleet.subjects import (
     LOG_STREAM,
     RESULT_STREAM,
     RESULTS,
+    SINK,
     STATUS,
     STATUS_STREAM,
     axis_path,
@@ -28,13 +29,20 @@ BACKLOG_SHARE_MAX = 0.7
 """Share of the log's capacity that is not processed yet, above which it is reported: at 1, data are lost."""
 
 
+RESULTS_SHARE_MAX = 0.7
+"""Share of log.results_gb that a sink has not stored yet, above which it is reported: at 1, results are lost."""
+
+
 async def fleet_status(log: FleetLog, axes: Mapping[str, Axis]) -> dict[str, Any]:
-    """Partitions, axes, the log, and alarms, as plain data."""
+    """Partitions, axes, the log, sinks that have run, and alarms, as plain data."""
     extent = await log.extent(LOG_STREAM, f"{LOG}.>")
     partitions = []
     found: dict[str, dict[str, Any]] = {}
     now_s = time.time()
-    for subject in sorted((await log.extent(STATUS_STREAM)).subjects, key=lambda name: int(name.split(".")[1])):
+    stored = [subject.split(".")[1] for subject in (await log.extent(STATUS_STREAM)).subjects]
+    sinks = await _sinks(log, sorted(name for name in stored if name.startswith(SINK)), now_s)
+    for number in sorted(int(name) for name in stored if not name.startswith(SINK)):
+        subject = f"{STATUS}.{number}"
         message = await log.last(STATUS_STREAM, subject)
         if message is None:
             continue
@@ -55,6 +63,7 @@ async def fleet_status(log: FleetLog, axes: Mapping[str, Axis]) -> dict[str, Any
         "axes": sorted(found.values(), key=lambda axis: str(axis["axis"])),
         "without_data": silent,
         "log": about_log | {"waiting": waiting, "backlog_share": share, "full_axes": full_axes},
+        "sinks": sinks,
         "alarms": [
             *_alarms(partitions, list(found.values()), share),
             *(
@@ -62,8 +71,37 @@ async def fleet_status(log: FleetLog, axes: Mapping[str, Axis]) -> dict[str, Any
                 "are not; check its edge"
                 for path in full_axes
             ),
+            *_sink_alarms(sinks),
         ],
     }
+
+
+async def _sinks(log: FleetLog, names: list[str], now_s: float) -> list[dict[str, Any]]:
+    """How far each sink is behind the newest result."""
+    if not names:
+        return []
+    extent = await log.extent(RESULT_STREAM)
+    each_bytes = extent.size_bytes / max(1, extent.last - extent.first + 1)
+    found = []
+    for name in names:
+        message = await log.last(STATUS_STREAM, f"{STATUS}.{name}")
+        if message is not None:
+            about = json.loads(message.data)
+            behind = max(0, extent.last - about["through"])
+            share = min(behind * each_bytes, extent.size_bytes) / (log.settings.results_gb * 1e9)
+            stored_s = about.pop("stored_s") or extent.created_s
+            behind_s = max(0.0, now_s - stored_s) if behind else 0.0
+            found.append(about | {"behind": behind, "behind_s": behind_s, "results_share": share})
+    return found
+
+
+def _sink_alarms(sinks: list[dict[str, Any]]) -> list[str]:
+    return [
+        f"the sink of {one['lake']} has not stored {one['results_share']:.0%} of log.results_gb yet: at 100 % results "
+        "are deleted before they are in the lake; start livebode fleet sink, or raise log.results_gb"
+        for one in sinks
+        if one["results_share"] > RESULTS_SHARE_MAX
+    ]
 
 
 def _alarms(partitions: list[dict[str, Any]], axes: list[dict[str, Any]], share: float) -> list[str]:

@@ -16,6 +16,8 @@ LOG_STREAM, RESULT_STREAM, STATE_STREAM, STATUS_STREAM, ACTS_STREAM = "LOG", "RE
 API: Final = "$JS.API"
 VIEW_API: Final = "viewer"
 """First tokens of requests to JetStream: its own, and those of a viewer."""
+SINK: Final = "sink-"
+"""Beginning of the second token of the status of a sink; that of a partition is its number."""
 _EMPTY = "_"
 
 

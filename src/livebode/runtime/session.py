@@ -9,11 +9,11 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 from livebode.configuration.axes import Axes, ConfigurationFile
 from livebode.configuration.axis import Axis
 from livebode.core import ConfigError, Event, LivebodeError
+from livebode.core.ending import ENDING, Handler, handled
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
 from livebode.runtime.destination import Destination
@@ -22,7 +22,6 @@ from livebode.runtime.status import Status
 TICK_S = 0.1
 LOOK_S = 1.0
 """Interval of checks of the file."""
-_ENDING = (signal.SIGINT, signal.SIGTERM)
 _logger = logging.getLogger(__name__)
 
 
@@ -187,15 +186,11 @@ class Session:
         if threading.current_thread() is not threading.main_thread():
             yield
             return
-        handlers: dict[signal.Signals, Any] = dict.fromkeys(_ENDING, self._heard)
+        handlers: dict[signal.Signals, Handler] = dict.fromkeys(ENDING, self._heard)
         if self._file is not None and hasattr(signal, "SIGHUP"):
             handlers[signal.SIGHUP] = lambda *_: self._reload_asked.set()
-        before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
-        try:
+        with handled(handlers):
             yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
 
     def _heard(self, number: int, _frame: object) -> None:
         if self.ended_by:

@@ -13,7 +13,7 @@ from livebode.cli.fleet.options import Fleet
 from livebode.cli.options import Json
 
 if TYPE_CHECKING:
-    import pyarrow as pa
+    from livebode.fleet.replay import ReplayedAxis
 
 
 def replay_command(
@@ -25,7 +25,10 @@ def replay_command(
     out: Annotated[Path, typer.Option(metavar="FILE", help="Parquet file to write.")] = Path("replay.parquet"),
     as_json: Json = False,
 ) -> None:
-    """Compute the responses of an axis again from the log, and write them as a table."""
+    """Compute the responses and fits of an axis again from the log, and write them as tables.
+
+    With [fit] its parameters, derived quantities and margins are in a second one, FILE-parameters.parquet.
+    """
     from livebode.core import nearest_name
     from livebode.core.errors import FleetError
     from livebode.fleet.log import FleetLog
@@ -40,10 +43,13 @@ def replay_command(
     if axis not in keys:
         raise FleetError("axis-unknown", f"the fleet has no axis {axis!r}", nearest_name(axis, sorted(keys)), axis=axis)
 
-    async def replay() -> pa.Table:
+    async def replay() -> ReplayedAxis:
         async with FleetLog(settings.log, "livebode replay") as log:
             return await replayed(log, keys[axis], axes[keys[axis]], 0.0 if from_ is None else from_.timestamp())
 
-    table = asyncio.run(replay())
-    write_replayed(table, out)
-    print(to_json({"file": str(out), "rows": table.num_rows}) if as_json else f"{out}: {table.num_rows:,} rows")
+    files = write_replayed(asyncio.run(replay()), out)
+    if as_json:
+        print(to_json({"files": {str(path): {"rows": rows} for path, rows in files.items()}}))
+        return
+    for path, rows in files.items():
+        print(f"{path}: {rows:,} rows")

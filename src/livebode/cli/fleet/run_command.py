@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import time
+import threading
 
 from livebode.cli.fleet.options import Fleet
 from livebode.cli.options import Json
+from livebode.core.ending import calls_at_end
 
 _STEP_S = 0.25
 
 
 def run_command(fleet: Fleet, as_json: Json = False) -> None:
-    """Start the workers of a fleet on this computer, and replace those that die, until Ctrl-C.
+    """Start the workers of a fleet on this computer, and replace those that die, until Ctrl-C or SIGTERM.
 
     Nothing has to be ended in order: what is not stored yet is computed again from the log at the next start.
     """
@@ -29,13 +30,12 @@ def run_command(fleet: Fleet, as_json: Json = False) -> None:
             await log.use_partitions(settings.partitions)
 
     asyncio.run(prepare())
-    with FleetCoordinator(settings, axes) as coordinator:
+    stop = threading.Event()
+    with calls_at_end(stop.set), FleetCoordinator(settings, axes) as coordinator:
         if not as_json:
-            print(f"{settings.workers} workers share {settings.partitions} partitions of {len(axes)} axes; Ctrl-C ends")
-        try:
-            while True:
-                coordinator.step()
-                time.sleep(_STEP_S)
-        except KeyboardInterrupt:
-            if not as_json:
-                print("stopped; the log has everything that is not processed yet")
+            about = f"{settings.workers} workers share {settings.partitions} partitions of {len(axes)} axes"
+            print(f"{about}; Ctrl-C ends", flush=True)
+        while not stop.wait(_STEP_S):
+            coordinator.step()
+    if not as_json:
+        print("stopped; the log has everything that is not processed yet")

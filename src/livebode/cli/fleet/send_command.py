@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import signal
 import threading
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +11,7 @@ import typer
 
 from livebode.cli.fleet.options import Fleet
 from livebode.cli.options import Json
+from livebode.core.ending import calls_at_end
 
 
 def send_command(
@@ -19,7 +19,7 @@ def send_command(
     fleet: Fleet,
     as_json: Json = False,
 ) -> None:
-    """Send the samples of live sources to the log, through a buffer on disk, until they end or Ctrl-C.
+    """Send the samples of live sources to the log, through a buffer on disk, until they end, Ctrl-C or SIGTERM.
 
     While the log cannot be reached, the buffer grows up to its limit; then its oldest messages are deleted and counted.
     """
@@ -33,10 +33,10 @@ def send_command(
     axes = ConfigurationFile(axis, {}).read()
     keys = {machine_key(one, f"{axis}, axis {name}" if name else str(axis)): one for name, one in axes.items()}
     stop = threading.Event()
-    signal.signal(signal.SIGINT, lambda *_: stop.set())
     with contextlib.ExitStack() as opened:
         sources = {key: opened.enter_context(make_source(one.source).open()) for key, one in keys.items()}
-        if not as_json:
-            print(f"{len(sources)} axes send to {settings.log.url}; Ctrl-C ends", flush=True)
-        sent = send_sources(settings, sources, stop)
+        with calls_at_end(stop.set):  # not before: a source opens with the first data of its sender
+            if not as_json:
+                print(f"{len(sources)} axes send to {settings.log.url}; Ctrl-C ends", flush=True)
+            sent = send_sources(settings, sources, stop)
     print(to_json({"messages": sent}) if as_json else f"the log has stored {sent} messages")

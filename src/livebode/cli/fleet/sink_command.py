@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 from typing import Annotated
 
 import typer
 
 from livebode.cli.fleet.options import Fleet
 from livebode.cli.options import Json
+from livebode.core.ending import calls_at_end
 
 
 def sink_command(
@@ -19,8 +19,8 @@ def sink_command(
 ) -> None:
     """Store the results of a fleet in a lake, each once: all of them, their means over minutes and hours, and events.
 
-    The log has them for a limited time, the lake as long as [sink] says. It ends at Ctrl-C, and may be killed: the lake
-    contains the position up to which the log was read.
+    The log has them for a limited time, the lake as long as [sink] says. It ends at Ctrl-C or SIGTERM, and may be
+    killed: the lake contains the position up to which the log was read.
     """
     from livebode.fleet.log import FleetLog
     from livebode.fleet.settings import FleetSettings
@@ -36,10 +36,10 @@ def sink_command(
             await log.create_streams()
             sink, stop = Sink(log, settings.sink), asyncio.Event()
             loop = asyncio.get_running_loop()
-            signal.signal(signal.SIGINT, lambda *_: loop.call_soon_threadsafe(stop.set))
-            if not (as_json or once):
-                print(f"results of {settings.log.url} are stored in {url}; Ctrl-C ends", flush=True)
-            await sink.run(stop, once=once)
+            with calls_at_end(lambda: loop.call_soon_threadsafe(stop.set)):
+                if not (as_json or once):
+                    print(f"results of {settings.log.url} are stored in {url}; Ctrl-C ends", flush=True)
+                await sink.run(stop, once=once)
             return sink.totals
 
     totals = asyncio.run(store())

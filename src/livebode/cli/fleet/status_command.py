@@ -47,6 +47,8 @@ def _show(found: dict[str, Any]) -> None:
         f"{log['waiting']:,} not processed yet"
     )
     print(f"axes: {len(found['axes'])} with data, {len(found['without_data'])} without")
+    for one in found["sinks"]:
+        print(f"sink of {one['lake']}: {one['behind']:,} messages of results behind, {one['behind_s']:,.0f} s")
     for alarm in found["alarms"][:_SHOWN]:
         print(f"alarm: {alarm}")
     if len(found["alarms"]) > _SHOWN:

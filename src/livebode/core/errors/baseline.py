@@ -36,6 +36,7 @@ class BaselineError(LivebodeError):
         "run-not-of-machine": "A run does not come from `livebode run` and so has no description of its machine.",
         "run-not-periodic": "A run is of an estimator for an excitation that does not repeat.",
         "run-repeated": "Two of the runs contain the same samples.",
+        "run-without-responses": "A run has modes of the output alone, and no responses.",
         "runs-differ": "The runs have different lines, signals or options.",
         "settings-differ": "The baseline was learned with other settings than those of the run.",
         "too-few-windows": "The runs have too few windows to learn a baseline from.",

@@ -1,0 +1,75 @@
+"""A lake with runs of outputs alone among others: what needs responses says so, and everything else works."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from distributed import LocalCluster
+
+from tests.support import ringing
+from tests.support.archives import RECIPE, write_recording
+from tests.support.command import livebode
+
+BAND = """
+[signals]
+output = "y"
+[output_only]
+band_hz = [20.0, 40.0]
+"""
+
+
+@pytest.fixture(scope="module")
+def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A lake of an axis with responses and of a spindle of which only the output is recorded."""
+    folder = tmp_path_factory.mktemp("mixed")
+    for kind in ("milling", "spindles"):
+        (folder / kind / f"{kind} 1").mkdir(parents=True)
+    write_recording(folder / "milling" / "milling 1" / "log.parquet", 1)
+    (output,) = ringing.two_modes(1, 6000)
+    columns = {"t": np.arange(len(output)) / ringing.RATE_HZ, "y": output}
+    pq.write_table(pa.table(columns), folder / "spindles" / "spindles 1" / "log.parquet")
+    with LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        host="127.0.0.1",
+        protocol="tcp://",
+        dashboard_address="127.0.0.1:0",
+    ) as cluster:
+        for kind, recipe in (("milling", RECIPE), ("spindles", BAND)):
+            (folder / f"{kind}-recipe.toml").write_text(recipe)
+            archive = folder / f"{kind}.toml"
+            archive.write_text(
+                f'inputs = ["{kind}/{{machine}}/*.parquet"]\nrecipe = "{kind}-recipe.toml"\nlake = "lake"\n'
+                f'[cluster]\naddress = "{cluster.scheduler_address}"\n'
+            )
+            done = livebode("archive", "run", archive)
+            assert done.code == 0, done.err
+    return folder / "lake"
+
+
+def test_a_run_without_responses_gives_no_baseline_and_one_sentence_says_why(lake: Path, tmp_path: Path) -> None:
+    learned = livebode("archive", "learn", lake, "--each", "--out", tmp_path / "{machine}.json", "--json")
+    refused = {one["machine"]: one for one in json.loads(learned.out)["refused"]}
+    assert learned.code == 2
+    assert refused["spindles 1"]["code"] == "baseline.run-without-responses"
+    assert "no response to learn from" in refused["spindles 1"]["message"]
+    assert refused["milling 1"]["code"] == "baseline.too-few-windows"  # this one has responses
+
+
+def test_list_trend_and_report_have_the_machines_of_both_kinds(lake: Path, tmp_path: Path) -> None:
+    listed = json.loads(livebode("archive", "list", lake, "--json").out)["machines"]
+    assert [(one["machine"], one["runs"]) for one in listed] == [("milling 1", 1), ("spindles 1", 1)]
+    for quantity, machine in (("J", "milling 1"), ("mode 1:frequency", "spindles 1")):
+        trend = livebode("archive", "trend", lake, quantity)
+        assert (trend.code, machine in trend.out) == (0, True), trend.err
+    reported = livebode("archive", "report", lake, "--out", tmp_path / "hall.html")
+    assert reported.code == 0, reported.err
+    page = (tmp_path / "hall.html").read_text()
+    assert "milling 1" in page
+    assert "spindles 1" in page
