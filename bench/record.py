@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.job import LINES, RATE_HZ, WINDOW, best_s, signals
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel
 from livebode.estimation import Settings, Tracker
 from livebode.preparation.checks import ChannelCheck

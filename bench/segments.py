@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 from bench.job import LINES
 from bench.record import NAMES, tracker_at
 from livebode.analysis.overview import Overview
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel
 from livebode.preparation.checks import ChannelCheck
 from livebode.records import RunRecord

@@ -12,7 +12,7 @@ import pytest
 from livebode.analysis.averaged import averaged
 from livebode.analysis.fits import fit_averaged, plain_fit
 from livebode.configuration import Axis
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.core import Lines, Response
 from livebode.excitation import multisine
 from livebode.fitting import fit

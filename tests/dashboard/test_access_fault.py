@@ -16,7 +16,8 @@ import pytest
 import websockets
 from websockets.sync.client import connect
 
-from livebode.configuration.axis import Axis, ServeSection
+from livebode.configuration.axis import Axis
+from livebode.configuration.serve_section import ServeSection
 from livebode.core import ConfigError, Event, LivebodeError, ServerError
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.access import Access

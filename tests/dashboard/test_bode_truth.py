@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from livebode.configuration.axis import LoopSection
+from livebode.configuration.loop_section import LoopSection
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.overlays import grid_hz
 from livebode.fitting import EvaluationGrid, model_named

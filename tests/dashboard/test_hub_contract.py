@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.analysis.overview import Overview
-from livebode.configuration.axis import LoopSection
+from livebode.configuration.loop_section import LoopSection
 from livebode.core import Block, Event, Lines, Responses, ServerError
 from livebode.dashboard import Hub
 from livebode.dashboard.alarm_actions import acknowledgement

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from livebode.configuration.axis import LoopSection
+from livebode.configuration.loop_section import LoopSection
 from livebode.dashboard import Dashboard, Serving
 from livebode.records import RunRecord
 from tests.support.browser import Tab

@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Event, RecordError
 from livebode.estimation import Tracker
 from livebode.records import RunDirectory, RunRecord

@@ -12,7 +12,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel, Event, Lines
 from livebode.dashboard.notices import EventCauses, event_id
 from livebode.estimation import Settings, Tracker

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.core import PID, Loop, PlantKinds
 from livebode.fitting import EvaluationGrid, TwoMass
 from livebode.runtime.fits import Fits

@@ -14,7 +14,8 @@ import pytest
 from livebode import example_axis
 from livebode.analysis.fits import fit_run
 from livebode.configuration import Axis
-from livebode.configuration.axis import FitSection, LoopSection, PIDSection
+from livebode.configuration.fit_section import FitSection
+from livebode.configuration.loop_section import LoopSection, PIDSection
 from livebode.core import Block, Channel, ConfigError, Event, PlantKinds, RecordingError, SourceError, SpectraLayout
 from livebode.estimation import Settings, Tracker
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection

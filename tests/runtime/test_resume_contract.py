@@ -9,7 +9,8 @@ import pyarrow as pa
 import pytest
 
 from livebode import MotionCorrection, Tracker
-from livebode.configuration.axis import FitSection, RecordSection
+from livebode.configuration.fit_section import FitSection
+from livebode.configuration.record_section import RecordSection
 from livebode.estimation.stream_estimator import Follower
 from livebode.monitoring import Baseline, Monitor
 from livebode.records import RunRecord

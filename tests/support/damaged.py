@@ -15,7 +15,8 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from livebode.configuration.axis import FitSection, RecordSection
+from livebode.configuration.fit_section import FitSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import DamageWarning, Event, LivebodeError, UsageError
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed

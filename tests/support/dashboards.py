@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis.overview import Overview
-from livebode.configuration.axis import FitSection, LoopSection, RecordSection
+from livebode.configuration.fit_section import FitSection
+from livebode.configuration.loop_section import LoopSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel, Lines, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Settings, Tracker

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel, Event, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.records import RunRecord

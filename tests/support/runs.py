@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from livebode.configuration import Axis
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.estimation.stream_estimator import Follower
 from livebode.records import RunRecord
 from livebode.records.piece import parts_of

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.configuration.ready import ReadyCondition
 from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
 from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, SpectraTracker, Tracker

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from livebode.configuration import Axis
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine

@@ -9,7 +9,8 @@ import numpy as np
 
 from livebode.analysis.difference import ALPHA, Compared
 from livebode.analysis.fits import fit_averaged
-from livebode.configuration.axis import FitSection, LoopSection
+from livebode.configuration.fit_section import FitSection
+from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import LivebodeError
 from livebode.fitting import Fit

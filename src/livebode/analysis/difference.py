@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.analysis.averaged import Averaged, averaged
-from livebode.configuration.axis import TrackingSection
 from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.tracking_section import TrackingSection
 from livebode.core import PER_LINE, GridError, Lines, Response, Responses, widened
 from livebode.fitting import RunningMean
 from livebode.records import RunRecord

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis.averaged import Averaged, averaged
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.configuration.fit_settings import chosen_model, fit_settings
 from livebode.core import read_unit, split_plant_unit
 from livebode.fitting import Fit, fit

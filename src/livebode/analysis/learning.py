@@ -8,7 +8,8 @@ from datetime import UTC, datetime
 from os import PathLike
 from typing import Any, Protocol
 
-from livebode.configuration.axis import Axis, FitSection
+from livebode.configuration.axis import Axis
+from livebode.configuration.fit_section import FitSection
 from livebode.configuration.fit_settings import fitter_of
 from livebode.configuration.recorded import recorded_configuration
 from livebode.configuration.recording import open_recording

@@ -8,7 +8,7 @@ from typing import cast
 from livebode.analysis.averaged import averaged
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.poles import fit_poles
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.core import FitError, GridError
 from livebode.fitting import POLE_MODELS, CommonPoles, Fit
 from livebode.fitting.pole_search import Kind

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis.fits import fit_run
-from livebode.configuration.axis import Axis, FitSection, LoopSection
+from livebode.configuration.axis import Axis
+from livebode.configuration.fit_section import FitSection
+from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import FitError, Loop, Parameters, Responses
 from livebode.fitting import Fit, Fitter, mean_response

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from livebode.analysis.averaged import averaged
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import UsageError
 from livebode.fitting.common_poles import CommonPoles, fit_common_poles

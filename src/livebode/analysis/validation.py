@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from livebode.analysis.fits import fit_run
-from livebode.configuration.axis import Axis, FitSection
+from livebode.configuration.axis import Axis
+from livebode.configuration.fit_section import FitSection
 from livebode.configuration.ready import ReadyCondition
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Block, FitError, RecordError, SignalError, UsageError

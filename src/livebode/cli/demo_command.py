@@ -14,7 +14,7 @@ from livebode.cli import terminal
 from livebode.cli.options import Json, Port, Serve
 from livebode.cli.pictures import drawing, show
 from livebode.cli.serving import served
-from livebode.configuration.axis import ServeSection
+from livebode.configuration.serve_section import ServeSection
 from livebode.core import Responses
 from livebode.records import to_json
 from livebode.runtime import Destination, Document

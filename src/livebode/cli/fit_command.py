@@ -11,7 +11,7 @@ from livebode.cli.band import parsed_band
 from livebode.cli.options import Json
 from livebode.cli.pictures import show_fit, show_poles
 from livebode.configuration import Axis
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import UsageError
 from livebode.fitting import POLE_MODELS

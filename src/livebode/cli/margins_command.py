@@ -41,7 +41,7 @@ def margins_command(
     Writes margins.png to the run directory.
     """
     from livebode.analysis.loop_report import loop_of_run
-    from livebode.configuration.axis import FitSection
+    from livebode.configuration.fit_section import FitSection
     from livebode.report import save_loop_picture
 
     given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}

@@ -127,7 +127,7 @@ def _no_limits() -> Exception:
 
 def _judged(directory: Path, on: Path) -> Judged:
     from livebode.analysis.validation import validate_run
-    from livebode.configuration.axis import FitSection
+    from livebode.configuration.fit_section import FitSection
     from livebode.configuration.recorded import recorded_configuration
     from livebode.records import RunRecord
     from livebode.reporting.report_data import Judged

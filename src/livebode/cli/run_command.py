@@ -19,7 +19,7 @@ from livebode.cli.pictures import drawing, show, tracked_amount
 from livebode.cli.remote import recorded_at
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
-from livebode.configuration.axis import ServeSection
+from livebode.configuration.serve_section import ServeSection
 from livebode.core import ConfigError, LivebodeError, LocationError, UsageError
 from livebode.locations import Location, Url, local_copy, location, original
 from livebode.records import to_json

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from livebode.configuration.axis import ServeSection
+from livebode.configuration.serve_section import ServeSection
 from livebode.core.ending import calls_at_end
 from livebode.runtime import Subscriber
 

@@ -19,7 +19,7 @@ from livebode.records import RunRecord, to_json
 from livebode.runtime import Destination, run
 
 if TYPE_CHECKING:
-    from livebode.configuration.axis import FitSection
+    from livebode.configuration.fit_section import FitSection
     from livebode.validation import LineValidation, Validation
 
 Channels = dict[str, str | None]
@@ -60,7 +60,7 @@ def validate_command(
     machine whose plant changes with position. The channels default to those of the run. A model whose simulation is
     not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was.
     """
-    from livebode.configuration.axis import FitSection
+    from livebode.configuration.fit_section import FitSection
     from livebode.configuration.recorded import recorded_configuration
 
     base = recorded_configuration(RunRecord.open(directory).summary).get("fit", {}) | (

@@ -9,7 +9,8 @@ import typer
 
 from livebode.cli.options import Port, ServeFile
 from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
-from livebode.configuration.axis import ServeSection, serve_section
+from livebode.configuration.axis import serve_section
+from livebode.configuration.serve_section import ServeSection
 from livebode.locations import location
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.core import ConfigError, PlantKinds
 from livebode.fitting import POLE_MODELS, Fitter, PhysicalModel, model_named
 

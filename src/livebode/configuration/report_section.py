@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
-from livebode.configuration.section import File, Language
+from livebode.configuration.section import ConfigurationSection, File, Language
 from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.core import ConfigError, nearest_name
 from livebode.core.document import Paper
@@ -37,11 +37,7 @@ def _known_quantity(name: str) -> str:
     return name
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class LimitSection(_Section):
+class LimitSection(ConfigurationSection):
     """[[report.limits]]: a quantity of the machine and what it must not fall below or exceed.
 
     Parameters
@@ -77,7 +73,7 @@ class LimitSection(_Section):
         return self
 
 
-class ReportSection(_Section):
+class ReportSection(ConfigurationSection):
     """[report]: the first page of `livebode report` and `livebode compare`, and the limits of the machine.
 
     Parameters

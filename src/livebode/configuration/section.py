@@ -1,11 +1,11 @@
-"""Types of values that several sections of a configuration have."""
+"""What the sections of a configuration have in common: how strict they are, and types of values."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from livebode.language import available
 
@@ -18,3 +18,10 @@ def _known_language(code: str) -> str:
 
 File = Annotated[Path, Field(strict=False)]
 Language = Annotated[str, AfterValidator(_known_language)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class ConfigurationSection(BaseModel):
+    """A table that accepts its own keys only, each with its own type."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)

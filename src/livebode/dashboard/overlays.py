@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.configuration.fit_settings import chosen_model
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Lines, LivebodeError, Quantity, Responses

@@ -11,7 +11,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.configuration.axis import LoopSection
+from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Lines, Loop, PlantKinds, Quantity, Responses, ServerError, split_plant_unit
 from livebode.estimation.quantities import convert

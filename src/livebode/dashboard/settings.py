@@ -10,7 +10,7 @@ import stat
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.configuration.axis import ServeSection
+from livebode.configuration.serve_section import ServeSection
 from livebode.core import ConfigError
 from livebode.sources.live.secret import secret
 

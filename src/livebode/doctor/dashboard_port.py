@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from livebode.configuration.axis import Axis, ServeSection
+from livebode.configuration.axis import Axis
+from livebode.configuration.serve_section import ServeSection
 from livebode.core import LivebodeError
 from livebode.dashboard.dashboard import listening
 from livebode.dashboard.settings import Serving

@@ -10,7 +10,8 @@ from typing import Any, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from livebode.configuration.axis import LoopSection, nearest
+from livebode.configuration.axis import nearest
+from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.toml_file import read_table, shortened
 from livebode.core import ConfigError, nearest_name
 from livebode.experiment_design import ExperimentSpec, Machine, MachineLimits, belt_machine

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from livebode.analysis.averaged import mean_of
-from livebode.configuration.axis import LoopSection
+from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import ConfigError, read_unit, split_plant_unit
 from livebode.experiment_design import Machine, MeasuredResponse, measured_machine

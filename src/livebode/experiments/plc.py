@@ -7,7 +7,8 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.configuration.axis import SAME_RATE, Axis
+from livebode.configuration.axis import Axis
+from livebode.configuration.loop_section import SAME_RATE
 from livebode.core import ConfigError, Lines, UsageError, counted
 from livebode.excitation import multisine
 from livebode.experiment_design import Waveform

@@ -13,7 +13,9 @@ import pyarrow as pa
 from livebode.analysis.averaged import Averaged, averaged
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import loop_report
-from livebode.configuration.axis import Axis, FitSection, LoopSection
+from livebode.configuration.axis import Axis
+from livebode.configuration.fit_section import FitSection
+from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Event, Lines, LivebodeError, Loop, PlotKind, Response, Responses, counted, plot_responses

@@ -14,7 +14,8 @@ from livebode.analysis.averaged import Averaged, averaged
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import LoopReport, loop_report
 from livebode.analysis.parameter_track import MARGINS, Track, tracks
-from livebode.configuration.axis import FitSection, LoopSection
+from livebode.configuration.fit_section import FitSection
+from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration, recorded_report
 from livebode.configuration.report_section import ReportSection
 from livebode.core import LivebodeError, Responses

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from livebode.configuration.axis import Axis, RecordSection
+from livebode.configuration.axis import Axis
+from livebode.configuration.record_section import RecordSection
 from livebode.core import ConfigError, Event
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.run_control import RunControl

@@ -6,7 +6,8 @@ from dataclasses import replace
 from math import nan
 from typing import TYPE_CHECKING, Any
 
-from livebode.configuration.axis import Axis, MonitoringSection
+from livebode.configuration.axis import Axis
+from livebode.configuration.monitoring_section import MonitoringSection
 from livebode.core import Block, Event, Parameters, RecordError, Responses
 from livebode.core.state import Stage, decode, encode
 from livebode.estimation import Settings

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from livebode.configuration.axis import FitSection, LoopSection, PIDSection
+from livebode.configuration.fit_section import FitSection
+from livebode.configuration.loop_section import LoopSection, PIDSection
 from livebode.core import Lines, UsageError
 from livebode.estimation import Settings, Tracker, plant_kinds
 from livebode.excitation import multisine

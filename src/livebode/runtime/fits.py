@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis.fits import plain_fit
-from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_section import FitSection
 from livebode.configuration.fit_settings import chosen_model, fitter_of
 from livebode.core import Event, Loop, Parameters, PlantKinds, Responses
 from livebode.core.state import Stage, decode, encode

@@ -10,7 +10,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from livebode.configuration.axis import Axis, RecordSection
+from livebode.configuration.axis import Axis
+from livebode.configuration.record_section import RecordSection
 from livebode.core import ConfigError, Event, LivebodeError
 from livebode.core.clock import moments_by
 from livebode.runtime import successors

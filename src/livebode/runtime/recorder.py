@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol, Self
 
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Event, Responses
 from livebode.runtime.documents import Document
 

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Event
 from livebode.runtime.pipeline import Pipeline
 from livebode.sources.live import Health, LiveSource

@@ -13,7 +13,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from livebode.analysis.overview import Overview
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel, Event, LivebodeError, Parameters, Responses, SignalError
 from livebode.estimation import plant_kinds, response_unit
 from livebode.fitting import Fit

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel, Event, RecordError, Responses, Spectra, StateError, Stateful
 from livebode.core.clock import RunClock
 from livebode.core.files import whole_files

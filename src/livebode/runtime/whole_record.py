@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Self
 
-from livebode.configuration.axis import RecordSection
+from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Event, Responses
 from livebode.records import RunDirectory
 from livebode.runtime.documents import Document, FitResults

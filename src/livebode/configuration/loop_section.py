@@ -1,0 +1,178 @@
+"""[loop]: the controllers of the loop, and what they form."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from livebode.configuration.section import ConfigurationSection, Positive
+from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, counted
+
+SAME_RATE = 1e-6
+Ticks = Annotated[int, Field(ge=0)]
+
+
+class _ControllerSection(ConfigurationSection):
+    """What all controllers have.
+
+    Parameters
+    ----------
+    rate_hz
+        Computations of the controller per second, in Hz.
+    rate_divider
+        Samples of the recording for which one output is held: the sampling rate divided by rate_hz.
+    hold
+        "zero-order": the output is held between computations. "none": the controller interpolates.
+    delay_ticks
+        Delay between reading the input and acting, in samples of the recording, in addition to the hold.
+    """
+
+    rate_hz: Positive
+    rate_divider: Annotated[int, Field(ge=1)] = 1
+    hold: Literal["zero-order", "none"] = "zero-order"
+    delay_ticks: Ticks = 0
+
+
+class PIDSection(_ControllerSection):
+    """A controller gain·(1 + I/Ti + Td·D/(1 + Tf·D)).
+
+    Parameters
+    ----------
+    gain
+        Proportional gain: of [loop.velocity] in units of the input per unit of velocity, of [loop.position] in 1/s.
+    integral_time_s
+        Integral time Ti in seconds. Default: no integrator.
+    derivative_time_s
+        Derivative time Td in seconds; 0: no derivative.
+    derivative_filter_s
+        Time constant Tf of the derivative's filter in seconds; 0: no filter.
+    integrator
+        Integration rule.
+    """
+
+    gain: float
+    integral_time_s: Annotated[float, Field(gt=0)] = inf
+    derivative_time_s: Annotated[float, Field(ge=0)] = 0.0
+    derivative_filter_s: Annotated[float, Field(ge=0)] = 0.0
+    integrator: Literal["backward", "forward", "trapezoidal", "continuous"] = "backward"
+
+
+class PositionPDSection(_ControllerSection):
+    """[loop.position_pd]: a PD controller kv·(kp + D) of the position, instead of [loop.velocity] and [loop.position].
+
+    Parameters
+    ----------
+    position_gain
+        Position gain kp in 1/s.
+    velocity_gain
+        Velocity gain kv, in units of the input per unit of velocity.
+    smoothed
+        D is the difference of the means of two neighbouring positions.
+    """
+
+    position_gain: float
+    velocity_gain: float
+    smoothed: bool = False
+
+
+class LoopSection(ConfigurationSection):
+    """[loop]: the controllers, the injection point of the excitation, and the times at which signals are logged.
+
+    Parameters
+    ----------
+    excitation_at
+        Injection point: where the excitation is added.
+    entry_gain
+        Injection gain: factor on the excitation at the injection point.
+    input_logged
+        The input is logged before or after the controller's update.
+    excitation_logged
+        The excitation is logged before or after the controller's update.
+    output_logged
+        The output is logged before or after the controller's update.
+    velocity
+        The velocity controller. It belongs to an output that is a velocity.
+    position
+        The position controller around the velocity controller.
+    position_pd
+        The whole controller of an output that is a position.
+    """
+
+    excitation_at: Literal["plant input", "velocity reference", "output"] = "plant input"
+    entry_gain: float = 1.0
+    input_logged: Literal["before", "after"] = "after"
+    excitation_logged: Literal["before", "after"] = "after"
+    output_logged: Literal["before", "after"] = "before"
+    velocity: PIDSection | None = None
+    position: PIDSection | None = None
+    position_pd: PositionPDSection | None = None
+
+    def build(self, rate_hz: float) -> Loop:
+        """The Loop of this description, recorded at `rate_hz`; ConfigError if its parts do not form one."""
+        for name in ("velocity", "position", "position_pd"):
+            part: _ControllerSection | None = getattr(self, name)
+            if part is not None and abs(part.rate_hz * part.rate_divider / rate_hz - 1) > SAME_RATE:
+                held = counted(part.rate_divider, "tick")
+                raise ConfigError(
+                    "rate-mismatch",
+                    f"loop.{name} has a rate of {part.rate_hz:g} Hz and holds {held}, which gives "
+                    f"{part.rate_hz * part.rate_divider:g} Hz, but the sampling rate is {rate_hz:g} Hz",
+                    "set rate_divider to the sampling rate divided by the rate of the controller",
+                    key=f"loop.{name}",
+                    rate_hz=rate_hz,
+                    controller_rate_hz=part.rate_hz,
+                    rate_divider=part.rate_divider,
+                )
+        return Loop(
+            feedback=self._feedback(),
+            entry=self._entry(),
+            input_logged=self.input_logged,
+            excitation_logged=self.excitation_logged,
+            output_logged=self.output_logged,
+        )
+
+    def _feedback(self) -> Model | None:
+        if self.position_pd is not None:
+            if self.velocity or self.position:
+                raise ConfigError(
+                    "key-conflict",
+                    "loop.position_pd is the whole controller",
+                    "remove loop.velocity and loop.position",
+                    key="loop.position_pd",
+                )
+            return PositionPD(**self.position_pd.model_dump())
+        if self.velocity is None:
+            if self.position is not None:
+                raise ConfigError(
+                    "incomplete",
+                    "loop.position needs loop.velocity inside it",
+                    "describe the velocity controller also",
+                    key="loop.velocity",
+                )
+            return None
+        velocity = PID(**self.velocity.model_dump())
+        return velocity if self.position is None else Cascade(velocity, PID(**self.position.model_dump()))
+
+    def _entry(self) -> Model | None:
+        if self.excitation_at == "plant input":
+            return None if self.entry_gain == 1.0 else Gain(self.entry_gain)
+        if self.excitation_at == "velocity reference":
+            if self.velocity is None:
+                raise ConfigError(
+                    "incomplete",
+                    "loop.excitation_at = 'velocity reference' needs loop.velocity",
+                    "describe the velocity controller",
+                    key="loop.velocity",
+                )
+            return self.entry_gain * PID(**self.velocity.model_dump())
+        feedback = self._feedback()
+        if feedback is None:
+            raise ConfigError(
+                "incomplete",
+                "loop.excitation_at = 'output' needs the loop's controllers",
+                "describe loop.velocity",
+                key="loop.velocity",
+            )
+        return Gain(-self.entry_gain) * feedback
