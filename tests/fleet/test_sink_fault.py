@@ -24,7 +24,7 @@ from livebode.fleet.settings import LogSection, SinkSection
 from livebode.fleet.sink import Sink
 from livebode.fleet.status import fleet_status
 from livebode.fleet.subjects import RESULT_STREAM, RESULTS, axis_path
-from livebode.lake import LEVELS, Lake, StreamTable, stream_table
+from livebode.lake import LEVELS, Lake, stream_table
 from tests.support.command import livebode
 from tests.support.fitted_fleet import fitted_axes, fitted_sent
 from tests.support.fleet_runs import (
@@ -88,7 +88,7 @@ def kill_at(step: int) -> None:
         return run
 
     stream_table.write_whole = around(stream_table.write_whole)  # type: ignore[attr-defined]
-    StreamTable._commit = around(StreamTable._commit)  # type: ignore[method-assign]
+    Lake.commit = around(Lake.commit)  # type: ignore[method-assign]
 
 
 def killed_sinks(log: LogSection, lake: Path, kills: int) -> None:

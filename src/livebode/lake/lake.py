@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -25,7 +25,7 @@ from livebode.locations import Location, Url, delta_options, location, read_byte
 from livebode.locations.storage import make_parent, opened, reporting
 
 try:
-    from deltalake import CommitProperties, DeltaTable
+    from deltalake import CommitProperties, DeltaTable, Transaction
     from deltalake.exceptions import CommitFailedError, DeltaError, TableNotFoundError
     from deltalake.transaction import AddAction, RemoveAction
 except ImportError:
@@ -33,7 +33,6 @@ except ImportError:
 
 Row = tuple[Any, ...]
 _DOWNLOADS = 8
-_ONCE = CommitProperties(max_commit_retries=0)
 
 
 class Lake:
@@ -109,12 +108,12 @@ class Lake:
         """Append the rows whose key is not in the table, and return their number."""
         with self.reported(name):
             while True:
-                table = self._created(name)
+                table = self.created(name)
                 present, own = self._keys(name, table), _rows_of(rows, TABLES[name].key)
                 new = rows.filter(pa.array([key not in present for key in own], pa.bool_()))
                 if not new.num_rows:
                     return 0
-                if self._commit(table, name, [self._group_file(name, new)]):
+                if self.commit(table, name, _added([self._group_file(name, new)])):
                     present.update(own)
                     self._known[name] = (table.version(), present)
                     return int(new.num_rows)
@@ -127,10 +126,10 @@ class Lake:
         """
         with self.reported(name):
             while files:
-                table = self._created(name)
+                table = self.created(name)
                 counted = self.keys("runs")
                 files = [file for file in files if file.rows and file.key not in counted]
-                if not files or self._commit(table, name, files):
+                if not files or self.commit(table, name, _added(files)):
                     return
 
     def store(self, path: Path, table: str) -> None:
@@ -162,14 +161,24 @@ class Lake:
         write_whole(self._place / name / file.name, data)
         return file
 
-    def _commit(self, table: DeltaTable, name: str, files: Sequence[DataFile]) -> bool:
-        """Add the files in the version after the one that was read; False if somebody else has written that one."""
-        before, now_ms = table.version(), time.time_ns() // 1_000_000
-        actions: list[AddAction | RemoveAction] = [
-            AddAction(file.name, file.size_bytes, {}, now_ms, True, file.statistics) for file in files
-        ]
+    def commit(
+        self,
+        table: DeltaTable,
+        name: str,
+        actions: list[AddAction | RemoveAction],
+        positions: Mapping[str, int] | None = None,
+    ) -> bool:
+        """Commit in the version after the one that was read; False if somebody else has written that one.
+
+        The `positions` in streams are stored in the same commit.
+        """
+        before, one = table.version(), TABLES[name]
+        transactions = [Transaction(stream, at) for stream, at in (positions or {}).items()]
+        once = CommitProperties(max_commit_retries=0, app_transactions=transactions)
         try:
-            table.create_write_transaction(actions, "append", TABLES[name].schema, commit_properties=_ONCE)
+            table.create_write_transaction(
+                actions, "append", one.schema, partition_by=one.partitions, commit_properties=once
+            )
         except CommitFailedError:
             table.update_incremental()
             if table.version() == before:
@@ -221,13 +230,16 @@ class Lake:
             return None
         return self._tables[name]
 
-    def _created(self, name: str) -> DeltaTable:
+    def created(self, name: str) -> DeltaTable:
+        """The table at its newest version, which may be a new one."""
         if (table := self.opened(name)) is not None:
             return table
+        one = TABLES[name]
         with suppress(CommitFailedError):  # another process has created it in the same moment
             DeltaTable.create(
-                self._uri(name), TABLES[name].schema, mode="ignore", storage_options=delta_options(self._place)
-            )
+                self._uri(name), one.schema, mode="ignore", partition_by=one.partitions,
+                storage_options=delta_options(self._place),
+            )  # fmt: skip
         self._tables[name] = self._table(name)
         return self._tables[name]
 
@@ -256,3 +268,8 @@ class Lake:
 
 def _rows_of(table: pa.Table, columns: Sequence[str]) -> list[Row]:
     return list(zip(*(table[name].to_pylist() for name in columns)))
+
+
+def _added(files: Sequence[DataFile]) -> list[AddAction | RemoveAction]:
+    now_ms = time.time_ns() // 1_000_000
+    return [AddAction(file.name, file.size_bytes, {}, now_ms, True, file.statistics) for file in files]

@@ -109,6 +109,11 @@ class LakeTable:
     key: tuple[str, ...] = ()
     days: bool = False
 
+    @property
+    def partitions(self) -> list[str] | None:
+        """Columns by whose values its files are divided."""
+        return ["day"] if self.days else None
+
 
 TABLES: Mapping[str, LakeTable] = {
     "runs": LakeTable(RUNS, ("content", "recipe")),

@@ -6,7 +6,6 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from datetime import date
 from pathlib import Path
 from typing import NamedTuple
@@ -14,14 +13,13 @@ from typing import NamedTuple
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from deltalake import CommitProperties, DeltaTable, Transaction
-from deltalake.exceptions import CommitFailedError
+from deltalake import DeltaTable
 from deltalake.transaction import AddAction, RemoveAction
 
 from livebode.lake.data_file import parquet_writer
 from livebode.lake.lake import Lake
 from livebode.lake.schemas import TABLES
-from livebode.locations import delta_options, location, read_bytes, write_whole
+from livebode.locations import location, read_bytes, write_whole
 
 _FILE_BYTES_MIN, _FILE_BYTES_MAX = 32 << 20, 128 << 20
 """Smaller files of a day are joined, up to the larger size together."""
@@ -97,10 +95,10 @@ class StreamTable:
             If the table cannot be written.
         """
         with self._lake.reported(self.name):
-            table = self._created()
+            table = self._lake.created(self.name)
             while (at := _position(table, stream)) < through:
                 positions = {stream: through, **(further or {})}
-                if self._commit(table, [file.added() for file in self._written(rows(at))], positions):
+                if self._lake.commit(table, self.name, [file.added() for file in self._written(rows(at))], positions):
                     return
 
     def read(self, columns: list[str], where: pc.Expression, since: date) -> pa.Table:
@@ -137,7 +135,7 @@ class StreamTable:
         with self._lake.reported(self.name):
             while (table := self._lake.opened(self.name)) is not None:
                 old = [file for file in _files(table) if file.day < day]
-                if not old or self._commit(table, [file.removed() for file in old]):
+                if not old or self._lake.commit(table, self.name, [file.removed() for file in old]):
                     return len(old)
             return 0
 
@@ -152,7 +150,7 @@ class StreamTable:
             for group in _groups([file for file in _files(table) if file.day < day]):
                 rows = pa.concat_tables(self._part(file, self.schema.names, None) for file in group).sort_by(order)
                 actions = [file.added(changed=False) for file in self._written(rows)]
-                if self._commit(table, [*(file.removed(changed=False) for file in group), *actions]):
+                if self._lake.commit(table, self.name, [*(file.removed(changed=False) for file in group), *actions]):
                     joined += len(group)
         return joined
 
@@ -181,41 +179,6 @@ class StreamTable:
             name = f"{day}-{hashlib.sha256(data).hexdigest()}.parquet"
             write_whole(self._place / name, data)
             yield _File(name, day, len(data), own.num_rows)
-
-    def _commit(
-        self,
-        table: DeltaTable,
-        actions: list[AddAction | RemoveAction],
-        positions: Mapping[str, int] | None = None,
-    ) -> bool:
-        """Commit in the version after the one that was read; False if somebody else has written that one."""
-        before = table.version()
-        once = CommitProperties(
-            max_commit_retries=0,
-            app_transactions=[Transaction(name, at) for name, at in (positions or {}).items()],
-        )
-        try:
-            table.create_write_transaction(actions, "append", self.schema, partition_by=["day"], commit_properties=once)
-        except CommitFailedError:
-            table.update_incremental()
-            if table.version() == before:
-                raise
-            return False
-        table.update_incremental()
-        return True
-
-    def _created(self) -> DeltaTable:
-        if (table := self._lake.opened(self.name)) is not None:
-            return table
-        place = self._place
-        address = str(place) if isinstance(place, Path) else place.address
-        with suppress(CommitFailedError):  # another process has created it in the same moment
-            DeltaTable.create(
-                address, self.schema, mode="ignore", partition_by=["day"], storage_options=delta_options(place)
-            )
-        created = self._lake.opened(self.name)
-        assert created is not None
-        return created
 
 
 def _position(table: DeltaTable, stream: str) -> int:
