@@ -11,7 +11,7 @@ Half a million objects of modules and tests live from the collection to the end.
 them: a sixth of the time of a collection was its search through them.
 
 Ctrl-C reaches the processes that tests start. A shell lets what it starts in the background ignore it, and they would
-inherit that: a test would wait for the end of a command for ever.
+inherit that: a test would never see the end of a command.
 """
 
 import gc

@@ -9,10 +9,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from distributed import LocalCluster
 
 from tests.support import ringing
-from tests.support.archives import RECIPE, write_recording
+from tests.support.archives import RECIPE, cluster_here, write_recording
 from tests.support.command import livebode
 
 BAND = """
@@ -33,20 +32,13 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (output,) = ringing.two_modes(1, 6000)
     columns = {"t": np.arange(len(output)) / ringing.RATE_HZ, "y": output}
     pq.write_table(pa.table(columns), folder / "spindles" / "spindles 1" / "log.parquet")
-    with LocalCluster(
-        n_workers=1,
-        threads_per_worker=1,
-        processes=False,
-        host="127.0.0.1",
-        protocol="tcp://",
-        dashboard_address="127.0.0.1:0",
-    ) as cluster:
+    with cluster_here() as address:
         for kind, recipe in (("milling", RECIPE), ("spindles", BAND)):
             (folder / f"{kind}-recipe.toml").write_text(recipe)
             archive = folder / f"{kind}.toml"
             archive.write_text(
                 f'inputs = ["{kind}/{{machine}}/*.parquet"]\nrecipe = "{kind}-recipe.toml"\nlake = "lake"\n'
-                f'[cluster]\naddress = "{cluster.scheduler_address}"\n'
+                f'[cluster]\naddress = "{address}"\n'
             )
             done = livebode("archive", "run", archive)
             assert done.code == 0, done.err

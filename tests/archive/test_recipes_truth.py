@@ -10,7 +10,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from distributed import LocalCluster
 
 from livebode import ConfigError
 from livebode.archive.coordinator import ArchiveOutcome, Coordinator, Progress
@@ -18,7 +17,7 @@ from livebode.archive.settings import ArchiveSettings
 from livebode.lake import Lake
 from livebode.trending import Selection, history
 from tests.support import ringing
-from tests.support.archives import write_archive, write_recording
+from tests.support.archives import cluster_here, write_archive, write_recording
 
 AXES = """
 [signals]
@@ -47,15 +46,8 @@ FASTER = 2.0
 
 @pytest.fixture
 def address() -> Iterator[str]:
-    with LocalCluster(
-        n_workers=1,
-        threads_per_worker=1,
-        processes=False,
-        host="127.0.0.1",
-        protocol="tcp://",
-        dashboard_address="127.0.0.1:0",
-    ) as cluster:
-        yield cluster.scheduler_address
+    with cluster_here() as address:
+        yield address
 
 
 def run(archive: Path) -> tuple[ArchiveOutcome, dict[str, int]]:

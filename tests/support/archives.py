@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from deltalake import DeltaTable
+from distributed import LocalCluster
 
 from livebode.archive.committing import Committer
 from livebode.archive.coordinator import Coordinator, Progress
@@ -146,3 +148,17 @@ def _sha256(path: Path) -> str:
 
 def _write(path: Path, columns: dict[str, Any]) -> None:
     pq.write_table(pa.table(columns), path)
+
+
+@contextmanager
+def cluster_here() -> Iterator[str]:
+    """The address of a cluster with one worker, a thread of this process."""
+    with LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        host="127.0.0.1",
+        protocol="tcp://",
+        dashboard_address="127.0.0.1:0",
+    ) as cluster:
+        yield cluster.scheduler_address
