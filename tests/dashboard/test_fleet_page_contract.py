@@ -59,8 +59,8 @@ def test_every_tile_shows_the_state_of_its_axis(browser: Browser, served: tuple[
         page.locator("#looks [data-look='silent']").click()
         assert tab.numbers("tiles.shown").tolist() == np.flatnonzero(truth == LOOKS.index("silent")).tolist()
         page.locator("#looks [data-look='silent']").click()
-        # What is drawn is what is known: the pixels of two tiles of different looks.
-        assert tab.js(_PIXELS) == 2
+        # What is drawn, in a frame after the click, is what is known: the pixels of two tiles of different looks.
+        tab.until(f"{_PIXELS} === 2")
         assert tab.wrong == []
 
 

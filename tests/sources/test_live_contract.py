@@ -77,11 +77,13 @@ def test_every_kind_has_a_peer():
 
 
 def test_the_same_samples_come_back_bit_for_bit(peer):
-    given = batches(60)
+    given, looked = batches(60), threading.Event()
 
     def script() -> None:
         peer.wait_ready()
         send_all(peer, given)
+        # A source whose sender has ended is no longer connected.
+        looked.wait(PATIENCE_S)
         peer.end()
 
     with fed(peer, script, **({"reorder_batches": 0} if "udp" in peer.settings["url"] else {})) as source:
@@ -90,6 +92,7 @@ def test_the_same_samples_come_back_bit_for_bit(peer):
         assert source.rate_hz == RATE_HZ
         assert source.samples is None
         assert source.health.connected
+        looked.set()
         assert source.health.lost == 0
         events = source.take_events()
     is_truth(blocks)
