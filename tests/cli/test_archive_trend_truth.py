@@ -124,3 +124,6 @@ def test_two_healthy_axes_do_not_differ(hall: Path) -> None:
     refused = livebode("archive", "compare", hall, "A/L1/M1/x", "A/L2/M2/z")
     assert (refused.code, "did you mean 'A/L2/M2/" in refused.err) == (2, True)
     assert livebode("archive", "compare", hall, "A/L1/M1/x").code == 2
+    nothing = livebode("archive", "compare", hall, "A/L1/M1/x", "--split", "2024-01-01")
+    assert (nothing.code, nothing.out) == (2, "")
+    assert "the runs of A/L1/M1/x before and from 2024-01-01 on have no quantity in common" in nothing.err

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from livebode.core import FleetError
 from livebode.fitting import Fitter, rows
 from livebode.fleet.axis_stream import AxisStream, Output, outputs_together
 from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
+from livebode.fleet.replay import replayed
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import LogSection
@@ -35,6 +37,8 @@ def test_an_axis_whose_baseline_is_absent_or_damaged_fails_alone_and_begins_agai
         found = []
         for part in range(3):
             if part == 1:
+                with pytest.raises(FleetError, match=r"cannot be tracked: .*own\.json"):
+                    asyncio.run(_replayed(settings, bad, axes[bad]))
                 own.write_text('{"format": ')
             if part == 2:
                 shutil.copy(healthy, own)
@@ -127,6 +131,11 @@ def test_an_axis_whose_fit_raises_fails_and_changes_no_bit_of_others(
 async def _status(settings: LogSection, axes: Any) -> dict[str, Any]:
     async with FleetLog(settings, "test") as log:
         return await fleet_status(log, axes)
+
+
+async def _replayed(settings: LogSection, key: str, axis: Any) -> None:
+    async with FleetLog(settings, "test") as log:
+        await replayed(log, key, axis, 0.0)
 
 
 async def _events(settings: LogSection) -> list[dict[str, Any]]:

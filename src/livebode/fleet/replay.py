@@ -44,7 +44,7 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> Replay
     Raises
     ------
     FleetError
-        If the log has no such message.
+        If the log has no such message, or the axis cannot be tracked from the first one on.
     """
     subject = f"{LOG}.*.{key}"
     through = (await log.extent(LOG_STREAM)).last
@@ -63,6 +63,13 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> Replay
             "no-data",
             f"the log has no data of {axis_path(key)} in this time",
             "choose an earlier beginning; see age_days and size_gb in [log]",
+            axis=axis_path(key),
+        )
+    if stream.failure and not batches:
+        raise FleetError(
+            "axis-failed",
+            f"{axis_path(key)} cannot be tracked: {stream.failure}",
+            "repair its configuration or its sender, and choose a beginning after that",
             axis=axis_path(key),
         )
     parameters = None if axis.fit is None else parameter_table(fits)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,11 +12,11 @@ from livebode.cli import terminal
 from livebode.cli.archive.options import LakeOf
 from livebode.cli.archive.selection import SelectionOptions, with_selection
 from livebode.cli.options import Json
-from livebode.core import UsageError
+from livebode.core import ArchiveError, UsageError
 
 if TYPE_CHECKING:
     from livebode.lake import Lake
-    from livebode.trending import History, MachineHistory, Selection
+    from livebode.trending import History, LevelDifference, MachineHistory, Selection
 
 _COLUMNS = ("quantity", "first", "second", "difference", "in %", "unit", "runs")
 
@@ -41,7 +42,6 @@ def compare_command(
     from livebode.archive.settings import lake_url
     from livebode.lake import Lake
     from livebode.records import to_json
-    from livebode.reporting.wording import with_bound
     from livebode.trending import differences
 
     if (second is None) == (split is None):
@@ -53,7 +53,18 @@ def compare_command(
     if as_json:
         print(to_json({"differences": [vars(one) for one in found], "too_few_runs": few}))
         return
+    if found:
+        _print_table(found)
+    for name in few:
+        print(f"{name}: not compared: fewer than 8 runs on a side")
+    if any(one.significant for one in found):
+        print("*: at most 5 % of the differences marked are expected to be none")
+
+
+def _print_table(found: Sequence[LevelDifference]) -> None:
     from rich.table import Table
+
+    from livebode.reporting.wording import with_bound
 
     table = Table(box=None, pad_edge=False)
     for column in _COLUMNS:
@@ -67,10 +78,6 @@ def compare_command(
             f"{one.runs[0]} / {one.runs[1]}",
         )  # fmt: skip
     terminal.console(width=None if terminal.is_terminal() else 1 << 14, markup=False).print(table)
-    for name in few:
-        print(f"{name}: not compared: fewer than 8 runs on a side")
-    if any(one.significant for one in found):
-        print("*: at most 5 % of the differences marked are expected to be none")
 
 
 def _pairs(
@@ -94,10 +101,18 @@ def _pairs(
                 argument="axis", value=axis,
             )  # fmt: skip
     later = {(history.model, history.name): history for history in after}
-    return [
+    pairs = [
         (history, history.machines[first], other.machines[second or first])
         for history in before
         if (other := later.get((history.model, history.name))) is not None
         and first in history.machines
         and (second or first) in other.machines
     ]
+    if not pairs:
+        sides = f"{first} and {second}" if second else f"the runs of {first} before and from {split} on"
+        raise ArchiveError(
+            "nothing-in-common",
+            f"{sides} have no quantity in common",
+            "compare axes or days with runs of the same [fit] model: `livebode archive list` shows them",
+        )
+    return pairs

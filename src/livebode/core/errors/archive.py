@@ -30,6 +30,7 @@ class ArchiveError(LivebodeError):
         "memory-exceeded": "A recording needs more memory than a worker may use.",
         "no-recordings": "No file matches the inputs of the archive.",
         "not-healthy": "Runs that a baseline is to be learned from contain alarms or a jump.",
+        "nothing-in-common": "The two sides of a comparison have no quantity that both have.",
         "process-ended": "The process that tracked a recording was ended by a signal, or ended itself.",
         "quantity-ambiguous": "Several models have a quantity of that name.",
         "quantity-unknown": "No run of the lake has a quantity of that name.",

@@ -22,6 +22,7 @@ class FleetError(LivebodeError):
     codes: ClassVar[Mapping[str, str]] = {
         "authority-unusable": "The certificate of the authority of the log cannot be used.",
         "axis-duplicated": "Two axes of the fleet have the same site, line, machine and axis.",
+        "axis-failed": "The messages of an axis cannot be tracked with its configuration.",
         "axis-unknown": "The fleet has no axis of this path.",
         "axis-unnamed": "An axis of the fleet has no [machine] section, so its place in the log is not defined.",
         "buffer-unusable": "The disk buffer of an edge cannot be read or written.",
