@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 
 import psutil
@@ -9,10 +10,11 @@ import psutil
 from livebode.fleet.coordinator import FleetCoordinator
 from livebode.fleet.settings import FleetSettings
 
+_ABOUT = {"axes": ["a.toml"], "partitions": 1, "workers": 1, "log": {"url": "nats://127.0.0.1:1"}}
+
 
 def test_a_worker_that_is_killed_again_while_it_starts_is_replaced() -> None:
-    about = {"axes": ["a.toml"], "partitions": 1, "workers": 1, "log": {"url": "nats://127.0.0.1:1"}}
-    with FleetCoordinator(FleetSettings.of(about, "a test"), {}) as coordinator:
+    with FleetCoordinator(FleetSettings.of(_ABOUT, "a test"), {}) as coordinator:
         killed = set()
         for pause_s in (0.0, 0.2):
             (process,) = _new(killed)
@@ -25,6 +27,16 @@ def test_a_worker_that_is_killed_again_while_it_starts_is_replaced() -> None:
             time.sleep(0.1)
         # Which of two that were started is the one that remains depends on the moments of the kills.
         assert any(process.is_running() for process in _new(killed, coordinator))
+
+
+def test_a_coordinator_whose_first_worker_is_killed_while_it_starts_starts_again() -> None:
+    killed: set[int] = set()
+    killer = threading.Thread(target=lambda: _new(killed)[0].kill())
+    killer.start()
+    with FleetCoordinator(FleetSettings.of(_ABOUT, "a test"), {}) as coordinator:
+        killer.join()
+        while not coordinator.workers:
+            time.sleep(0.1)
 
 
 def _new(killed: set[int], coordinator: FleetCoordinator | None = None) -> list[psutil.Process]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from multiprocessing.context import ForkServerProcess
@@ -14,9 +16,12 @@ import pytest
 
 from livebode.configuration.axis import Axis
 from livebode.fleet.check import CheckResult
+from livebode.fleet.log import FleetLog
 from livebode.fleet.partition import PartitionOwner
 from livebode.fleet.server import LogServer
 from livebode.fleet.settings import LogSection
+from livebode.fleet.subjects import RESULT_STREAM
+from livebode.fleet.worker import own_partitions
 from tests.support.fleet_runs import (
     PARTITIONS,
     UnfencedOwner,
@@ -48,6 +53,35 @@ def test_with_the_fence_a_frozen_owner_doubles_nothing(server: LogServer) -> Non
     assert result.exact
     assert result.total.responses > 0
     assert result.claims == 2 * PARTITIONS
+
+
+def test_an_owner_without_data_ends_when_another_one_claims_its_partition(server: LogServer) -> None:
+    # Else it keeps the thread of its worker, and when all are taken no partition that moves there begins.
+    settings, ended = log_section(server.url), []
+    asyncio.run(_streams(settings))
+    first = threading.Thread(target=lambda: ended.append(own_partitions(settings, {}, [0], threading.Event())))
+    first.start()
+    _until(lambda: _claims(settings), at_least=1)
+    stop = threading.Event()
+    second = threading.Thread(target=own_partitions, args=(settings, {}, [0], stop))
+    second.start()
+    first.join()
+    stop.set()
+    second.join()
+    assert ended == [[False]]
+
+
+async def _streams(settings: LogSection) -> None:
+    async with FleetLog(settings, "test") as log:
+        await log.create_streams()
+
+
+def _claims(settings: LogSection) -> int:
+    async def count() -> int:
+        async with FleetLog(settings, "test") as log:
+            return (await log.extent(RESULT_STREAM)).last
+
+    return asyncio.run(count())
 
 
 def _frozen(server: LogServer, kind: type[PartitionOwner]) -> CheckResult:

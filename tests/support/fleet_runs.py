@@ -97,6 +97,9 @@ class UnfencedOwner(PartitionOwner):
             except ClaimLostError:
                 continue
 
+    async def _check_claim(self) -> None:
+        pass
+
 
 def start_owner(
     settings: LogSection, axes: Mapping[str, Axis], kind: type[PartitionOwner] = PartitionOwner

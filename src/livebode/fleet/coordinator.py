@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from livebode.configuration.axis import Axis
+from livebode.core.errors import FleetError
 from livebode.core.installing import not_installed
 from livebode.fleet.settings import FleetSettings, LogSection
 from livebode.fleet.worker import own_partitions
@@ -19,6 +20,7 @@ WORKER_TTL_S = 5
 _SILENT_S = 4.0
 """Silence after which a worker gets no partitions and loses its own; a heartbeat comes each half second."""
 _AGAIN_S = 1.0
+_STARTS_MAX = 5
 _LOST_S = 1
 """After which the cluster forgets a worker that its process has left."""
 _logger = logging.getLogger(__name__)
@@ -48,6 +50,8 @@ class FleetCoordinator:
     ------
     ExtraError
         If dask.distributed is not installed.
+    FleetError
+        If workers end again and again while they start.
     """
 
     def __init__(self, settings: FleetSettings, axes: Mapping[str, Axis]) -> None:
@@ -71,17 +75,31 @@ class FleetCoordinator:
                 "distributed.deploy.lost-worker-timeout": f"{_LOST_S}s",
             }
         )
-        self._cluster = LocalCluster(
-            n_workers=self._settings.workers,
-            threads_per_worker=self._settings.partitions,
-            host="127.0.0.1",
-            dashboard_address=None,
-            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else the port that other schedulers use too
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
+        self._cluster = self._started(LocalCluster)
         self._client = Client(self._cluster)
         return self
+
+    def _started(self, cluster: Any) -> Any:
+        """The cluster with its workers; it ends itself where one of them ends before all have started."""
+        for _ in range(_STARTS_MAX):
+            try:
+                return cluster(
+                    n_workers=self._settings.workers,
+                    threads_per_worker=self._settings.partitions,
+                    host="127.0.0.1",
+                    dashboard_address=None,
+                    scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else that of all schedulers
+                    memory_limit=0,
+                    silence_logs=logging.CRITICAL,
+                )
+            except RuntimeError as error:
+                reason = error
+                _logger.warning("a worker ended while it started (%s); starting all again", error)
+        raise FleetError(
+            "workers-ended",
+            f"the workers ended while they started, {_STARTS_MAX} times in succession: {reason}",
+            "look for the reason in the messages before this one and in the system's log, such as too little memory",
+        )
 
     def __exit__(self, *_: object) -> None:
         self._client.close()

@@ -73,6 +73,7 @@ class PartitionOwner:
         self._through = 0
         self._stored = StoredStates()
         self._status_due_s = 0.0
+        self._reported = 0
         self._since_s = time.time()
         self._newest_s = 0.0
         self._page = PageStatus(number, self._owner)
@@ -209,7 +210,16 @@ class PartitionOwner:
         await self._store_states()
         if time.monotonic() >= self._status_due_s:
             self._status_due_s = time.monotonic() + STATUS_S
+            if self._reported == self._result:
+                await self._check_claim()
+            self._reported = self._result
             await self._publish_status(waiting)
+
+    async def _check_claim(self) -> None:
+        """Without data nothing is stored, and so nothing else shows that another process has claimed the partition."""
+        last = await self._log.last(RESULT_STREAM, self._subject)
+        if last is not None and last.number > self._result:
+            raise ClaimLostError(self._subject)
 
     async def _store_results(self) -> None:
         if self._pending:

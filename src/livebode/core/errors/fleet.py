@@ -45,4 +45,5 @@ class FleetError(LivebodeError):
         "server-open": "The server of the log would be open to a network without TLS or keys.",
         "servers-missing": "The log is to have more copies than there are servers.",
         "view-only": "The key of this user may read the log, and store nothing there.",
+        "workers-ended": "The workers of a fleet ended again and again while they started.",
     }
