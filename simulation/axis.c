@@ -8,7 +8,11 @@
 /* Values of one degree of freedom for friction and play. */
 typedef struct {
     double slack, rate; /* elongation beyond the play, and its time derivative */
+    int region;
 } lb_play;
+
+/* Regions of a play within each of which the equations are smooth. */
+enum { LB_FREE = 1, LB_CORNER = 2, LB_ABOVE = 4, LB_BELOW = 8 };
 
 /* viscous v + (coulomb + stribeck/(1 + (v/vs)^2)) v/sqrt(v^2 + w^2); `speed` is v in m/s at the belt. */
 static double friction(double coulomb, double stribeck, double vs, double w, double speed)
@@ -22,13 +26,13 @@ static double friction(double coulomb, double stribeck, double vs, double w, dou
  * up to its second derivative. */
 static lb_play play(double gap, double elongation, double rate)
 {
-    if (gap == 0.0) return (lb_play){elongation, rate};
+    if (gap == 0.0) return (lb_play){elongation, rate, LB_FREE};
     const double round = 0.05 * gap, beyond = fabs(elongation) - 0.5 * gap, into = beyond + round;
-    if (into <= 0.0) return (lb_play){0.0, 0.0};
-    if (beyond >= round) return (lb_play){copysign(beyond, elongation), rate};
+    if (into <= 0.0) return (lb_play){0.0, 0.0, LB_FREE};
+    if (beyond >= round) return (lb_play){copysign(beyond, elongation), rate, elongation > 0.0 ? LB_ABOVE : LB_BELOW};
     const double square = into * into, unit = 16.0 * (round * round * round);
     const double slope = (3.0 * square * (3.0 * round - beyond) - square * into) / unit;
-    return (lb_play){copysign(square * into * (3.0 * round - beyond) / unit, elongation), rate * slope};
+    return (lb_play){copysign(square * into * (3.0 * round - beyond) / unit, elongation), rate * slope, LB_CORNER};
 }
 
 /* Belt that the motor's pulley has moved, the angle at which a pulley without eccentricity moves as much, its arm, and
@@ -69,8 +73,8 @@ static lb_belt belt(const lb_axis_config *c, const double *now, double at)
     return c->states == 4 ? (lb_belt){k * shape, b * sqrt(shape)} : (lb_belt){k, b / sqrt(shape)};
 }
 
-static void two_masses(const lb_axis_config *c, const double *now, lb_belt whole, double torque, const double *s,
-                       double *d)
+static int two_masses(const lb_axis_config *c, const double *now, lb_belt whole, double torque, const double *s,
+                      double *d)
 {
     const lb_pulley m = pulley(c, s[0], s[1]);
     const lb_play p = play(now[LB_AXIS_GAP], m.travel - s[2], m.speed - s[3]);
@@ -79,10 +83,11 @@ static void two_masses(const lb_axis_config *c, const double *now, lb_belt whole
     d[1] = (torque - m.arm * force) / c->motor_inertia_kg_m2;
     d[2] = s[3];
     d[3] = force;
+    return p.region;
 }
 
-static void three_masses(const lb_axis_config *c, const double *now, lb_belt span, double at, double torque,
-                         const double *s, double *d)
+static int three_masses(const lb_axis_config *c, const double *now, lb_belt span, double at, double torque,
+                        const double *s, double *d)
 {
     const double r = c->radius_m, l3 = c->pulley_distance_m, k = span.k, b = span.b;
     const lb_pulley m = pulley(c, s[0], s[1]);
@@ -102,11 +107,13 @@ static void three_masses(const lb_axis_config *c, const double *now, lb_belt spa
     d[3] = r * (f2 - f3) / c->pulley_inertia_kg_m2;
     d[4] = s[5];
     d[5] = f1 - f2;
+    return p.region;
 }
 
-/* Time derivative with the belt as it is at the cart, or, where the spans are frozen, as `frozen` has it. */
-static inline void derivative(const lb_axis_config *c, const double *now, const lb_belt *frozen, double torque,
-                              const double *s, double *d)
+/* Time derivative with the belt as it is at the cart, or, where the spans are frozen, as `frozen` has it. Returns the
+ * region of the play. */
+static inline int derivative(const lb_axis_config *c, const double *now, const lb_belt *frozen, double torque,
+                             const double *s, double *d)
 {
     const double omega = s[1], v = s[c->states - 1], vs = c->stribeck_speed_m_per_s, w = c->smoothing_m_per_s;
     const double share = now[LB_AXIS_FRICTION], at = c->frozen ? c->frozen_position_m : s[c->states - 2];
@@ -115,13 +122,12 @@ static inline void derivative(const lb_axis_config *c, const double *now, const 
                    share * (c->motor_viscous_n_m_s * omega +
                             friction(c->motor_coulomb_n_m, c->motor_stribeck_n_m, vs, w, c->radius_m * omega));
     if (c->torque_ripple_n_m != 0.0) drive += c->torque_ripple_n_m * sin(c->torque_ripple_per_turn * s[0]);
-    if (c->states == 4)
-        two_masses(c, now, here, drive, s, d);
-    else
-        three_masses(c, now, here, at, drive, s, d);
+    const int region =
+        c->states == 4 ? two_masses(c, now, here, drive, s, d) : three_masses(c, now, here, at, drive, s, d);
     const double resisting =
         share * (c->load_viscous_n_s_per_m * v + friction(c->load_coulomb_n, c->load_stribeck_n, vs, w, v));
     d[c->states - 1] = (d[c->states - 1] - resisting) / now[LB_AXIS_LOAD];
+    return region;
 }
 
 void lb_axis_derivative(const lb_axis_config *c, const double *now, double torque, const double *s, double *d)
@@ -130,15 +136,16 @@ void lb_axis_derivative(const lb_axis_config *c, const double *now, double torqu
     derivative(c, now, &frozen, torque, s, d);
 }
 
-/* One step of order 8 under constant torque, of n states. */
-static inline void step_of(int n, const lb_axis_config *c, const double *now, double torque, double seconds,
-                           double *state)
+/* One step of order 8 under constant torque, of n states. Returns the regions of the play that its stages were in. */
+static inline int step_of(int n, const lb_axis_config *c, const double *now, double torque, double seconds,
+                          double *state)
 {
+    int regions = 0;
     double slope[LB_STAGES][LB_AXIS_STATES], at[LB_AXIS_STATES];
     const lb_belt frozen = c->frozen ? belt(c, now, c->frozen_position_m) : (lb_belt){0.0, 0.0};
     memcpy(at, state, sizeof at);
     for (int stage = 0; stage < LB_STAGES; ++stage) {
-        derivative(c, now, &frozen, torque, at, slope[stage]);
+        regions |= derivative(c, now, &frozen, torque, at, slope[stage]);
         const lb_combination *mix = &lb_dop853[stage];
         double sum[LB_AXIS_STATES] = {0.0};
         for (int j = 0; j < mix->terms; ++j)
@@ -146,15 +153,26 @@ static inline void step_of(int n, const lb_axis_config *c, const double *now, do
         for (int i = 0; i < n; ++i) at[i] = state[i] + seconds * sum[i];
     }
     memcpy(state, at, sizeof at);
+    return regions;
 }
 
 /* With the number of states constant the compiler unrolls and vectorises the sums: a fifth faster. */
-static void step(const lb_axis_config *c, const double *now, double torque, double seconds, double *state)
+static int step(const lb_axis_config *c, const double *now, double torque, double seconds, double *state)
 {
-    if (c->states == 4)
-        step_of(4, c, now, torque, seconds, state);
-    else
-        step_of(6, c, now, torque, seconds, state);
+    return c->states == 4 ? step_of(4, c, now, torque, seconds, state) : step_of(6, c, now, torque, seconds, state);
+}
+
+/* A step, or two halves where it crosses from one region of the play into another, down to 2^-halvings of it. */
+static void split(const lb_axis_config *c, const double *now, double torque, double seconds, int halvings,
+                  double *state)
+{
+    double before[LB_AXIS_STATES];
+    memcpy(before, state, sizeof before);
+    const int regions = step(c, now, torque, seconds, state);
+    if (halvings == 0 || (regions & (regions - 1)) == 0) return;
+    memcpy(state, before, sizeof before);
+    split(c, now, torque, 0.5 * seconds, halvings - 1, state);
+    split(c, now, torque, 0.5 * seconds, halvings - 1, state);
 }
 
 static int alive(const lb_axis_config *c, const lb_axis_state *state)
@@ -224,7 +242,7 @@ size_t lb_axis_advance(const lb_axis_config *c, lb_axis_state *state, size_t tic
         const double signals[LB_AXIS_SIGNALS] = {torque, velocity, state->reading};
         for (int i = 0; i < LB_AXIS_SIGNALS; ++i) output[(size_t)i * ticks + n] = signals[i];
         for (int i = 0; i < c->states; ++i) output[(size_t)(LB_AXIS_SIGNALS + i) * ticks + n] = state->plant[i];
-        for (int i = 0; i < c->substeps; ++i) step(c, now, torque, seconds, state->plant);
+        for (int i = 0; i < c->substeps; ++i) split(c, now, torque, seconds, c->halvings, state->plant);
         ++state->tick;
     }
     return ticks;

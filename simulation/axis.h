@@ -33,6 +33,7 @@ typedef struct {
     double stribeck_speed_m_per_s, smoothing_m_per_s;
     double torque_ripple_n_m, torque_ripple_per_turn;
     double rate_hz;
+    int halvings; /* of a step in which a play opens or closes */
     int substeps, velocity_ticks, position_ticks, delay_ticks;
     double velocity_gain_n_m_s, integral_step, position_gain_per_s, velocity_feedforward;
     double torque_n_m_max;   /* infinite: none */

@@ -23,7 +23,7 @@ int main(void) {
             .motor_coulomb_n_m = 0.1, .eccentricity = 0.01, .load_coulomb_n = 15, .load_stribeck_n = 5,
             .stribeck_speed_m_per_s = 0.05, .smoothing_m_per_s = 0.01,
             .torque_ripple_n_m = 0.1, .torque_ripple_per_turn = 24, .rate_hz = 4000,
-            .substeps = 4, .velocity_ticks = 1, .position_ticks = 2, .delay_ticks = LB_AXIS_DELAY_MAX,
+            .substeps = 4, .halvings = 2, .velocity_ticks = 1, .position_ticks = 2, .delay_ticks = LB_AXIS_DELAY_MAX,
             .velocity_gain_n_m_s = 0.01, .integral_step = 1e-3, .position_gain_per_s = 0.1, .torque_n_m_max = 5,
             .encoder_step_rad = 1e-4, .position_m_min = 0.15, .position_m_max = 1.85};
         c.spot[0] = (lb_axis_spot){0.9, 0.1, 0.2};

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import ceil, inf, isnan, sqrt
+from math import ceil, inf, isnan, log2, sqrt
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,7 @@ _OF_DRIVE = (
 )
 # The product of the fastest mode (rad/s) and a step of the integration; the order-8 method then errs by 1e-10 or less.
 _STEP_MAX = 0.2
+_PLAY_STEPS = 64  # of a tick in which a play opens or closes
 # Of the largest eigenvalue over 1; rounding alone makes the double one of an open loop this large.
 _UNSTABLE = 1e-6
 
@@ -70,7 +71,8 @@ class BeltAxis:
     seed
         Of the sensor's noise: the same seed gives the same samples.
     substeps
-        Integration steps in a tick; None chooses them from the fastest mode.
+        Integration steps in a tick; None chooses them from the fastest mode, and shorter ones where a play opens or
+        closes.
 
     Raises
     ------
@@ -227,10 +229,15 @@ class BeltAxis:
             for t in self._moments_s.tolist()
         )
         smooth = ceil(fastest / self.drive.rate_hz / _STEP_MAX)
-        backlash = bool(np.any(self.condition(self._moments_s).gap_m))
         # A sign smoothed over less speed changes within less time (docs/reference/axis.md: 5e-8 of a stroke at worst).
         dry = 2 * ceil(sqrt(0.005 / self.friction.smoothing_m_per_s)) if self.friction.dry else 1
-        return max(smooth, dry, 16 if backlash else 1)
+        return max(smooth, dry, 1)
+
+    @property
+    def halvings(self) -> int:
+        """How often a step is halved in which a play opens or closes."""
+        backlash = bool(np.any(self.condition(self._moments_s).gap_m))
+        return ceil(log2(max(1, _PLAY_STEPS / self.substeps_chosen))) if backlash and self.substeps is None else 0
 
     def condition(self, time_s: Floats) -> Condition:
         """The machine's parameters at these times, without the soft spots."""
@@ -282,6 +289,7 @@ def engine_settings(axis: BeltAxis) -> dict[str, Any]:
             "frozen_position_m": m.frozen_position_m or 0.0,
             "spots": [(spot.position_m, spot.width_m, spot.loss) for spot in axis.spots],
             "substeps": axis.substeps_chosen,
+            "halvings": axis.halvings,
             "position_m_min": axis.limits.stops_m[0],
             "position_m_max": axis.limits.stops_m[1],
         }

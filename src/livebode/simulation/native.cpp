@@ -55,6 +55,7 @@ lb_axis_config config_of(const nb::dict &s)
     c.torque_ripple_per_turn = number(s, "torque_ripple_per_turn");
     c.rate_hz = number(s, "rate_hz");
     c.substeps = whole(s, "substeps");
+    c.halvings = whole(s, "halvings");
     c.velocity_ticks = whole(s, "velocity_ticks");
     c.position_ticks = whole(s, "position_ticks");
     c.delay_ticks = whole(s, "delay_ticks");
@@ -67,9 +68,10 @@ lb_axis_config config_of(const nb::dict &s)
     c.velocity_differenced = whole(s, "velocity_differenced");
     c.position_m_min = number(s, "position_m_min");
     c.position_m_max = number(s, "position_m_max");
-    const bool usable = (c.states == 4 || c.states == 6) && c.substeps >= 1 && c.velocity_ticks >= 1 &&
-                        c.position_ticks >= 1 && c.delay_ticks >= 0 && c.delay_ticks <= LB_AXIS_DELAY_MAX;
-    if (!usable) throw nb::value_error("states, substeps, ticks or delay outside what the simulation takes");
+    const bool usable = (c.states == 4 || c.states == 6) && c.substeps >= 1 && c.halvings >= 0 &&
+                        c.velocity_ticks >= 1 && c.position_ticks >= 1 && c.delay_ticks >= 0 &&
+                        c.delay_ticks <= LB_AXIS_DELAY_MAX;
+    if (!usable) throw nb::value_error("states, steps, ticks or delay outside what the simulation takes");
     return c;
 }
 

@@ -40,19 +40,27 @@ def friction(coulomb: float, stribeck: float, s: Settings, speed: float) -> floa
     return float((coulomb + stribeck / (1 + ratio * ratio)) * (speed / sqrt(speed * speed + width * width)))
 
 
-def play(gap: float, elongation: float, rate: float) -> tuple[float, float]:
-    """Elongation beyond a play, and its rate: a dead zone whose corners a quartic rounds over a twentieth of it."""
+class Play(NamedTuple):
+    """Elongation beyond a play, its rate, and the region of the play, in each of which the equations are smooth."""
+
+    slack: float
+    rate: float
+    region: str
+
+
+def play(gap: float, elongation: float, rate: float) -> Play:
+    """A dead zone whose corners a quartic rounds over a twentieth of it."""
     if gap == 0:
-        return elongation, rate
+        return Play(elongation, rate, "free")
     rounding, beyond = 0.05 * gap, abs(elongation) - 0.5 * gap
     into = beyond + rounding
     if into <= 0:
-        return 0.0, 0.0
+        return Play(0.0, 0.0, "free")
     if beyond >= rounding:
-        return copysign(beyond, elongation), rate
+        return Play(copysign(beyond, elongation), rate, "above" if elongation > 0 else "below")
     square, unit = into * into, 16 * (rounding * rounding * rounding)
     slope = (3 * square * (3 * rounding - beyond) - square * into) / unit
-    return copysign(square * into * (3 * rounding - beyond) / unit, elongation), rate * slope
+    return Play(copysign(square * into * (3 * rounding - beyond) / unit, elongation), rate * slope, "corner")
 
 
 def weakening(s: Settings, at: float) -> float:
@@ -71,6 +79,7 @@ class Plant:
     def __init__(self, settings: Settings, position_m: float) -> None:
         self.settings = settings
         self.state = [0.0] * settings["states"]
+        self._regions: set[str] = set()  # of the play, in the stages of the newest step
         self.state[0] = position_m / settings["radius_m"]
         travel, angle, _, _ = self._pulley(self.state[0], 0.0)
         self.state[-2] = travel
@@ -85,14 +94,23 @@ class Plant:
         """One tick under a constant torque: steps of the order-8 method."""
         seconds = 1 / (self.settings["rate_hz"] * self.settings["substeps"])
         for _ in range(self.settings["substeps"]):
-            start, at, slopes = self.state, self.state, []
-            for stage in STAGES:
-                slopes.append(self.derivative(now, torque, at))
-                sums = [0.0] * len(start)
-                for j, weight in stage:
-                    sums = [total + weight * slope for total, slope in zip(sums, slopes[j])]
-                at = [value + seconds * total for value, total in zip(start, sums)]
+            self._split(torque, now, seconds, self.settings["halvings"])
+
+    def _split(self, torque: float, now: Now, seconds: float, halvings: int) -> None:
+        """A step, or two halves where it crosses from one region of the play into another."""
+        start, at, slopes = self.state, self.state, []
+        self._regions = set()
+        for stage in STAGES:
+            slopes.append(self.derivative(now, torque, at))
+            sums = [0.0] * len(start)
+            for j, weight in stage:
+                sums = [total + weight * slope for total, slope in zip(sums, slopes[j])]
+            at = [value + seconds * total for value, total in zip(start, sums)]
+        if halvings == 0 or len(self._regions) < 2:
             self.state = at
+        else:
+            for _ in range(2):
+                self._split(torque, now, 0.5 * seconds, halvings - 1)
 
     def derivative(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
         """Time derivative of the state: (11), (12) or (8)–(10), with friction and torque ripple."""
@@ -125,8 +143,9 @@ class Plant:
         shape = 1 / at + 1 / (2 * s["pulley_distance_m"] - at)
         k = s["specific_stiffness_n"] * now.stiffness * weakening(s, at) * shape
         b = s["damping_shape"] * now.damping * sqrt(shape)
-        slack, rate = play(now.gap_m, travel - state[2], speed - state[3])
-        force = k * slack + b * rate
+        held = play(now.gap_m, travel - state[2], speed - state[3])
+        self._regions.add(held.region)
+        force = k * held.slack + b * held.rate
         return [state[1], (torque - arm * force) / s["motor_inertia_kg_m2"], state[3], force]
 
     def _three_masses(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
@@ -152,8 +171,9 @@ class Plant:
         travel, _, _, speed = self._pulley(state[0], state[1])
         free = (s1 * travel + s2 * (r * state[2])) / (s1 + s2)
         free_rate = (s1 * speed + s2 * (r * state[3])) / (s1 + s2)
-        slack, rate = play(now.gap_m, free - state[4], free_rate - state[5])
-        return free - slack, free_rate - rate
+        held = play(now.gap_m, free - state[4], free_rate - state[5])
+        self._regions.add(held.region)
+        return free - held.slack, free_rate - held.rate
 
 
 class Controller:
