@@ -90,6 +90,7 @@ class FleetCoordinator:
                     dashboard_address=None,
                     scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else that of all schedulers
                     memory_limit=0,
+                    preload=[__name__],  # imported in the first task, it would keep a slow computer from a heartbeat
                     silence_logs=logging.CRITICAL,
                 )
             except RuntimeError as error:
