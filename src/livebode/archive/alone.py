@@ -25,6 +25,7 @@ from livebode.core import ArchiveError
 from livebode.core.files import write_whole
 
 _LOOK_S = 0.1
+_KILLED_MAX = 3
 
 
 def handle_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Handled:
@@ -41,7 +42,22 @@ def handle_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = 
 
 
 def _tracked_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Sequence[Result]:
-    """Track a recording of known content by one recipe in a new process; one that needs too much memory is ended."""
+    """Track a recording of known content by one recipe in a new process; one that needs too much memory is ended.
+
+    SIGKILL comes from outside, from the system or a person, and may have nothing to do with the recording.
+    """
+    left = _KILLED_MAX
+    while True:
+        try:
+            return _once_alone(job, recording, scratch)
+        except ArchiveError as error:
+            left -= 1
+            if not left or error.facts.get("signal") != signal.SIGKILL:
+                return [failed(recording.place, error, recording.content, *recording.recipes)]
+
+
+def _once_alone(job: Job, recording: ArchivedRecording, scratch: Path | None) -> Sequence[Result]:
+    """The results; ArchiveError if the process ended without them."""
     with tempfile.TemporaryDirectory(prefix="livebode-", dir=scratch) as name:
         folder = Path(name)
         (folder / "task").write_bytes(pickle.dumps((job, recording)))
@@ -59,8 +75,7 @@ def _tracked_alone(job: Job, recording: ArchivedRecording, scratch: Path | None 
         if result.exists():
             found: Sequence[Result] = pickle.loads(result.read_bytes())
             return found
-    error = _exceeded(job) if exceeded else _ended(process.returncode)
-    return [failed(recording.place, error, recording.content, *recording.recipes)]
+    raise _exceeded(job) if exceeded else _ended(process.returncode)
 
 
 def _watched(process: subprocess.Popen[bytes], memory_bytes: int) -> bool:
@@ -94,7 +109,10 @@ def _exceeded(job: Job) -> ArchiveError:
 def _ended(code: int) -> ArchiveError:
     how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended itself with exit code {code}"
     return ArchiveError(
-        "process-ended", f"the process that tracked the recording {how}", "please report it with the recording"
+        "process-ended",
+        f"the process that tracked the recording {how}",
+        "please report it with the recording",
+        **({"signal": -code} if code < 0 else {"exit_code": code}),
     )
 
 
