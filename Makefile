@@ -77,6 +77,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.segments
 	$(BIN)/python -m bench.start
 	$(BIN)/python -m bench.dashboard
+	$(BIN)/python -m bench.readers
 	$(BIN)/python -m bench.runs
 	$(BIN)/python -m bench.archive
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -35,12 +35,17 @@ UNPACKED_MAX = 1 << 34
 
 @dataclass(frozen=True)
 class Variable:
-    """Header of a variable: MATLAB's name of its class, its dimensions, and whether it has an imaginary part."""
+    """Header of a variable: MATLAB's name of its class, its dimensions, and whether it has an imaginary part.
+
+    `byte` is where its element begins in the file, and `order` the order of the bytes there.
+    """
 
     name: str
     kind: str
     shape: tuple[int, ...] = ()
     is_complex: bool = False
+    byte: int = 0
+    order: str = "<"
 
 
 def list_variables(path: Path) -> list[Variable]:
@@ -60,8 +65,9 @@ def list_variables(path: Path) -> list[Variable]:
         order = "<" if header[126:128] == b"IM" else ">"
         at = HEADER_BYTES
         while at < size:
-            variable, at = check_top(path, file, at, size, order)
-            found.append(variable)
+            variable, after = check_top(path, file, at, size, order)
+            found.append(replace(variable, byte=at, order=order))
+            at = after
     return [variable for variable in found if variable.name]  # MATLAB stores its own workspace without a name
 
 

@@ -1,4 +1,4 @@
-"""MATLAB v5 (also v6 and v7): variables read one by one by SciPy, structs walked for paths."""
+"""MATLAB v5 (also v6 and v7): vectors streamed, other variables read one by one by SciPy, structs walked for paths."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from livebode.sources.arrays import array_columns
 from livebode.sources.damage import oversized
 from livebode.sources.friendly import with_friendly_names
 from livebode.sources.mat5check import list_variables
+from livebode.sources.mat5stream import stream, streamable
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 
 NUMERIC = {
@@ -24,7 +25,7 @@ DEPTH_MAX = 32
 
 
 class MatlabRecording(Recording):
-    """A v5 file. The format must be read variable by variable, so a variable has to fit in memory."""
+    """A v5 file. A matrix, and what is in a struct, has to fit in memory; a vector does not."""
 
     format: ClassVar[str] = "mat"
 
@@ -32,7 +33,8 @@ class MatlabRecording(Recording):
         super().__init__(path)
         walk = MatlabCollector()
         singles: list[str] = []
-        for variable in list_variables(path):
+        variables = list_variables(path)
+        for variable in variables:
             name = variable.name
             if variable.kind in NUMERIC and not variable.is_complex:
                 walk.number(name, variable.shape, np.dtype(np.float64))
@@ -46,13 +48,21 @@ class MatlabRecording(Recording):
         self.columns = with_friendly_names(walk.columns, walk.texts)
         self.skipped, self.scalars = tuple(walk.skipped), walk.scalars
         self._paths = walk.arrays
+        self._vectors = {variable.name: variable for variable in variables if streamable(variable)}
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
-        plain = sorted({column.key.array for column in columns} - self._paths.keys())
+        names = {column.key.array for column in columns}
+        streams = {name: stream(self.path, self._vectors[name], rows) for name in names & self._vectors.keys()}
+        plain = sorted(names - self._paths.keys() - streams.keys())
         arrays = {**self._paths, **(load(self.path, plain) if plain else {})}
         samples = columns[0].key.samples
         for first in range(0, samples, rows):
-            yield [arrays[column.key.array][column.key.at(first, min(first + rows, samples))] for column in columns]
+            pieces = {name: next(values) for name, values in streams.items()}
+            yield [
+                pieces[name] if name in pieces else arrays[name][column.key.at(first, min(first + rows, samples))]
+                for column in columns
+                for name in (column.key.array,)
+            ]
 
 
 def load(path: Path, names: list[str]) -> dict[str, Any]:
