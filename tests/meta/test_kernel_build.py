@@ -60,11 +60,11 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86) -> 
         return list(pool.map(compile_one, jobs))
 
 
-def program(directory: Path, compiler: str, objects: list[Path], name: str, *flags: str) -> str:
+def program(directory: Path, compiler: str, objects: list[Path], name: str, *flags: str, runner: str = "") -> str:
     source = KERNEL / "tests" / f"{name}.c"
     include = f"-I{KERNEL / 'include'}"
     run(compiler, *WARNINGS, *flags, include, source, *objects, "-o", directory / name)
-    return run(directory / name)
+    return run(*([runner] if runner else []), directory / name)
 
 
 Built = tuple[str, Path, list[Path]]
@@ -138,6 +138,21 @@ def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factor
         (tmp_path / f"run {name}").mkdir()
         hashes[name] = tuple(program(tmp_path / f"run {name}", compiler, objects, part) for part in ("bits", "lines"))
     assert len(set(hashes.values())) == 1, hashes
+
+
+def test_arm_has_vectors_and_the_same_bits(tmp_path, tmp_path_factory):
+    """AArch64 in QEMU: the vectors are NEON's from the same source, and no product is fused with a sum."""
+    compiler, emulator = needed("aarch64-linux-gnu-gcc"), needed("qemu-aarch64")
+    objects = build(tmp_path / "objects", compiler, "-O2", dispatch=False)
+    for file in objects:
+        assembly = run("aarch64-linux-gnu-objdump", "-d", file)
+        assert not re.search(r"\bfn?m(la|ls|add|sub)\b", assembly), file.name
+        if file.stem in ("tile32", "tile64"):
+            assert len(re.findall(rf"fmul\s+v\d+\.{'4s' if file.stem == 'tile32' else '2d'}", assembly)) > 100
+    host, _, of_host = build_once("gcc", tmp_path_factory)
+    (tmp_path / "host").mkdir()
+    made = program(tmp_path, compiler, objects, "bits", "-static", runner=emulator)
+    assert made == program(tmp_path / "host", host, of_host, "bits")
 
 
 def test_sanitizers_find_nothing(tmp_path):
