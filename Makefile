@@ -66,6 +66,9 @@ $(VENV)/.bench: $(BUILT) requirements-bench.lock
 
 bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench
+	$(BIN)/python -m bench.dense_bound
+	$(BIN)/python -m bench.large_rows
+	$(BIN)/python -m bench.full_spectrum
 	$(BIN)/python -m bench --job
 	$(BIN)/python -m bench.tracking
 	$(BIN)/python -m bench.fits
