@@ -66,6 +66,9 @@ $(VENV)/.bench: $(BUILT) requirements-bench.lock
 
 bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench
+	$(BIN)/python -m bench.dense_bound
+	$(BIN)/python -m bench.large_rows
+	$(BIN)/python -m bench.full_spectrum
 	$(BIN)/python -m bench --job
 	$(BIN)/python -m bench.tracking
 	$(BIN)/python -m bench.fits
@@ -164,7 +167,7 @@ screenshots: $(BUILT)  ## pictures of dashboard and report in every state (light
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends chromium clang fonts-wqy-microhei gcc-arm-none-eabi mosquitto nats-server openssh-server openssl poppler-utils qemu-system-arm
+	apt-get install -y -qq --no-install-recommends chromium clang fonts-wqy-microhei gcc-aarch64-linux-gnu gcc-arm-none-eabi libc6-dev-arm64-cross mosquitto nats-server openssh-server openssl poppler-utils qemu-system-arm qemu-user
 
 catalogues: $(BUILT)  ## after a change of a sentence of report or dashboard: update the catalogues, list what lacks a translation
 	$(BIN)/python -m tools.catalogues

@@ -19,7 +19,7 @@ WINDOW, HOP, CHANNELS = 400, 20, 2
 TABLES = ("rows", "compact")
 COUNTS = (7, 21)
 SAMPLES = 2 * WINDOW
-LIMIT = 1000
+LIMIT, WORST = 600, 750  # 21 lines with a table of rows on the Cortex-M4F: per sample, and of a single push
 CLOCK_HZ, RATE_HZ, CYCLES = 168e6, 4000, 2.0
 
 
@@ -103,8 +103,9 @@ def main() -> None:
             m4f = counted.kernel[21, "rows"]
     cycles = CYCLES * m4f.sample
     share = cycles * RATE_HZ / CLOCK_HZ
-    verdict = "" if m4f.sample <= LIMIT else " missed"
-    print(f"{M4F.name}, 21 lines, {CHANNELS} channels: {m4f.sample:.0f} of {LIMIT} instructions per sample{verdict},")
+    verdict = "met" if m4f.sample <= LIMIT and m4f.worst <= WORST else "missed"
+    print(f"{M4F.name}, 21 lines, {CHANNELS} channels: {m4f.sample:.0f} instructions per sample (target {LIMIT}),")
+    print(f"at most {m4f.worst} in a push (target {WORST}): {verdict};")
     print(f"about {cycles:.0f} cycles: {100 * share:.1f} % of {CLOCK_HZ / 1e6:.0f} MHz at {RATE_HZ / 1e3:.0f} kHz")
 
 

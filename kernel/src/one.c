@@ -19,9 +19,9 @@ LB_RARELY void last(const LB_DFT *t, const real *samples, ptrdiff_t stride)
     for (uint32_t c = 0; c < t->channels; ++c, line += t->line_length, samples += stride) {
         const real even = *samples + line[1], odd = *samples - line[1];
         line[t->index] = *samples;
-        for (const real *r = row; r != end; r += 2, sums += 4) {
-            sums[0] = sums[2] += r[0] * even;
-            sums[1] = sums[3] += r[1] * odd;
+        for (const real *r = row; r != end;) {
+            const turn now = take_turn(&r);
+            sums = end_one(sums, now, even, odd);
         }
     }
 }

@@ -9,11 +9,13 @@
 typedef double real;
 typedef int64_t lb_lane_index;
 #define LB_DFT lb_sdft64
+#define LB_STAGE lb_stage64
 #define LB(name) lb_sdft64_##name
 #elif LB_BITS == 32
 typedef float real;
 typedef int32_t lb_lane_index;
 #define LB_DFT lb_sdft32
+#define LB_STAGE lb_stage32
 #define LB(name) lb_sdft32_##name
 #else
 #error "compile with -DLB_BITS=32 or -DLB_BITS=64"

@@ -54,6 +54,8 @@ static inline int lb_sound(const LB_DFT *t)
            (unsigned)t->variant <= LB_BLACKMAN && t->radius >= 0 && t->radius <= 1 && t->radius_window <= t->radius;
 }
 
+static inline size_t lb_smaller(size_t a, size_t b) { return a < b ? a : b; }
+
 /* Whether two regions have no byte in common. */
 static inline int lb_apart(const void *a, size_t a_bytes, const void *b, size_t b_bytes)
 {
@@ -136,9 +138,10 @@ static inline lb_region lb_region_of(const LB_DFT *t, const lb_input *in, size_t
 typedef struct {
     size_t first, hop;
     lb_phase phase;
-    real *out;            /* next row of channel 0 */
-    size_t channel_reals; /* from channel to channel */
-    const real *end;      /* of channel 0's rows */
+    real *out;              /* next row of channel 0 */
+    size_t channel_reals;   /* from channel to channel */
+    const real *end;        /* of channel 0's rows */
+    struct LB_STAGE *stage; /* where rows wait that go past the caches; null: they do not */
 } lb_rows_due;
 
 /* `length` samples without rows. */
@@ -147,6 +150,10 @@ void LB(skip)(LB_DFT *t, lb_input *in, size_t length);
 #ifndef LB_SCALAR
 /* The same with rows, which the inner kernels write themselves; LB_MODULATED only. */
 void LB(fused_rows)(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due);
+
+/* The same rows past the caches, and whether that is faster: see stage.h. */
+int LB(staged)(const LB_DFT *t, const lb_rows_due *due);
+void LB(staged_rows)(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due);
 #endif
 
 /* Updates the sums with the waiting samples. */

@@ -57,12 +57,13 @@ lb_status LB(process)(LB_DFT *t, const real *samples, ptrdiff_t channel_stride, 
     due.out = out;
     due.channel_reals = rows * 2 * t->bin_count;
     due.end = out + due.channel_reals;
+    due.stage = 0;
     LB_ASSERT(due.first < length);
     LB_ASSERT(lb_apart((void *)lb_region_of(t, &in, length).first, lb_region_of(t, &in, length).bytes, out,
                        t->channels * due.channel_reals * sizeof(real)));
 #ifndef LB_SCALAR
     if (t->variant == LB_MODULATED) {
-        LB(fused_rows)(t, &in, length, due);
+        (LB(staged)(t, &due) ? LB(staged_rows) : LB(fused_rows))(t, &in, length, due);
         return LB_OK;
     }
 #endif

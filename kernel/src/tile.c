@@ -119,6 +119,7 @@ typedef struct {
     int backwards;
     int n;        /* vectors */
     size_t valid; /* of the last block: reals of its rows that exist; else 0 */
+    lb_move move;
 } unit;
 
 /* A row of the last block: the next rows overwrite its surplus; where there are none, only existing values
@@ -135,6 +136,15 @@ LB_INLINE void emit_tail(unit u, unit_sums a, unit_row next)
     for (size_t i = 0; i < u.valid; ++i) {
         u.out[i] = whole[i];
     }
+}
+
+/* As many numbers as a row of the unit has: writing rows past the caches takes no time while others are computed. */
+LB_INLINE lb_move moved(lb_move m, int n)
+{
+    for (int v = 0; v < 2 * n && m.from != m.end; ++v, m.from += LB_LANES, m.to += LB_LANES) {
+        lb_store_past(m.to, lb_load(m.from));
+    }
+    return m;
 }
 
 LB_INLINE unit emit_row(const lb_tile *t, unit u, unit_sums a, unit_row next)
@@ -173,11 +183,14 @@ LB_INLINE unit_sums swapped(unit_sums a, const real *sums, int n)
 }
 
 /* A row after every sample. The next sample's table row demodulates this one's, so each is loaded once. */
-LB_INLINE void run_dense(const lb_tile *t, unit u)
+LB_INLINE void run_dense(const lb_tile *t, unit u, int moving)
 {
     const int apart = u.backwards && !LB_MANY_REGISTERS, together = u.backwards && LB_MANY_REGISTERS;
     const size_t before_swap = t->length - (size_t)t->swap;
     unit_sums a;
+    if (moving) {
+        u.move = *t->move;
+    }
     if (apart) {
         renew(t, u);
     }
@@ -194,6 +207,12 @@ LB_INLINE void run_dense(const lb_tile *t, unit u)
             a = step_f(a, row, u.delta + i, u.n);
         }
         u = emit_row(t, u, a, next);
+        if (moving) {
+            u.move = moved(u.move, u.n);
+        }
+    }
+    if (moving) {
+        *t->move = u.move;
     }
     if (together) {
         a = t->swap ? step_f(a, row, u.delta + before_swap, u.n) : a;
@@ -204,6 +223,15 @@ LB_INLINE void run_dense(const lb_tile *t, unit u)
         (void)emit_row(t, u, a, load_row(u.row + t->row_step, u.n));
     }
     store_s(u.sums, a, u.n);
+}
+
+LB_INLINE void run_dense_either(const lb_tile *t, unit u)
+{
+    if (t->move) {
+        run_dense(t, u, 1);
+    } else {
+        run_dense(t, u, 0);
+    }
 }
 
 /* A row after every hop-th sample, or none. */
@@ -263,10 +291,10 @@ LB_INLINE void run_blocks(const lb_tile *t, size_t block, int backwards, int blo
             run_sparse(t, u);
         } else if (t->phase == LB_PHASE_FIXED) {
             u.phase = LB_PHASE_FIXED;
-            run_dense(t, u);
+            run_dense_either(t, u);
         } else {
             u.phase = LB_PHASE_WINDOW;
-            run_dense(t, u);
+            run_dense_either(t, u);
         }
     }
 }
@@ -354,6 +382,13 @@ static void take_in(real *restrict delta, real *restrict line, const real *restr
     }
 }
 
-const lb_kernel LB_KERNEL_NAME = {take_in, run_tile, read_row};
+static void finish(lb_move *move)
+{
+    while (move->from != move->end) {
+        *move = moved(*move, 1);
+    }
+}
+
+const lb_kernel LB_KERNEL_NAME = {take_in, run_tile, read_row, finish};
 
 #endif

@@ -1,8 +1,6 @@
 /* Samples by the tile: store them, and let the inner kernel of the instruction set update the sums. */
-#include "state.h"
+#include "stage.h"
 #ifndef LB_SCALAR
-
-static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
 /* The differences and the delay line of one channel's next samples. */
 static void take_in(LB_DFT *t, size_t channel, const real *samples, ptrdiff_t stride, size_t length)
@@ -77,7 +75,12 @@ static void run_part(LB_DFT *t, uint32_t start, uint32_t offset, uint32_t length
     for (size_t c = 0; c < t->channels && (start == t->half || t->window == 1); ++c) {
         seed(t, c);
     }
-    t->kernel->run(&tile);
+    tile.move = 0;
+    if (due->stage) {
+        LB(run_staged)(t, &tile, due->stage);
+    } else {
+        t->kernel->run(&tile);
+    }
 }
 
 /* Moves on to the rows due after `length` further samples. */
@@ -99,7 +102,7 @@ static void passed(lb_rows_due *due, size_t length, size_t row_reals)
 static void run(LB_DFT *t, uint32_t length, lb_rows_due *due)
 {
     LB_ASSERT(length <= t->index && t->index <= t->window);
-    const uint32_t longest = due->hop == 1 ? LB_DENSE_TILE : LB_TILE;
+    const uint32_t longest = due->stage ? LB(staged_length)(t) : due->hop == 1 ? LB_DENSE_TILE : LB_TILE;
     uint32_t start = t->index - length;
     if (!lb_renews(t->variant)) {
         for (size_t c = 0; c < t->channels; ++c) {
@@ -125,7 +128,7 @@ static void run(LB_DFT *t, uint32_t length, lb_rows_due *due)
 /* Stores the samples of one tile within the period, at most `length`; returns their number. */
 static size_t next_tile(LB_DFT *t, lb_input *in, size_t length, lb_rows_due *due)
 {
-    const size_t n = smaller(length, smaller(LB_TILE, t->window - t->index));
+    const size_t n = lb_smaller(length, lb_smaller(LB_TILE, t->window - t->index));
     LB_ASSERT(n && n <= length);
     for (size_t c = 0; c < t->channels; ++c) {
         take_in(t, c, in->samples + (ptrdiff_t)c * in->channel_stride, in->sample_stride, n);
@@ -141,7 +144,7 @@ static size_t next_tile(LB_DFT *t, lb_input *in, size_t length, lb_rows_due *due
 /* Without rows. */
 void LB(skip)(LB_DFT *t, lb_input *in, size_t length)
 {
-    lb_rows_due none = {SIZE_MAX, SIZE_MAX, LB_PHASE_FIXED, 0, 0, 0};
+    lb_rows_due none = {SIZE_MAX, SIZE_MAX, LB_PHASE_FIXED, 0, 0, 0, 0};
     while (length) {
         length -= next_tile(t, in, length, &none);
     }

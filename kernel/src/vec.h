@@ -24,6 +24,25 @@ typedef real loose_vec __attribute__((vector_size(LB_LANES * sizeof(real)), may_
 LB_INLINE vec lb_load(const real *p) { return *(const vec *)(const void *)p; }
 LB_INLINE void lb_store(real *p, vec v) { *(vec *)(void *)p = v; }
 
+/* A store past the caches. Elsewhere than on x86 there is none that a program can rely on, and nothing uses this. */
+LB_INLINE void lb_store_past(real *p, vec v)
+{
+#if !defined(__SSE2__)
+    lb_store(p, v);
+#elif defined(__clang__)
+    __builtin_nontemporal_store(v, (vec *)(void *)p);
+#else
+    typedef long long words __attribute__((vector_size(sizeof(vec)), may_alias));
+#if defined(__AVX512F__)
+    __builtin_ia32_movntdq512((words *)(void *)p, (words)v);
+#elif defined(__AVX2__)
+    __builtin_ia32_movntdq256((words *)(void *)p, (words)v);
+#else
+    __builtin_ia32_movntdq((words *)(void *)p, (words)v);
+#endif
+#endif
+}
+
 #if defined(__clang__) || __GNUC__ >= 12
 #define LB_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
 #else

@@ -16,7 +16,7 @@ static uint64_t RUN(uint32_t window, uint32_t bin_count, lb_variant variant, lb_
     DEMAND(FN(init)(memory[1], bytes, &config, &pushes) == LB_OK);
 
     uint64_t hash = 14695981039346656037u;
-    static const size_t lengths[] = {1, 130, 7, 64, 260}, hops[] = {1, 3, 1, 20, 7};
+    static const size_t lengths[] = {1, 130, 7, 64, 260, 150}, hops[] = {1, 3, 1, 20, 7, 1};
     for (size_t block = 0; block < sizeof lengths / sizeof *lengths; ++block) {
         const size_t n = lengths[block];
         size_t rows;

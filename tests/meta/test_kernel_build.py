@@ -17,7 +17,7 @@ WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werr
 # The flags that kernel/CMakeLists.txt sets.
 ALWAYS = ["-ffp-contract=off"]
 SETS = {"avx2": ["-mavx2", "-mno-fma"], "avx512": ["-mavx512f", "-mavx512vl"]}
-TYPED = ["layout", "rows", "stream", "read", "recur", "snapshot", "dispatch", "tiles", "one", "tile"]
+TYPED = ["layout", "rows", "stage", "stream", "read", "recur", "snapshot", "dispatch", "tiles", "one", "tile"]
 X86 = os.uname().machine == "x86_64"
 # What compilers may call in place of a loop, even in a freestanding build.
 FREESTANDING = {"memcpy", "memset", "memmove", "memcmp"}
@@ -60,11 +60,11 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86) -> 
         return list(pool.map(compile_one, jobs))
 
 
-def program(directory: Path, compiler: str, objects: list[Path], name: str, *flags: str) -> str:
+def program(directory: Path, compiler: str, objects: list[Path], name: str, *flags: str, runner: str = "") -> str:
     source = KERNEL / "tests" / f"{name}.c"
     include = f"-I{KERNEL / 'include'}"
     run(compiler, *WARNINGS, *flags, include, source, *objects, "-o", directory / name)
-    return run(directory / name)
+    return run(*([runner] if runner else []), directory / name)
 
 
 Built = tuple[str, Path, list[Path]]
@@ -140,12 +140,29 @@ def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factor
     assert len(set(hashes.values())) == 1, hashes
 
 
+def test_arm_has_vectors_and_the_same_bits(tmp_path, tmp_path_factory):
+    """AArch64 in QEMU: the vectors are NEON's from the same source, and no product is fused with a sum."""
+    compiler, emulator = needed("aarch64-linux-gnu-gcc"), needed("qemu-aarch64")
+    objects = build(tmp_path / "objects", compiler, "-O1", dispatch=False)
+    for file in objects:
+        assembly = run("aarch64-linux-gnu-objdump", "-d", file)
+        assert not re.search(r"\bfn?m(la|ls|add|sub)\b", assembly), file.name
+        if file.stem in ("tile32", "tile64"):
+            assert len(re.findall(rf"fmul\s+v\d+\.{'4s' if file.stem == 'tile32' else '2d'}", assembly)) > 100
+    host, _, of_host = build_once("gcc", tmp_path_factory)
+    (tmp_path / "host").mkdir()
+    made = program(tmp_path, compiler, objects, "bits", "-static", runner=emulator)
+    assert made == program(tmp_path / "host", host, of_host, "bits")
+
+
 def test_sanitizers_find_nothing(tmp_path):
     # gcc alone: Debian's clang comes without the sanitizers' run-time library.
     sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     compiler = needed("gcc")
     # The same statements, and every check in each of them, but no object repeats a function wherever it is called.
-    objects = build(tmp_path / "objects", compiler, "-O0", "-DLB_DEBUG", "-DLB_INLINE=static inline", *sanitize)
+    # Long blocks of rows go past the caches, as else only megabytes of them.
+    flags = ["-O0", "-DLB_DEBUG", "-DLB_INLINE=static inline", "-DLB_STAGED_BYTES=8192"]
+    objects = build(tmp_path / "objects", compiler, *flags, *sanitize)
     program(tmp_path, compiler, objects, "misuse", *sanitize)
     program(tmp_path, compiler, objects, "bits", *sanitize)
     program(tmp_path, compiler, objects, "lines", *sanitize)

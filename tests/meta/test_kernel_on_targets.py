@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from bench.mcu import LIMIT, TABLES, count
+from bench.mcu import LIMIT, WORST, count
 from tests.support.targets import need_tools
 from tools.firmware import KERNEL, M4F, M7, ROOT, kept, run, undefined
 
@@ -57,12 +57,13 @@ def test_no_object_rounds_once_where_others_round_twice(built):
 
 
 def test_the_count_is_exact_and_the_step_is_cheap(tmp_path):
-    """On loops of 2n + 1 instructions, and twice the same; 1,000 a sample is 5 % of a 168 MHz part at 4 kHz."""
+    """On loops of 2n + 1 instructions, and twice the same; 600 a sample are 3 % of a 168 MHz part at 4 kHz."""
     need_tools()
     counted = count(M4F, tmp_path / "once")
     assert counted == count(M4F, tmp_path / "twice")
     assert len(counted.loops) == 6
     assert all(found == 2 * turns + 1 for turns, found in counted.loops.items())
-    assert all(counted.kernel[21, table].sample <= LIMIT for table in TABLES)
-    assert counted.kernel[21, "rows"].worst <= LIMIT
+    assert counted.kernel[21, "rows"].sample <= LIMIT
+    assert counted.kernel[21, "rows"].worst <= WORST
+    assert counted.kernel[21, "compact"].sample <= 1.2 * counted.kernel[21, "rows"].sample
     assert counted.kernel[21, "compact"].ram < counted.kernel[21, "rows"].ram / 4

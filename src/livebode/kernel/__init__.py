@@ -3,6 +3,7 @@
 The twins are `livebode.kernel.twin` and `livebode.kernel.line_twin`.
 """
 
+from livebode.kernel._hopping import HoppingDFT, fft_is_cheaper
 from livebode.kernel._instructions import VARIABLE as INSTRUCTION_SET_VARIABLE
 from livebode.kernel._instructions import instruction_set, instruction_sets
 from livebode.kernel._lines import (
@@ -28,6 +29,7 @@ __all__ = [
     "NOISE_MOVING",
     "NOISE_SCATTER",
     "SCATTER",
+    "HoppingDFT",
     "LineMoments",
     "LineRows",
     "LineSettings",
@@ -35,6 +37,7 @@ __all__ = [
     "SlidingDFT",
     "WeightSums",
     "add_windows",
+    "fft_is_cheaper",
     "instruction_set",
     "instruction_sets",
     "process_lines",
