@@ -1,7 +1,7 @@
 """`python -m bench.dense_bound`: how near dense rows are to the memory's limit, and to Numba.
 
-"memory" only reads the table of twiddle factors and writes the rows (bench/native/traffic.c): no kernel with this table
-can be faster. Numba / memory is therefore the largest ratio to Numba that is possible.
+"memory" only reads the table of twiddle factors and writes the rows (bench/native/traffic.c): a yardstick of what
+the memory takes, though a kernel that orders its accesses better can be faster.
 """
 
 import argparse
