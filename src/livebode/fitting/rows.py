@@ -11,6 +11,7 @@ from livebode.core.parameters import OK
 from livebode.fitting.friction import held_by_friction
 from livebode.fitting.problem import Measured, Problem, Solution
 from livebode.fitting.weighing import chi_squared, lacks_more_than, own_epsilon, squares, weights
+from livebode.kernel import FitModel, FitRows, fit
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -35,6 +36,8 @@ SENTENCES = {
     "excitation, or free the model's viscous friction",
 }
 """The meaning of each status as text."""
+
+_WORDS = np.array([OK, NO_RESPONSE, NOT_CONVERGED, BOUND, NOT_SEEN, NO_FIT], dtype="<U20")  # in the kernel's order
 
 EPSILON_MAX = 0.5
 _UNCERTAIN = 0.5  # of a logarithm
@@ -76,6 +79,8 @@ def fit_rows(
     `epsilon` (rows,) is fixed where it is given; else each row's own is found, such that its reduced chi² is 1.
     `noise_dof` (rows,) are the degrees of freedom behind the sigmas.
     """
+    if problem.native is not None:
+        return _fitted_natively(problem, problem.native, measured, noise_dof, start, epsilon)
     dof = 2.0 * np.count_nonzero(measured.use, axis=1) - problem.size
     if dof.size and (dof > 0).all():
         return _fitted_apart(problem, measured, noise_dof, start, epsilon, dof)
@@ -86,6 +91,32 @@ def fit_rows(
         found = _fitted_apart(problem, measured[some], noise_dof[some], begin, eps, dof[some])
         for kept, other in zip(whole, found):
             kept[some] = other
+    return whole
+
+
+def _fitted_natively(
+    problem: Problem,
+    native: FitModel,
+    measured: Measured,
+    noise_dof: Floats,
+    start: Floats | None,
+    epsilon: Floats | None,
+) -> FittedRows:
+    """All rows in C, which has no viscous friction: whether one explains a model's error is examined here."""
+    grid = problem.grid
+    rows = FitRows(measured.value, measured.sigma, measured.use, noise_dof, start, epsilon)
+    found = fit(native, grid.frequency_hz, grid.rate_hz, rows)
+    whole = FittedRows(
+        found.values, found.covariance, _WORDS[found.status], found.epsilon, found.chi2, found.dof, found.response,
+        found.ended,
+    )  # fmt: skip
+    if problem.model.frictions and found.lacks.any():
+        lacking = np.flatnonzero(found.lacks & (found.status == 0))
+        solution = Solution(found.ended[lacking], found.response[lacking], np.empty(0), found.status[lacking] == 0)
+        stopped = lacking[held_by_friction(problem, measured[lacking], solution, found.dof[lacking])]
+        whole.status[stopped] = FRICTION
+        for numbers in (whole.values, whole.covariance, whole.epsilon):
+            numbers[stopped] = np.nan
     return whole
 
 

@@ -1,8 +1,9 @@
-"""The sliding DFT and the line stage in C, and their NumPy twins, the readable definitions.
+"""The sliding DFT, the line stage and the fit in C, and their NumPy twins, the readable definitions.
 
-The twins are `livebode.kernel.twin` and `livebode.kernel.line_twin`.
+The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin` and `livebode.kernel.fit_twin`.
 """
 
+from livebode.kernel._fit import FitFound, FitModel, FitRows, fit, fit_epsilon, fit_response
 from livebode.kernel._instructions import VARIABLE as INSTRUCTION_SET_VARIABLE
 from livebode.kernel._instructions import instruction_set, instruction_sets
 from livebode.kernel._lines import (
@@ -28,6 +29,9 @@ __all__ = [
     "NOISE_MOVING",
     "NOISE_SCATTER",
     "SCATTER",
+    "FitFound",
+    "FitModel",
+    "FitRows",
     "LineMoments",
     "LineRows",
     "LineSettings",
@@ -35,6 +39,9 @@ __all__ = [
     "SlidingDFT",
     "WeightSums",
     "add_windows",
+    "fit",
+    "fit_epsilon",
+    "fit_response",
     "instruction_set",
     "instruction_sets",
     "process_lines",
