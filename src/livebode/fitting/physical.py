@@ -165,7 +165,7 @@ class PhysicalModel:
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 
-    @property
+    @cached_property
     def units(self) -> tuple[str, ...]:
         return tuple(p.unit for p in self.parameters)
 
