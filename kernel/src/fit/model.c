@@ -174,7 +174,7 @@ static void turn_back(lb_places *p, double ticks, lb_curve to)
 
 void lb_evaluate(lb_places *p, const lb_sampled *s, lb_curve to)
 {
-    LB_ASSERT(p->width % LB_LANES == 0u && p->lines <= p->width);
+    LB_ASSERT(p->lines <= p->width);
     for (size_t i = 0; i < p->width; ++i) {
         to.re[i] = s->a * p->once.re[i];
         to.im[i] = s->a * p->once.im[i];

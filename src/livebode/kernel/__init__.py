@@ -3,7 +3,18 @@
 The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin` and `livebode.kernel.fit_twin`.
 """
 
-from livebode.kernel._fit import FitFound, FitModel, FitRows, fit, fit_epsilon, fit_response
+from livebode.kernel._fit import (
+    FeedbackSeries,
+    FitFound,
+    FitModel,
+    FitRows,
+    MarginGrid,
+    MarginRows,
+    fit,
+    fit_epsilon,
+    fit_margins,
+    fit_response,
+)
 from livebode.kernel._instructions import VARIABLE as INSTRUCTION_SET_VARIABLE
 from livebode.kernel._instructions import instruction_set, instruction_sets
 from livebode.kernel._lines import (
@@ -29,6 +40,9 @@ __all__ = [
     "NOISE_MOVING",
     "NOISE_SCATTER",
     "SCATTER",
+    "MarginGrid",
+    "MarginRows",
+    "FeedbackSeries",
     "FitFound",
     "FitModel",
     "FitRows",
@@ -41,6 +55,7 @@ __all__ = [
     "add_windows",
     "fit",
     "fit_epsilon",
+    "fit_margins",
     "fit_response",
     "instruction_set",
     "instruction_sets",

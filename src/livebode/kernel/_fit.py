@@ -140,3 +140,38 @@ def fit_response(model: FitModel, rate_hz: float, values: Floats, frequency_hz: 
     found = np.empty((len(values), frequency_hz.shape[-1]), np.complex128)
     _native.fit_response(model, rate_hz, values, frequency_hz, frequency_hz.ndim == 1, found)
     return found
+
+
+class FeedbackSeries(NamedTuple):
+    """F over ln f: pieces of equal `width` from `begin` on, each a series of Chebyshev polynomials, (pieces, 16)."""
+
+    begin: float
+    width: float
+    coefficients: Complex
+
+
+class MarginGrid(NamedTuple):
+    """Frequencies at which a loop is searched, ascending to half the rate, and F there, shape (points,)."""
+
+    frequency_hz: Floats
+    feedback: Complex
+    rate_hz: float
+
+
+class MarginRows(NamedTuple):
+    """Margins in the order of `livebode.margins.NAMES`, shape (rows, 6), and stable rows (rows,); NaN in the others."""
+
+    value: Floats
+    sigma: Floats
+    frequency_hz: Floats
+    frequency_sigma_hz: Floats
+    stable: Flags
+
+
+def fit_margins(
+    model: FitModel, feedback: FeedbackSeries, grid: MarginGrid, values: Floats, covariance: Floats
+) -> MarginRows:
+    """Margins of L = F·G for values (rows, parameters) and their covariance (rows, parameters, parameters)."""
+    found = MarginRows(*(np.empty((len(values), 6)) for _ in range(4)), np.empty(len(values), np.bool_))
+    _native.fit_margins(model, feedback, grid, np.ascontiguousarray(values), np.ascontiguousarray(covariance), found)
+    return found

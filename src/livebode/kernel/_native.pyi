@@ -47,6 +47,16 @@ def fit_response(
     /,
 ) -> None: ...
 
+def fit_margins(
+    model: tuple[Any, ...],
+    feedback: tuple[Any, ...],
+    grid: tuple[Any, ...],
+    values: npt.NDArray[np.float64],
+    covariance: npt.NDArray[np.float64],
+    out: tuple[Any, ...],
+    /,
+) -> None: ...
+
 class Engine:
     def __init__(
         self,

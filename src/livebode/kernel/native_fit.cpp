@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "livebode/fit.h"
+#include "livebode/margins.h"
 #include "native_array.h"
 
 namespace {
@@ -101,6 +101,27 @@ void respond(nb::tuple model, double rate_hz, nb::handle values, nb::handle freq
     expect(lb_fit_response(&m.model, rate_hz, rows, lines, is_shared ? 0 : lines, of, at, response.data<double>()));
 }
 
+// FeedbackSeries and MarginGrid.
+void margins(nb::tuple model, nb::tuple feedback, nb::tuple grid, nb::handle values, nb::handle covariance,
+             nb::tuple out)
+{
+    const Model m(model);
+    const size_t n = m.parameters, rows = length_of(values, 0), pieces = length_of(feedback[2], 0);
+    const size_t points = length_of(grid[0], 0);
+    const Array series(feedback[2], COMPLEX, {pieces, LB_FEEDBACK_DEGREE + 1});
+    const lb_feedback behind = {nb::cast<double>(feedback[0]), nb::cast<double>(feedback[1]), pieces,
+                                series.data<double>()};
+    const Array at_hz(grid[0], REAL, {points}), there(grid[1], COMPLEX, {points});
+    const lb_margin_grid places = {points, at_hz, there.data<double>(), nb::cast<double>(grid[2])};
+    const Array of(values, REAL, {rows, n}), spread(covariance, REAL, {rows, n, n});
+    const Array value(out[0], REAL, {rows, LB_MARGINS}, WRITE), sigma(out[1], REAL, {rows, LB_MARGINS}, WRITE);
+    const Array frequency(out[2], REAL, {rows, LB_MARGINS}, WRITE);
+    const Array frequency_sigma(out[3], REAL, {rows, LB_MARGINS}, WRITE), stable(out[4], FLAG, {rows}, WRITE);
+    const lb_margin_rows found = {value, sigma, frequency, frequency_sigma, stable};
+    std::vector<double> work(2 * points);
+    call(long_work, [&] { return lb_margins(&m.model, &behind, &places, rows, of, spread, &found, work.data()); });
+}
+
 } // namespace
 
 void bind_fit(nb::module_ &m)
@@ -108,4 +129,5 @@ void bind_fit(nb::module_ &m)
     m.def("fit", &fit);
     m.def("fit_epsilon", &epsilon_for);
     m.def("fit_response", &respond);
+    m.def("fit_margins", &margins);
 }
