@@ -26,11 +26,11 @@ typedef enum { LB_FIT_RIGID = 0, LB_FIT_TWO_MASS, LB_FIT_TWO_MASS_GAIN } lb_fit_
 typedef struct {
     lb_fit_kind kind;
     size_t parameters;
-    int integrators; /* 1: velocity, 2: position */
-    int at_load;     /* the output is that of the last mass */
-    double lever;    /* of the output */
-    double arm;      /* r², from load to shaft */
-    double ratio;    /* load's inertia over the motor's, 0 if not known */
+    int integrators;                                 /* 1: velocity, 2: position */
+    int at_load;                                     /* the output is that of the last mass */
+    double lever;                                    /* of the output */
+    double arm;                                      /* r², from load to shaft */
+    double ratio;                                    /* load's inertia over the motor's, 0 if not known */
     const double *start, *low, *high, *scale, *held; /* [parameters] */
 } lb_fit_model;
 
@@ -53,11 +53,11 @@ typedef struct {
 
 typedef enum {
     LB_FIT_OK = 0,
-    LB_FIT_NO_RESPONSE,   /* too few lines */
+    LB_FIT_NO_RESPONSE, /* too few lines */
     LB_FIT_NOT_CONVERGED,
     LB_FIT_AT_BOUND,
-    LB_FIT_NOT_SEEN,      /* a parameter is uncertain by more than half */
-    LB_FIT_NO_MODEL       /* error of the model above half of |G| */
+    LB_FIT_NOT_SEEN, /* a parameter is uncertain by more than half */
+    LB_FIT_NO_MODEL  /* error of the model above half of |G| */
 } lb_fit_status;
 
 /* Results of each row; where the status is not LB_FIT_OK, values, covariance and epsilon are NaN. */

@@ -33,11 +33,11 @@ typedef struct {
 /* Gain margin and reduction, phase margin, delay margin, peak sensitivity, bandwidth: dB, dB, deg, ms, –, Hz. A margin
  * without a crossing is infinite, a bandwidth NaN; the frequency of what is not there is NaN. */
 typedef struct {
-    double *value;          /* [rows][LB_MARGINS] */
-    double *sigma;          /* [rows][LB_MARGINS], 0 without a crossing */
-    double *frequency_hz;   /* [rows][LB_MARGINS] */
+    double *value;        /* [rows][LB_MARGINS] */
+    double *sigma;        /* [rows][LB_MARGINS], 0 without a crossing */
+    double *frequency_hz; /* [rows][LB_MARGINS] */
     double *frequency_sigma_hz;
-    uint8_t *is_stable;     /* [rows]; where the loop is not stable, the rest is NaN */
+    uint8_t *is_stable; /* [rows]; where the loop is not stable, the rest is NaN */
 } lb_margin_rows;
 
 /* Margins for values [rows][parameters] and their covariance [rows][parameters][parameters]; `work` has 2·points

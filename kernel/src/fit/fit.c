@@ -231,11 +231,11 @@ static int judge(lb_job *j, const lb_fit_rows *in, const lb_fit_found *out, size
         return 0;
     }
     const int is_wrong = lb_reduced(&j->row, width, epsilon_max * epsilon_max) > dof;
-    const lb_fit_status status = !j->now.is_settled   ? LB_FIT_NOT_CONVERGED
-                                 : is_at_bound(j)     ? LB_FIT_AT_BOUND
+    const lb_fit_status status = !j->now.is_settled    ? LB_FIT_NOT_CONVERGED
+                                 : is_at_bound(j)      ? LB_FIT_AT_BOUND
                                  : is_unseen(j, small) ? LB_FIT_NOT_SEEN
-                                 : is_wrong           ? LB_FIT_NO_MODEL
-                                                      : LB_FIT_OK;
+                                 : is_wrong            ? LB_FIT_NO_MODEL
+                                                       : LB_FIT_OK;
     for (size_t i = 0; i < n; ++i) {
         out->ended[row * n + i] = j->now.values[i];
         out->values[row * n + i] = status == LB_FIT_OK ? j->now.values[i] : nan;
@@ -291,9 +291,9 @@ lb_status lb_fit(const lb_fit_model *model, const lb_fit_grid *grid, const lb_fi
     if (!lb_is_complete(model) || !grid || !grid->frequency_hz || !in || !out || !work) {
         return LB_ERROR_NULL;
     }
-    if (in->rows && (!in->value || !in->sigma || !in->use || !in->noise_dof || !out->values || !out->covariance ||
-                     !out->status || !out->epsilon || !out->chi2 || !out->dof || !out->response || !out->ended ||
-                     !out->lacks)) {
+    if (in->rows &&
+        (!in->value || !in->sigma || !in->use || !in->noise_dof || !out->values || !out->covariance || !out->status ||
+         !out->epsilon || !out->chi2 || !out->dof || !out->response || !out->ended || !out->lacks)) {
         return LB_ERROR_NULL;
     }
     lb_job j = {0};

@@ -21,10 +21,10 @@ typedef struct {
     size_t lines, width;
     double tick, lowest_hz, highest_hz;
     double *theta;
-    lb_curve w, square, before;             /* w, w², 1/z */
-    lb_curve once, once_late;               /* 1/w, 1/(z·w) */
-    lb_curve twice, twice_late;             /* 1/w², 1/(z·w²) */
-    lb_curve turned;                        /* z^−ticks */
+    lb_curve w, square, before; /* w, w², 1/z */
+    lb_curve once, once_late;   /* 1/w, 1/(z·w) */
+    lb_curve twice, twice_late; /* 1/w², 1/(z·w²) */
+    lb_curve turned;            /* z^−ticks */
     double ticks;
 } lb_places;
 

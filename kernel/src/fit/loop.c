@@ -11,7 +11,8 @@ static lb_complex feedback_at(const lb_feedback *f, double frequency_hz)
     const double x = 2.0 * (place - piece) - 1.0;
     lb_complex now = {0.0, 0.0}, before = {0.0, 0.0};
     for (size_t i = LB_FEEDBACK_DEGREE; i > 0u; --i) {
-        const lb_complex next = {2.0 * x * now.re - before.re + c[2u * i], 2.0 * x * now.im - before.im + c[2u * i + 1u]};
+        const lb_complex next = {2.0 * x * now.re - before.re + c[2u * i],
+                                 2.0 * x * now.im - before.im + c[2u * i + 1u]};
         before = now;
         now = next;
     }
@@ -28,7 +29,8 @@ typedef struct {
 static void prepare(point_tables *t, double frequency_hz, double rate_hz)
 {
     lb_places *p = &t->places;
-    lb_curve *curves[] = {&p->w, &p->square, &p->before, &p->once, &p->once_late, &p->twice, &p->twice_late, &p->turned};
+    lb_curve *curves[] = {&p->w,         &p->square, &p->before,     &p->once,
+                          &p->once_late, &p->twice,  &p->twice_late, &p->turned};
     p->lines = p->width = 1u;
     p->theta = &t->theta;
     for (size_t i = 0; i < sizeof curves / sizeof *curves; ++i) {
@@ -58,7 +60,8 @@ void lb_open_loop(lb_loop *l, const double *values)
     l->plant = lb_sampled_of(&t, tick, values[n - 1u]);
     for (size_t i = 0; i < n; ++i) {
         const double sigma = sqrt(l->covariance[i * n + i]);
-        const double step = of_sigma * sigma > of_value * fabs(values[i]) ? of_sigma * sigma : of_value * fabs(values[i]);
+        const double step =
+            of_sigma * sigma > of_value * fabs(values[i]) ? of_sigma * sigma : of_value * fabs(values[i]);
         l->sigma[i] = sigma;
         /* A parameter without variance is not moved: it may be at its limit. */
         l->share[i] = sigma > 0.0 ? sigma / (2.0 * step) : 0.0;
@@ -109,7 +112,8 @@ static double turns_along(const lb_loop *l)
 {
     double turns = 0.0;
     for (size_t i = 1; i < l->grid->points; ++i) {
-        const lb_complex a = {1.0 + l->curve[i - 1u].re, l->curve[i - 1u].im}, b = {1.0 + l->curve[i].re, l->curve[i].im};
+        const lb_complex a = {1.0 + l->curve[i - 1u].re, l->curve[i - 1u].im},
+                         b = {1.0 + l->curve[i].re, l->curve[i].im};
         const double across = a.re * b.im - a.im * b.re;
         turns += a.im >= 0.0 && b.im < 0.0 && across > 0.0 ? 1.0 : 0.0;
         turns -= a.im < 0.0 && b.im >= 0.0 && across < 0.0 ? 1.0 : 0.0;

@@ -2,7 +2,7 @@
 #include "fit.h"
 
 static const double step_of_slope = 1e-7, tolerance = 1e-10, rise = 10.0, fall = 0.2;
-static const double enough = 1e-4;     /* of chi²: a step of 1 % of sigma */
+static const double enough = 1e-4;      /* of chi²: a step of 1 % of sigma */
 static const double largest_step = 0.7; /* of a logarithm: a factor of two */
 
 double lb_coordinate(const lb_fit_model *m, size_t at, double value)

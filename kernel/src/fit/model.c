@@ -36,8 +36,8 @@ static lb_transfer two_mass(const lb_fit_model *m, const double *v)
 static lb_transfer two_mass_gain(const lb_fit_model *m, const double *v)
 {
     const double low = 2.0 * LB_PI * v[1], high = 2.0 * LB_PI * v[2];
-    lb_transfer t = {v[0],           2.0 * v[0] * v[3] / low, v[0] / (low * low), 1.0, 2.0 * v[4] / high,
-                     1.0 / (high * high), m->integrators};
+    lb_transfer t = {
+        v[0], 2.0 * v[0] * v[3] / low, v[0] / (low * low), 1.0, 2.0 * v[4] / high, 1.0 / (high * high), m->integrators};
     return t;
 }
 
@@ -53,7 +53,8 @@ lb_transfer lb_transfer_of(const lb_fit_model *m, const double *values)
 /* Residue over the pole, N(p)/(d2·(p − other)·p^integrators)/p. */
 static lb_complex share_of(const lb_transfer *t, lb_complex p, lb_complex other)
 {
-    lb_complex above = {t->n2 * p.re + t->n1, t->n2 * p.im}, below = {t->d2 * (p.re - other.re), t->d2 * (p.im - other.im)};
+    lb_complex above = {t->n2 * p.re + t->n1, t->n2 * p.im},
+               below = {t->d2 * (p.re - other.re), t->d2 * (p.im - other.im)};
     const lb_complex value = {above.re * p.re - above.im * p.im + t->n0, above.re * p.im + above.im * p.re};
     for (int i = 0; i <= t->integrators; ++i) {
         const lb_complex more = {below.re * p.re - below.im * p.im, below.re * p.im + below.im * p.re};

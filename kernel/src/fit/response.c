@@ -9,8 +9,8 @@ typedef struct {
 
 static void prepare(lb_places *p, lb_tables *t, lb_curve *to)
 {
-    lb_curve *curves[] = {&p->w,         &p->square, &p->before,     &p->once, &p->once_late,
-                          &p->twice,     &p->twice_late, &p->turned, to};
+    lb_curve *curves[] = {&p->w,     &p->square,     &p->before, &p->once, &p->once_late,
+                          &p->twice, &p->twice_late, &p->turned, to};
     p->theta = t->theta;
     for (size_t i = 0; i < sizeof curves / sizeof *curves; ++i) {
         curves[i]->re = t->numbers[i][0];

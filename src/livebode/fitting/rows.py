@@ -112,7 +112,8 @@ def _fitted_natively(
     )  # fmt: skip
     if problem.model.frictions and found.lacks.any():
         lacking = np.flatnonzero(found.lacks & (found.status == 0))
-        solution = Solution(found.ended[lacking], found.response[lacking], np.empty(0), found.status[lacking] == 0)
+        no_slopes = np.empty((lacking.size, 0, 0), dtype=np.complex128)
+        solution = Solution(found.ended[lacking], found.response[lacking], no_slopes, found.status[lacking] == 0)
         stopped = lacking[held_by_friction(problem, measured[lacking], solution, found.dof[lacking])]
         whole.status[stopped] = FRICTION
         for numbers in (whole.values, whole.covariance, whole.epsilon):

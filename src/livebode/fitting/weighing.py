@@ -29,7 +29,7 @@ def epsilon_for(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Float
 
     Zero where noise alone explains the residuals: Σ 2·rest/noise ≤ dof.
     """
-    return fit_epsilon(*(np.ascontiguousarray(x) for x in (rest, noise, size)), np.asarray(dof, dtype=np.float64))
+    return fit_epsilon(np.ascontiguousarray(rest), np.ascontiguousarray(noise), np.ascontiguousarray(size), dof)
 
 
 def squares(measured: Measured, response: Complex) -> tuple[Floats, Floats, Floats]:

@@ -119,8 +119,9 @@ class FitFound(NamedTuple):
 
 def fit(model: FitModel, frequency_hz: Floats, rate_hz: float, rows: FitRows) -> FitFound:
     """Weighted least squares of each row by itself (docs/explanation/fits.md); frequencies of shape (lines,)."""
-    found = FitFound.empty(*rows.value.shape, model.table.shape[1])
-    arrays = FitRows(*(None if x is None else np.ascontiguousarray(x) for x in rows))
+    count, lines = rows.value.shape
+    found = FitFound.empty(count, lines, model.table.shape[1])
+    arrays = tuple(None if x is None else np.ascontiguousarray(x) for x in rows)
     _native.fit(model, frequency_hz, rate_hz, arrays, found)
     return found
 
@@ -172,6 +173,7 @@ def fit_margins(
     model: FitModel, feedback: FeedbackSeries, grid: MarginGrid, values: Floats, covariance: Floats
 ) -> MarginRows:
     """Margins of L = F·G for values (rows, parameters) and their covariance (rows, parameters, parameters)."""
-    found = MarginRows(*(np.empty((len(values), 6)) for _ in range(4)), np.empty(len(values), np.bool_))
+    value, sigma, at_hz, at_sigma_hz = (np.empty((len(values), 6)) for _ in range(4))
+    found = MarginRows(value, sigma, at_hz, at_sigma_hz, np.empty(len(values), np.bool_))
     _native.fit_margins(model, feedback, grid, np.ascontiguousarray(values), np.ascontiguousarray(covariance), found)
     return found

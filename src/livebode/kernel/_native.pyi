@@ -20,7 +20,6 @@ def add_windows(
 def process_lines(
     settings: tuple[Any, ...], moments: tuple[Any, ...], windows: tuple[Any, ...], out: tuple[Any, ...], /
 ) -> float: ...
-
 def fit(
     model: tuple[Any, ...],
     frequency_hz: npt.NDArray[np.float64],
@@ -46,7 +45,6 @@ def fit_response(
     out: npt.NDArray[np.complex128],
     /,
 ) -> None: ...
-
 def fit_margins(
     model: tuple[Any, ...],
     feedback: tuple[Any, ...],

@@ -51,14 +51,16 @@ class SingularError(ArithmeticError):
 
 def fit(model: FitModel, frequency_hz: Floats, rate_hz: float, rows: FitRows) -> FitFound:
     """As `livebode.kernel.fit`."""
-    found = FitFound.empty(*rows.value.shape, model.table.shape[1])
+    count, lines = rows.value.shape
+    found = FitFound.empty(count, lines, model.table.shape[1])
     with np.errstate(all="ignore"):
         places = Places(frequency_hz, rate_hz)
-        for i in range(len(rows.value)):
+        for i in range(count):
             row = _Row(rows.value[i], rows.sigma[i], rows.use[i])
             start = None if rows.start is None else rows.start[i]
             epsilon = None if rows.epsilon is None else rows.epsilon[i]
-            _fit_row(_Problem(model, places, row), rows.noise_dof[i], start, epsilon, [part[i : i + 1] for part in found])
+            out = [part[i : i + 1] for part in found]
+            _fit_row(_Problem(model, places, row), rows.noise_dof[i], start, epsilon, out)
     return found
 
 
@@ -136,11 +138,11 @@ def transfer_of(m: FitModel, v: Floats) -> Transfer:
         motor, load = v[0], v[0] * m.ratio if m.ratio > 0 else v[1] * m.arm
         spring, damper = (x * m.arm for x in v[1 if m.ratio > 0 else 2 :][:2])
         both = motor + load
-        above = (m.lever * spring, m.lever * damper, 0.0) if m.at_load else (spring, damper, load)
-        return Transfer(*above, both * spring, both * damper, motor * load, m.integrators)
+        n0, n1, n2 = (m.lever * spring, m.lever * damper, 0.0) if m.at_load else (spring, damper, load)
+        return Transfer(n0, n1, n2, both * spring, both * damper, motor * load, m.integrators)
     low, high = 2.0 * np.pi * v[1], 2.0 * np.pi * v[2]
-    above = v[0], 2.0 * v[0] * v[3] / low, v[0] / (low * low)
-    return Transfer(*above, 1.0, 2.0 * v[4] / high, 1.0 / (high * high), m.integrators)
+    n1, n2 = 2.0 * v[0] * v[3] / low, v[0] / (low * low)
+    return Transfer(v[0], n1, n2, 1.0, 2.0 * v[4] / high, 1.0 / (high * high), m.integrators)
 
 
 @dataclass
@@ -361,7 +363,7 @@ class _Problem:
     def __init__(self, model: FitModel, places: Places, row: _Row) -> None:
         self.model, self.places, self.row = model, places, row
         self.begin, self.low, self.high, self.scale, self.held = model.table
-        self.at = np.flatnonzero(np.isnan(self.held))
+        self.at: list[int] = np.flatnonzero(np.isnan(self.held)).tolist()
         self.is_log = self.low > 0
         self.lowest, self.highest = (np.array([self.coordinate(at, e[at]) for at in self.at]) for e in model.table[1:3])
 
@@ -463,8 +465,8 @@ class _Problem:
 
     def _share_at(self, rigid: Curve, omega: Any) -> tuple[Any, Any, Any]:
         m = self.model
-        above = (1.0, 0.0) if m.integrators == 2 else (0.0, 1.0)  # s/(s² + ωs/Q + ω²), over s for a position
-        mode = Transfer(*above, 0.0, omega * omega, omega / _QUALITY, 1.0, 0)
+        n0, n1 = (1.0, 0.0) if m.integrators == 2 else (0.0, 1.0)  # s/(s² + ωs/Q + ω²), over s for a position
+        mode = Transfer(n0, n1, 0.0, omega * omega, omega / _QUALITY, 1.0, 0)
         shape = evaluate(self.places, sampled_of(mode, self.places.tick, 0.0))
         ratio = -1.0 if m.at_load else m.ratio if m.kind == TWO_MASS else 0.0
         if ratio == 0:
@@ -487,8 +489,8 @@ class _Problem:
         floor = _LEAST * largest + 1e-300
         weights, cost = [x if x > floor else floor for x in solved], np.float64(0.0)
         for k, one in enumerate(weights):
-            for l, other in enumerate(weights):
-                cost = cost + one * matrix[k, l] * other
+            for i, other in enumerate(weights):
+                cost = cost + one * matrix[k, i] * other
             cost = cost - 2.0 * one * along[k]
         return weights, cost
 
