@@ -15,8 +15,8 @@ def fit_together(
 ) -> list[Parameters]:
     """Parameters of each batch, to rounding as `process` of its fitter gives them; a fitter may be there once.
 
-    Fitters with the same model, lines and free parameters share the computation of their rows: a call for one row costs
-    nearly what it costs for sixteen (`python -m bench.fits`).
+    Fitters with the same model, lines and free parameters share the computation of their rows where NumPy fits them: a
+    call for one row costs nearly what it costs for sixteen (`python -m bench.fits`).
 
     Parameters
     ----------

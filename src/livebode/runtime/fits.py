@@ -51,8 +51,8 @@ class Fits:
 
     def take(self, found: Parameters, responses: Responses) -> None:
         """Count the fits of these responses, and remember the newest."""
-        for word, count in zip(*np.unique(found.status, return_counts=True)):
-            self._counts[str(word)] = self._counts.get(str(word), 0) + int(count)
+        for word in found.status.tolist():
+            self._counts[word] = self._counts.get(word, 0) + 1
         good = np.flatnonzero(found.ok)
         if good.size:
             epsilon = found.epsilon[good]
