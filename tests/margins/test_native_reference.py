@@ -64,6 +64,7 @@ def loops(draw: st.DrawFn) -> tuple[OpenLoop, OpenLoop, Parameters]:
         belt = np.array([*BELT[:2], reduced * omega**2 / 0.019**2, 2 * damping * reduced * omega / 0.019**2])
         value = parameters(belt * factors).value
         value[:, -1] = draw(st.sampled_from([0.0, 3e-4, -1e-4]))
+        value[:, 4:6] = draw(st.sampled_from([0.0, 0.0, 0.05, 1.0])) * np.array([1.0, 100.0])
         fits = fits_of(case.open.plant, value, covariance_of(value, 4, seed))
         return case.open, replace(case.open, plant=NumpyTwoMass(radius_m=0.019)), fits
     output = "position" if position else "velocity"
@@ -101,10 +102,5 @@ def test_rows_do_not_depend_on_those_beside_them() -> None:
         assert alone.equals(together[i : i + 1])
 
 
-def test_a_friction_and_a_feedback_with_steps_are_read_by_numpy() -> None:
-    fits, loop = parameters(BELT[np.newaxis]), Case(BELT, gain=0.6).open
-    without = margins(fits, loop, BAND_HZ)
-    fits.value[0, 4] = 0.5
-    with_friction = margins(fits, loop, BAND_HZ)
-    assert with_friction.of("phase_margin")[0] != pytest.approx(without.of("phase_margin")[0], rel=1e-3)
+def test_a_feedback_with_steps_is_read_by_numpy() -> None:
     assert series_of(lambda f: np.round(f).astype(complex), 0.1, 2000.0) is None

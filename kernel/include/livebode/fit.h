@@ -1,7 +1,7 @@
 /* Weighted least squares of drive models to rows of frequency responses (Levenberg–Marquardt), with covariance.
  *
  * One mass, two masses, or two masses behind an unknown gain, behind a zero-order hold and a delay; their frictions are
- * fixed at zero. Every row is computed by itself. No function of a mathematical library is used except sqrt, floor and
+ * fixed. Every row is computed by itself. No function of a mathematical library is used except sqrt, floor and
  * fabs, which IEEE 754 defines to the bit. Complex arrays are pairs of re and im; all belong to the caller. The NumPy
  * equivalent, with the same bits, is livebode.kernel.fit_twin; the sign and payload of NaN are not specified.
  */
@@ -57,7 +57,8 @@ typedef enum {
     LB_FIT_NOT_CONVERGED,
     LB_FIT_AT_BOUND,
     LB_FIT_NOT_SEEN, /* a parameter is uncertain by more than half */
-    LB_FIT_NO_MODEL  /* error of the model above half of |G| */
+    LB_FIT_NO_MODEL, /* error of the model above half of |G| */
+    LB_FIT_FRICTION  /* error above 3 %, of which a viscous friction explains more than half */
 } lb_fit_status;
 
 /* Results of each row; where the status is not LB_FIT_OK, values, covariance and epsilon are NaN. */
@@ -70,7 +71,6 @@ typedef struct {
     double *dof;        /* [rows] */
     double *response;   /* [rows][lines][2], of the model, also where the fit failed */
     double *ended;      /* [rows][parameters], where the search ended */
-    uint8_t *lacks;     /* [rows], the error of the model is above 3 % of |G| */
 } lb_fit_found;
 
 /* Number of doubles that lb_fit needs as `work`. */

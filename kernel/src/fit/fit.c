@@ -5,7 +5,8 @@ static const double first_epsilon = 0.1, same = 0.01, epsilon_max = 0.5, lacking
 static const double uncertain = 0.5;  /* of a logarithm */
 static const double suspicious = 4.0; /* of a reduced chi², ε and all */
 static const double near_bound = 1e-6;
-static const int warm_rounds = 12, rounds = 30, reweighted = 8;
+static const double explained = 0.5; /* of ε, by a friction */
+static const int warm_rounds = 12, rounds = 30, reweighted = 8, friction_rounds = 15;
 
 #define LB_CURVES_OF_PLACES 8u
 #define LB_ARRAYS_OF_ROW 8u
@@ -201,7 +202,6 @@ static void write_none(const lb_job *j, const lb_fit_found *out, size_t row, dou
     out->status[row] = status;
     out->epsilon[row] = out->chi2[row] = nan;
     out->dof[row] = dof;
-    out->lacks[row] = 0;
 }
 
 static void write_covariance(const lb_job *j, double small[LB_FREE][LB_FREE], double *to)
@@ -251,8 +251,62 @@ static int judge(lb_job *j, const lb_fit_rows *in, const lb_fit_found *out, size
     out->epsilon[row] = status == LB_FIT_OK ? epsilon : nan;
     out->chi2[row] = chi_squared(&j->row, width);
     out->dof[row] = dof;
-    out->lacks[row] = lb_reduced(&j->row, width, lacking * lacking) > dof;
     return 1;
+}
+
+/* Whether ε falls to less than half as soon as one viscous friction is fitted too: dry friction at standstill acts on
+ * such a small motion much like a viscous one, and a real viscous one biases stiffness and inertia alike. */
+static int is_explained(lb_job *j, const lb_fit_rows *in, size_t row, size_t at, const double *values, double dof)
+{
+    const lb_fit_model *model = j->model;
+    const double epsilon = own_epsilon(j, dof),
+                 arm = model->kind == LB_FIT_TWO_MASS && at + 2u == model->parameters ? model->arm : 1.0;
+    double scale[LB_FIT_PARAMETERS];
+    lb_fit_model wider = *model;
+    for (size_t i = 0; i < model->parameters; ++i) {
+        j->now.values[i] = values[i];
+        scale[i] = model->scale[i];
+    }
+    /* A friction that stops the motor in as long as ten of the lowest line's radians take. */
+    j->now.values[at] = scale[at] = values[0] * (2.0 * LB_PI * j->places.lowest_hz / 10.0) / arm;
+    wider.scale = scale;
+    read_row(j, in, row);
+    lb_weigh(&j->row, j->places.width, epsilon / 2.0);
+    j->model = &wider;
+    j->at[j->free++] = at;
+    const int is_possible = lb_minimise(j, friction_rounds);
+    j->model = model;
+    --j->free;
+    lb_take_residuals(&j->row, j->places.width, j->now.response);
+    return is_possible && own_epsilon(j, dof - 1.0) < explained * epsilon;
+}
+
+/* Of a row that is fitted with a large error. */
+static void examine_friction(lb_job *j, const lb_fit_rows *in, const lb_fit_found *out, size_t row)
+{
+    const lb_fit_model *m = j->model;
+    const size_t n = m->parameters, first = m->kind == LB_FIT_RIGID ? 1u : n - 3u;
+    double values[LB_FIT_PARAMETERS];
+    const lb_curve fitted = j->shape;
+    for (size_t i = 0; i < n; ++i) {
+        values[i] = out->ended[row * n + i];
+    }
+    for (size_t at = first; at + 1u < n && out->status[row] == LB_FIT_OK; ++at) {
+        for (size_t i = 0; i < j->places.width; ++i) {
+            const size_t from = 2u * (row * j->places.lines + (i < j->places.lines ? i : 0u));
+            fitted.re[i] = out->response[from];
+            fitted.im[i] = out->response[from + 1u];
+        }
+        read_row(j, in, row);
+        lb_take_residuals(&j->row, j->places.width, fitted);
+        if (is_explained(j, in, row, at, values, out->dof[row])) {
+            out->status[row] = LB_FIT_FRICTION;
+        }
+    }
+    for (size_t i = 0; i < n * n && out->status[row] == LB_FIT_FRICTION; ++i) {
+        out->values[row * n + i % n] = out->covariance[row * n * n + i] = lb_not_a_number();
+        out->epsilon[row] = lb_not_a_number();
+    }
 }
 
 static void fit_row(lb_job *j, const lb_fit_rows *in, const lb_fit_found *out, size_t row)
@@ -274,6 +328,11 @@ static void fit_row(lb_job *j, const lb_fit_rows *in, const lb_fit_found *out, s
     if (!is_possible || !judge(j, in, out, row, count, epsilon)) {
         write_none(j, out, row, dof, LB_FIT_NOT_CONVERGED);
     }
+    const int has_friction = j->model->kind != LB_FIT_TWO_MASS_GAIN;
+    if (has_friction && out->status[row] == LB_FIT_OK &&
+        lb_reduced(&j->row, j->places.width, lacking * lacking) > dof) {
+        examine_friction(j, in, out, row);
+    }
 }
 
 static int is_grid_valid(const lb_fit_grid *g)
@@ -291,9 +350,8 @@ lb_status lb_fit(const lb_fit_model *model, const lb_fit_grid *grid, const lb_fi
     if (!lb_is_complete(model) || !grid || !grid->frequency_hz || !in || !out || !work) {
         return LB_ERROR_NULL;
     }
-    if (in->rows &&
-        (!in->value || !in->sigma || !in->use || !in->noise_dof || !out->values || !out->covariance || !out->status ||
-         !out->epsilon || !out->chi2 || !out->dof || !out->response || !out->ended || !out->lacks)) {
+    if (in->rows && (!in->value || !in->sigma || !in->use || !in->noise_dof || !out->values || !out->covariance ||
+                     !out->status || !out->epsilon || !out->chi2 || !out->dof || !out->response || !out->ended)) {
         return LB_ERROR_NULL;
     }
     lb_job j = {0};

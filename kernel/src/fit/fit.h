@@ -28,10 +28,12 @@ typedef struct {
     double ticks;
 } lb_places;
 
-/* Numerator and denominator in s, by powers, over s^integrators. */
+/* Numerator and denominator in s, by powers, over s^integrators; with `has_slow` also over s − slow. */
 typedef struct {
     double n0, n1, n2, d0, d1, d2;
     int integrators;
+    int has_slow;
+    double slow;
 } lb_transfer;
 
 /* Behind the hold: once·a + once_late·b + twice·c + twice_late·d, and a section of second order in w; a delay adds the
@@ -39,7 +41,8 @@ typedef struct {
 typedef struct {
     double a, b, c, d;
     double n0, n1, late0, late1, d0, d1;
-    int has_section, is_late, is_double;
+    double slow, slow_late, slow_end; /* a section of first order, slow/(w − slow_end) */
+    int has_section, has_slow, is_late, is_double;
     double ticks;
 } lb_sampled;
 

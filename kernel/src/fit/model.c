@@ -15,8 +15,32 @@ int lb_is_valid(const lb_fit_model *m)
 
 static lb_transfer rigid(const lb_fit_model *m, const double *v)
 {
-    lb_transfer t = {m->lever / v[0], 0.0, 0.0, 1.0, 0.0, 0.0, m->integrators};
+    lb_transfer t = {m->lever / v[0], 0.0, 0.0, 1.0, 0.0, 0.0, m->integrators, 0, 0.0};
+    if (v[1] != 0.0) {
+        t.integrators = m->integrators - 1;
+        t.has_slow = 1;
+        t.slow = -v[1] / v[0];
+    }
     return t;
+}
+
+/* The real root nearest to zero of d3·s³ + d2·s² + d1·s + d0, whose coefficients are those of a passive machine: it is
+ * between −d2/d3 and 0. Newton's steps, and a bisection where one leaves the interval. */
+static double slow_root(double d3, double d2, double d1, double d0)
+{
+    double low = -d2 / d3, high = 0.0, x = -d0 / d1;
+    for (int i = 0; i < 60; ++i) {
+        const double value = ((d3 * x + d2) * x + d1) * x + d0, slope = (3.0 * d3 * x + 2.0 * d2) * x + d1;
+        low = value < 0.0 ? x : low;
+        high = value < 0.0 ? high : x;
+        const double newton = x - value / slope;
+        const double next = newton > low && newton < high ? newton : 0.5 * (low + high);
+        if (fabs(next - x) <= 1e-15 * fabs(x)) {
+            return next;
+        }
+        x = next;
+    }
+    return x;
 }
 
 static lb_transfer two_mass(const lb_fit_model *m, const double *v)
@@ -24,11 +48,22 @@ static lb_transfer two_mass(const lb_fit_model *m, const double *v)
     const size_t next = m->ratio > 0.0 ? 1u : 2u;
     const double motor = v[0], load = m->ratio > 0.0 ? motor * m->ratio : v[1] * m->arm;
     const double spring = v[next] * m->arm, damper = v[next + 1u] * m->arm, both = motor + load;
-    lb_transfer t = {spring, damper, load, both * spring, both * damper, motor * load, m->integrators};
+    const double drag = v[next + 2u], load_drag = v[next + 3u] * m->arm, drags = drag + load_drag;
+    lb_transfer t = {spring, damper + load_drag, load, both * spring, both * damper, motor * load, m->integrators, 0,
+                     0.0};
     if (m->at_load) {
         t.n0 = m->lever * spring;
         t.n1 = m->lever * damper;
         t.n2 = 0.0;
+    }
+    if (drags != 0.0) {
+        const double d3 = motor * load, d2 = motor * (damper + load_drag) + load * (damper + drag);
+        const double d1 = both * spring + drag * load_drag + damper * drags, d0 = spring * drags;
+        t.integrators = m->integrators - 1;
+        t.has_slow = 1;
+        t.slow = slow_root(d3, d2, d1, d0);
+        t.d1 = d2 + d3 * t.slow;
+        t.d0 = -d0 / t.slow;
     }
     return t;
 }
@@ -56,6 +91,11 @@ static lb_complex share_of(const lb_transfer *t, lb_complex p, lb_complex other)
     lb_complex above = {t->n2 * p.re + t->n1, t->n2 * p.im},
                below = {t->d2 * (p.re - other.re), t->d2 * (p.im - other.im)};
     const lb_complex value = {above.re * p.re - above.im * p.im + t->n0, above.re * p.im + above.im * p.re};
+    if (t->has_slow) {
+        const lb_complex more = {below.re * (p.re - t->slow) - below.im * p.im,
+                                 below.re * p.im + below.im * (p.re - t->slow)};
+        below = more;
+    }
     for (int i = 0; i <= t->integrators; ++i) {
         const lb_complex more = {below.re * p.re - below.im * p.im, below.re * p.im + below.im * p.re};
         below = more;
@@ -116,6 +156,21 @@ static void section(const lb_transfer *t, double tick, double late, lb_sampled *
     }
 }
 
+/* The slow pole, whose residue has the whole section below it. */
+static void slow_section(const lb_transfer *t, double tick, double late, lb_sampled *s)
+{
+    const double p = t->slow;
+    double below = (t->d2 * p + t->d1) * p + t->d0;
+    for (int i = 0; i <= t->integrators; ++i) {
+        below = below * p;
+    }
+    const double q = ((t->n2 * p + t->n1) * p + t->n0) / below;
+    s->slow_end = lb_expm1(p * tick);
+    const double soon = s->is_late ? lb_expm1(p * tick * (1.0 - late)) : s->slow_end;
+    s->slow = q * soon;
+    s->slow_late = q * (s->slow_end - soon);
+}
+
 lb_sampled lb_sampled_of(const lb_transfer *t, double tick, double delay_s)
 {
     lb_sampled s = {0};
@@ -125,8 +180,10 @@ lb_sampled lb_sampled_of(const lb_transfer *t, double tick, double delay_s)
     s.is_double = t->integrators == 2;
     s.has_section = t->d2 != 0.0;
     const double late = ticks - s.ticks, soon = s.is_late ? (1.0 - late) * tick : tick, rest = tick - soon;
+    s.has_slow = t->has_slow;
     if (t->integrators > 0) {
-        const double constant = t->n0 / t->d0, speed = s.is_double ? (t->n1 - constant * t->d1) / t->d0 : constant;
+        const double constant = t->n0 / (t->has_slow ? t->d0 * -t->slow : t->d0),
+                     speed = s.is_double ? (t->n1 - constant * t->d1) / t->d0 : constant;
         const double place = s.is_double ? constant : 0.0;
         s.a = speed * soon + place * (soon * soon / 2.0);
         s.b = speed * rest + place * ((tick * tick - soon * soon) / 2.0);
@@ -135,6 +192,9 @@ lb_sampled lb_sampled_of(const lb_transfer *t, double tick, double delay_s)
     }
     if (s.has_section) {
         section(t, tick, late, &s);
+    }
+    if (s.has_slow) {
+        slow_section(t, tick, late, &s);
     }
     return s;
 }
@@ -150,6 +210,18 @@ static void add_section(const lb_places *p, const lb_sampled *s, lb_curve to)
             re = re + (late_re * p->before.re[i] - late_im * p->before.im[i]);
             im = im + (late_re * p->before.im[i] + late_im * p->before.re[i]);
         }
+        const double size = below_re * below_re + below_im * below_im;
+        to.re[i] = to.re[i] + (re * below_re + im * below_im) / size;
+        to.im[i] = to.im[i] + (im * below_re - re * below_im) / size;
+    }
+}
+
+static void add_slow(const lb_places *p, const lb_sampled *s, lb_curve to)
+{
+    for (size_t i = 0; i < p->width; ++i) {
+        const double below_re = p->w.re[i] - s->slow_end, below_im = p->w.im[i];
+        const double re = s->is_late ? s->slow + s->slow_late * p->before.re[i] : s->slow;
+        const double im = s->is_late ? s->slow_late * p->before.im[i] : 0.0;
         const double size = below_re * below_re + below_im * below_im;
         to.re[i] = to.re[i] + (re * below_re + im * below_im) / size;
         to.im[i] = to.im[i] + (im * below_re - re * below_im) / size;
@@ -194,6 +266,9 @@ void lb_evaluate(lb_places *p, const lb_sampled *s, lb_curve to)
     }
     if (s->has_section) {
         add_section(p, s, to);
+    }
+    if (s->has_slow) {
+        add_slow(p, s, to);
     }
     if (s->ticks != 0.0) {
         turn_back(p, s->ticks, to);

@@ -8,7 +8,7 @@ static const int rounds = 30;
 static void find_modes(lb_job *j)
 {
     const lb_fit_model *m = j->model;
-    const lb_transfer body = {1.0, 0.0, 0.0, 1.0, 0.0, 0.0, m->integrators};
+    const lb_transfer body = {1.0, 0.0, 0.0, 1.0, 0.0, 0.0, m->integrators, 0, 0.0};
     const lb_sampled of_body = lb_sampled_of(&body, j->places.tick, 0.0);
     const double low = 2.0 * LB_PI * (j->places.lowest_hz / 2.0), high = 2.0 * LB_PI * (j->places.highest_hz * 2.0);
     const double step = lb_log(high / low) / (double)(LB_SCANNED - 1u);
@@ -16,7 +16,7 @@ static void find_modes(lb_job *j)
     for (size_t k = 0; k < LB_SCANNED; ++k) {
         const double omega = low * lb_exp(step * (double)k);
         /* s/(s² + ωs/Q + ω²), over s for a position */
-        lb_transfer mode = {0.0, 1.0, 0.0, omega * omega, omega / quality, 1.0, 0};
+        lb_transfer mode = {0.0, 1.0, 0.0, omega * omega, omega / quality, 1.0, 0, 0, 0.0};
         if (m->integrators == 2) {
             mode.n0 = 1.0;
             mode.n1 = 0.0;

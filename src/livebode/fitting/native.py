@@ -15,12 +15,12 @@ _KINDS: dict[type[PhysicalModel], int] = {Rigid: RIGID, TwoMass: TWO_MASS, TwoMa
 
 
 def native_model(model: PhysicalModel, grid: EvaluationGrid, held: dict[str, float]) -> FitModel | None:
-    """None for a model of the user or of three masses, a continuous response, or a friction that is not zero.
+    """None for a model of the user or of three masses, a continuous response, or a free friction.
 
     A class derived from a model may have another transfer function, so it is not one of them.
     """
     kind = _KINDS.get(type(model))
-    if kind is None or grid.hold != "zero-order" or any(held.get(name) != 0.0 for name in model.frictions):
+    if kind is None or grid.hold != "zero-order" or any(name not in held for name in model.frictions):
         return None
     f = grid.frequency_hz
     if not (f.size and f.min() > 0 and f.max() <= grid.rate_hz / 2):

@@ -37,7 +37,9 @@ SENTENCES = {
 }
 """The meaning of each status as text."""
 
-_WORDS = np.array([OK, NO_RESPONSE, NOT_CONVERGED, BOUND, NOT_SEEN, NO_FIT], dtype="<U20")  # in the kernel's order
+_WORDS = np.array(
+    [OK, NO_RESPONSE, NOT_CONVERGED, BOUND, NOT_SEEN, NO_FIT, FRICTION], dtype="<U20"
+)  # in the kernel's order
 
 EPSILON_MAX = 0.5
 _UNCERTAIN = 0.5  # of a logarithm
@@ -102,23 +104,14 @@ def _fitted_natively(
     start: Floats | None,
     epsilon: Floats | None,
 ) -> FittedRows:
-    """All rows in C, which has no viscous friction: whether one explains a model's error is examined here."""
+    """All rows in C."""
     grid = problem.grid
     rows = FitRows(measured.value, measured.sigma, measured.use, noise_dof, start, epsilon)
     found = fit(native, grid.frequency_hz, grid.rate_hz, rows)
-    whole = FittedRows(
-        found.values, found.covariance, _WORDS[found.status], found.epsilon, found.chi2, found.dof, found.response,
-        found.ended,
-    )  # fmt: skip
-    if problem.model.frictions and found.lacks.any():
-        lacking = np.flatnonzero(found.lacks & (found.status == 0))
-        no_slopes = np.empty((lacking.size, 0, 0), dtype=np.complex128)
-        solution = Solution(found.ended[lacking], found.response[lacking], no_slopes, found.status[lacking] == 0)
-        stopped = lacking[held_by_friction(problem, measured[lacking], solution, found.dof[lacking])]
-        whole.status[stopped] = FRICTION
-        for numbers in (whole.values, whole.covariance, whole.epsilon):
-            numbers[stopped] = np.nan
-    return whole
+    status = _WORDS[found.status]
+    return FittedRows(
+        found.values, found.covariance, status, found.epsilon, found.chi2, found.dof, found.response, found.ended
+    )
 
 
 def _fitted_apart(

@@ -15,13 +15,13 @@ Flags = npt.NDArray[np.bool_]
 Integers = npt.NDArray[np.int64]
 
 RIGID, TWO_MASS, TWO_MASS_GAIN = range(3)
-FITTED, NO_RESPONSE, NOT_CONVERGED, AT_BOUND, NOT_SEEN, NO_MODEL = range(6)
+FITTED, NO_RESPONSE, NOT_CONVERGED, AT_BOUND, NOT_SEEN, NO_MODEL, FRICTION = range(7)
 """Status of a row: fitted; too few lines; no minimum; a parameter at its bound; one uncertain by more than half; an
-error of the model above half of |G|."""
+error of the model above half of |G|; one above 3 %, of which a viscous friction explains more than half."""
 
 
 class FitModel(NamedTuple):
-    """A model behind a zero-order hold, without frictions.
+    """A model behind a zero-order hold, whose frictions are fixed.
 
     Attributes
     ----------
@@ -88,8 +88,6 @@ class FitFound(NamedTuple):
         Of the model, shape (rows, lines), also where the fit failed.
     ended
         Where the search ended, shape (rows, parameters).
-    lacks
-        Rows whose error of the model is above 3 % of |G|, shape (rows,).
     """
 
     values: Floats
@@ -100,7 +98,6 @@ class FitFound(NamedTuple):
     dof: Floats
     response: Complex
     ended: Floats
-    lacks: Flags
 
     @classmethod
     def empty(cls, rows: int, lines: int, parameters: int) -> FitFound:
@@ -113,7 +110,6 @@ class FitFound(NamedTuple):
             np.empty(rows),
             np.empty((rows, lines), np.complex128),
             np.empty((rows, parameters)),
-            np.empty(rows, np.bool_),
         )
 
 

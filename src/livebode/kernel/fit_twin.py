@@ -17,12 +17,14 @@ import numpy.typing as npt
 from livebode.kernel._fit import (
     AT_BOUND,
     FITTED,
+    FRICTION,
     NO_MODEL,
     NO_RESPONSE,
     NOT_CONVERGED,
     NOT_SEEN,
     RIGID,
     TWO_MASS,
+    TWO_MASS_GAIN,
     FitFound,
     FitModel,
     FitRows,
@@ -41,7 +43,7 @@ _SCANNED, _TRIED, _QUALITY, _LEAST = 48, 4, 10.0, 1e-3
 _EPSILON_STEPS, _CLOSE = 30, 1e-6
 _FIRST_EPSILON, _SAME, _EPSILON_MAX, _LACKING = 0.1, 0.01, 0.5, 0.03
 _UNCERTAIN, _SUSPICIOUS, _NEAR_BOUND = 0.5, 4.0, 1e-6
-_WARM_ROUNDS, _ROUNDS, _REWEIGHTED = 12, 30, 8
+_WARM_ROUNDS, _ROUNDS, _REWEIGHTED, _FRICTION_ROUNDS, _EXPLAINED = 12, 30, 8, 15, 0.5
 _LEAST_DOF, _CONDITION_MAX, _ROUNDING = 3.0, 1e11, 1e-14
 
 
@@ -119,7 +121,7 @@ def times(a: Any, b: Any) -> Any:
 
 
 class Transfer(NamedTuple):
-    """Numerator and denominator in s by powers, over s^integrators."""
+    """Numerator and denominator in s by powers, over s^integrators, and over s − slow if that is not None."""
 
     n0: Any
     n1: Any
@@ -128,21 +130,47 @@ class Transfer(NamedTuple):
     d1: Any
     d2: Any
     integrators: int
+    slow: Any = None
 
 
 def transfer_of(m: FitModel, v: Floats) -> Transfer:
     """Of a model at its parameters."""
     if m.kind == RIGID:
+        if v[1] != 0:
+            return Transfer(m.lever / v[0], 0.0, 0.0, 1.0, 0.0, 0.0, m.integrators - 1, -v[1] / v[0])
         return Transfer(m.lever / v[0], 0.0, 0.0, 1.0, 0.0, 0.0, m.integrators)
     if m.kind == TWO_MASS:
         motor, load = v[0], v[0] * m.ratio if m.ratio > 0 else v[1] * m.arm
         spring, damper = (x * m.arm for x in v[1 if m.ratio > 0 else 2 :][:2])
-        both = motor + load
-        n0, n1, n2 = (m.lever * spring, m.lever * damper, 0.0) if m.at_load else (spring, damper, load)
+        drag, load_drag = v[-3], v[-2] * m.arm
+        both, drags = motor + load, drag + load_drag
+        n0, n1, n2 = (m.lever * spring, m.lever * damper, 0.0) if m.at_load else (spring, damper + load_drag, load)
+        if drags != 0:
+            d3, d2 = motor * load, motor * (damper + load_drag) + load * (damper + drag)
+            d1, d0 = both * spring + drag * load_drag + damper * drags, spring * drags
+            slow = _slow_root(d3, d2, d1, d0)
+            return Transfer(n0, n1, n2, -d0 / slow, d2 + d3 * slow, d3, m.integrators - 1, slow)
         return Transfer(n0, n1, n2, both * spring, both * damper, motor * load, m.integrators)
     low, high = 2.0 * np.pi * v[1], 2.0 * np.pi * v[2]
     n1, n2 = 2.0 * v[0] * v[3] / low, v[0] / (low * low)
     return Transfer(v[0], n1, n2, 1.0, 2.0 * v[4] / high, 1.0 / (high * high), m.integrators)
+
+
+def _slow_root(d3: Any, d2: Any, d1: Any, d0: Any) -> Any:
+    """The real root nearest to zero of a passive machine's d3·s³ + d2·s² + d1·s + d0: between −d2/d3 and 0.
+
+    Newton's steps, and a bisection where one leaves the interval.
+    """
+    low, high, x = -d2 / d3, np.float64(0.0), -d0 / d1
+    for _ in range(60):
+        value, slope = ((d3 * x + d2) * x + d1) * x + d0, (3.0 * d3 * x + 2.0 * d2) * x + d1
+        low, high = (x, high) if value < 0 else (low, x)
+        newton = x - value / slope
+        following = newton if low < newton < high else 0.5 * (low + high)
+        if abs(following - x) <= 1e-15 * abs(x):
+            return following
+        x = following
+    return x
 
 
 @dataclass
@@ -155,6 +183,8 @@ class Sampled:
     rest: tuple[Any, Any, Any, Any] = (0.0, 0.0, 0.0, 0.0)
     section: tuple[Any, ...] | None = None
     """n1, n0, late1, late0, d1, d0."""
+    slow: tuple[Any, Any, Any] | None = None
+    """Of first order: (slow + late/z)/(w − end)."""
 
 
 def sampled_of(t: Transfer, tick: float, delay_s: Any) -> Sampled:
@@ -165,7 +195,7 @@ def sampled_of(t: Transfer, tick: float, delay_s: Any) -> Sampled:
     soon = (1.0 - late) * tick if s.is_late else np.float64(tick)
     rest = tick - soon
     if t.integrators:
-        constant = np.float64(t.n0) / t.d0
+        constant = np.float64(t.n0) / (t.d0 if t.slow is None else t.d0 * -t.slow)
         speed = (t.n1 - constant * t.d1) / t.d0 if s.is_double else constant
         place = constant if s.is_double else 0.0
         s.rest = (
@@ -176,6 +206,14 @@ def sampled_of(t: Transfer, tick: float, delay_s: Any) -> Sampled:
         )
     if t.d2 != 0:
         s.section = _section(t, tick, late, is_late=s.is_late)
+    if t.slow is not None:
+        p = t.slow
+        below = (t.d2 * p + t.d1) * p + t.d0
+        for _ in range(t.integrators + 1):
+            below = below * p
+        q, end = ((t.n2 * p + t.n1) * p + t.n0) / below, expm1(p * tick)
+        soon = expm1(p * tick * (1.0 - late)) if s.is_late else end
+        s.slow = q * soon, q * (end - soon), end
     return s
 
 
@@ -197,6 +235,8 @@ def _share(t: Transfer, p: Any, other: Any) -> Any:
     value = times((t.n2 * p[0] + t.n1, t.n2 * p[1]), p)
     value = value[0] + t.n0, value[1]
     below = t.d2 * (p[0] - other[0]), t.d2 * (p[1] - other[1])
+    if t.slow is not None:
+        below = times(below, (p[0] - t.slow, p[1]))
     for _ in range(t.integrators + 1):
         below = times(below, p)
     size = below[0] * below[0] + below[1] * below[1]
@@ -254,6 +294,13 @@ def evaluate(p: Places, s: Sampled) -> Curve:
         if s.is_late:
             late = times((late1 * p.w[0] + late0, late1 * p.w[1]), p.before)
             above = above[0] + late[0], above[1] + late[1]
+        size = below[0] * below[0] + below[1] * below[1]
+        re = re + (above[0] * below[0] + above[1] * below[1]) / size
+        im = im + (above[1] * below[0] - above[0] * below[1]) / size
+    if s.slow is not None:
+        slow, slow_late, end = s.slow
+        below = p.w[0] - end, p.w[1]
+        above = (slow + slow_late * p.before[0], slow_late * p.before[1]) if s.is_late else (slow, 0.0)
         size = below[0] * below[0] + below[1] * below[1]
         re = re + (above[0] * below[0] + above[1] * below[1]) / size
         im = im + (above[1] * below[0] - above[0] * below[1]) / size
@@ -360,10 +407,10 @@ class _Point:
 class _Problem:
     """One row's search."""
 
-    def __init__(self, model: FitModel, places: Places, row: _Row) -> None:
+    def __init__(self, model: FitModel, places: Places, row: _Row, last: int | None = None) -> None:
         self.model, self.places, self.row = model, places, row
         self.begin, self.low, self.high, self.scale, self.held = model.table
-        self.at: list[int] = np.flatnonzero(np.isnan(self.held)).tolist()
+        self.at: list[int] = sorted(np.flatnonzero(np.isnan(self.held)).tolist(), key=lambda at: at == last)
         self.is_log = self.low > 0
         self.lowest, self.highest = (np.array([self.coordinate(at, e[at]) for at in self.at]) for e in model.table[1:3])
 
@@ -594,7 +641,7 @@ def _reweighted(problem: _Problem, found: _Point, dof: float) -> tuple[_Point, A
 def _write_none(out: list[Any], dof: float, status: int) -> None:
     for part in (0, 1, 3, 4, 6, 7):
         out[part][0] = np.nan + 1j * np.nan if part == 6 else np.nan
-    out[2][0], out[5][0], out[8][0] = status, dof, False
+    out[2][0], out[5][0] = status, dof
 
 
 def _write(problem: _Problem, found: _Point, noise_dof: Any, dof: float, epsilon: Any, out: list[Any]) -> None:
@@ -621,4 +668,35 @@ def _write(problem: _Problem, found: _Point, noise_dof: Any, dof: float, epsilon
     out[4][0] = total(np.where(known, 2.0 * row.rest / row.noise, 0.0)) if known.any() else np.nan
     out[5][0] = dof
     out[6][0].real, out[6][0].imag = found.response
-    out[7][0], out[8][0] = found.values, row.reduced(_LACKING * _LACKING) > dof
+    out[7][0] = found.values
+    if status == FITTED and row.reduced(_LACKING * _LACKING) > dof and _explained(problem, found, dof):
+        out[2][0] = FRICTION
+        for part in (0, 1, 3):
+            out[part][0] = np.nan
+
+
+def _explained(problem: _Problem, found: _Point, dof: float) -> bool:
+    """Whether ε falls to less than half as soon as one viscous friction is fitted too."""
+    m, n, row = problem.model, len(problem.held), problem.row
+    if m.kind == TWO_MASS_GAIN:
+        return False
+    epsilon = row.epsilon(dof)
+    for at in (1,) if m.kind == RIGID else (n - 3, n - 2):
+        arm = m.arm if m.kind == TWO_MASS and at == n - 2 else 1.0
+        # A friction that stops the motor in as long as ten of the lowest line's radians take.
+        shown = found.values[0] * (2.0 * np.pi * problem.places.lowest_hz / 10.0) / arm
+        table, start = m.table.copy(), found.values.copy()
+        table[3, at], table[4, at], start[at] = shown, np.nan, shown
+        row.take_residuals((np.zeros(len(row.use)), np.zeros(len(row.use))))
+        row.size = row.rest
+        row.weigh(epsilon / 2.0)
+        # The friction is the last of the free parameters.
+        wider = _Problem(m._replace(table=table), problem.places, row, last=at)
+        try:
+            with_friction = wider.minimised(start, _FRICTION_ROUNDS)
+        except SingularError:
+            continue
+        row.take_residuals(with_friction.response)
+        if row.epsilon(dof - 1.0) < _EXPLAINED * epsilon:
+            return True
+    return False

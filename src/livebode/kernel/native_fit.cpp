@@ -72,8 +72,7 @@ void fit(nb::tuple model, nb::handle frequency_hz, double rate_hz, nb::tuple row
     const Array status(out[2], INTEGER, {count}, WRITE), of_model(out[3], REAL, {count}, WRITE);
     const Array chi2(out[4], REAL, {count}, WRITE), dof(out[5], REAL, {count}, WRITE);
     const Array response(out[6], COMPLEX, {count, lines}, WRITE), ended(out[7], REAL, {count, n}, WRITE);
-    const Array lacks(out[8], FLAG, {count}, WRITE);
-    const lb_fit_found found = {values, covariance, status, of_model, chi2, dof, response.data<double>(), ended, lacks};
+    const lb_fit_found found = {values, covariance, status, of_model, chi2, dof, response.data<double>(), ended};
     thread_local std::vector<double> work;
     work.resize(lb_fit_work(&grid));
     double *const numbers = work.data();

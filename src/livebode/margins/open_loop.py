@@ -80,7 +80,7 @@ class OpenLoop:
 
     @cached_property
     def native(self) -> tuple[FitModel, FeedbackSeries] | None:
-        """The plant without frictions, and F, as the kernel evaluates them; None where only NumPy can.
+        """The plant and F as the kernel evaluates them; None where only NumPy can.
 
         F is not smooth enough where it was measured, for example.
         """

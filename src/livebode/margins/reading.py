@@ -70,7 +70,7 @@ def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> M
     found = _nothing(fits)
     rows = np.flatnonzero(fits.ok)
     for alike, grid in loop.grids(fits.value[rows], band_hz) if rows.size else ():
-        if loop.native is not None and not _has_friction(loop, fits.value[rows[alike]]):
+        if loop.native is not None:
             _read_natively(found, rows[alike], fits, loop, grid)
             continue
         for part in _parts(rows[alike]):
@@ -78,11 +78,6 @@ def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> M
     place = np.where((found.frequency_hz >= low) & (found.frequency_hz <= high), INTERPOLATED, EXTRAPOLATED)
     found.place[:] = np.where(np.isnan(found.frequency_hz), NONE, place)
     return found
-
-
-def _has_friction(loop: OpenLoop, values: Floats) -> bool:
-    """Whether a viscous friction is not zero, which the kernel does not have."""
-    return any(values[:, loop.plant.names.index(name)].any() for name in loop.plant.frictions)
 
 
 def _read_natively(found: Margins, rows: NDArray[np.int64], fits: Parameters, loop: OpenLoop, grid: MarginGrid) -> None:
