@@ -201,7 +201,7 @@ class TwoMass(Chain):
         return (*super().derived_units, "")
 
     def derived(self, values: Floats) -> Floats:
-        js, load, *_ = self._at_the_shaft(*np.moveaxis(values[..., :-1], -1, 0))
+        js, load, *_ = self._at_the_shaft(*(values[..., i] for i in range(values.shape[-1] - 1)))
         return np.concatenate([super().derived(values), (load / js)[..., np.newaxis]], axis=-1)
 
     def _pairs(self) -> list[str]:

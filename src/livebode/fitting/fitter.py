@@ -31,6 +31,7 @@ from livebode.fitting.tasks import FitTask
 from livebode.fitting.weighing import epsilon_for, squares
 
 Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 _GROUP = 16  # rows that share a start and an ε, however they arrive
 _MEMORY = 64  # rows that ε is taken from
@@ -102,6 +103,7 @@ class Fitter(StatefulBase):
         self._next: Floats | None = None
         self._epsilon: float | None = None
         self._rows: list[tuple[Floats, Floats, Floats]] = []
+        self._unread: list[tuple[Measured, Complex, NDArray[np.int64]]] = []
         self._delay = DelayChoice()
 
     @property
@@ -134,10 +136,10 @@ class Fitter(StatefulBase):
         parts: list[Parameters] = []
         first = 0
         while not parts or first < len(responses):
-            task = self.task(responses[first:])
+            task = self.task(responses[first:] if first else responses)
             parts.append(self.take(task, task.fitted(), emit))
             first += len(task.responses)
-        return Parameters.join(parts)
+        return parts[0] if len(parts) == 1 else Parameters.join(parts)
 
     def task(self, responses: Responses) -> FitTask:
         """The fit of the first of these Responses, as many as the group still lacks; `take` accepts its result.
@@ -152,7 +154,8 @@ class Fitter(StatefulBase):
                 quantity=responses.quantity,
             )
         use = self._prepare(responses.lines)
-        part = responses[: _GROUP - self._seen % _GROUP]
+        lacking = _GROUP - self._seen % _GROUP
+        part = responses if len(responses) <= lacking else responses[:lacking]
         problem, rows = self._delay.problem, len(part)
         epsilon = None if self._epsilon is None else np.full(rows, self._epsilon)
         start = None if self._start is None else np.repeat(problem.with_held(self._start)[np.newaxis], rows, axis=0)
@@ -163,8 +166,8 @@ class Fitter(StatefulBase):
         found = self._delay.weigh(self._seen // _GROUP, task.measured, task.noise_dof, found)
         good = np.flatnonzero(found.status == OK)
         near = np.flatnonzero((found.status == OK) | (found.status == FRICTION))
-        parts = squares(task.measured, found.response)
-        self._rows += [(parts[0][i], parts[1][i], parts[2][i]) for i in good]
+        if good.size:
+            self._unread.append((task.measured, found.response, good))
         if near.size:
             self._next = found.ended[near[-1]]
         self._seen += len(task.responses)
@@ -212,6 +215,7 @@ class Fitter(StatefulBase):
         return self._delay.problem.grid
 
     def _state(self) -> dict[str, Any]:
+        self._read_rows()
         rows = {f"rows {i}": np.array(part) for i, part in enumerate(zip(*self._rows))}
         arrays = {"start": self._start, "next": self._next} | rows
         return {"seen": self._seen, "word": self._word, "epsilon": self._epsilon, "delay": self._delay} | arrays
@@ -220,6 +224,7 @@ class Fitter(StatefulBase):
         self._delay.restore(state["delay"])
         self._seen, self._word, self._epsilon = int(state["seen"]), str(state["word"]), state["epsilon"]
         self._start, self._next = state["start"], state["next"]
+        self._unread = []
         self._rows = list(zip(state["rows 0"], state["rows 1"], state["rows 2"])) if "rows 0" in state else []
 
     @property
@@ -257,7 +262,15 @@ class Fitter(StatefulBase):
             )
         return self._use
 
+    def _read_rows(self) -> None:
+        """Squares of the rows that ε is taken from: at once for a group, and not for each response."""
+        for measured, response, good in self._unread:
+            parts = squares(measured, response)
+            self._rows += [(parts[0][i], parts[1][i], parts[2][i]) for i in good]
+        self._unread = []
+
     def _finish_group(self, problem: Problem) -> None:
+        self._read_rows()
         self._rows = self._rows[-_MEMORY:]
         self._start = self._next
         if len(self._rows) >= _KNOWN:
@@ -283,9 +296,12 @@ class Fitter(StatefulBase):
 
 def measured_of(responses: Responses, use: NDArray[np.bool_]) -> tuple[Measured, Floats]:
     """The lines in use as rows to fit, and the degrees of freedom of their sigmas."""
-    value, sigma = responses.value[:, use], responses.sigma[:, use]
-    usable = responses.valid[:, use] & np.isfinite(value)
+    value, sigma, valid = responses.value, responses.sigma, responses.valid
+    if not use.all():
+        value, sigma, valid = value[:, use], sigma[:, use], valid[:, use]
+    usable = valid & np.isfinite(value)
     # If sigma is known at some lines only, the others would count as free of noise.
     known = np.isfinite(sigma) | ~usable
-    sigma = np.where(known.all(axis=1, keepdims=True), sigma, np.nan)
+    if not known.all():
+        sigma = np.where(known.all(axis=1, keepdims=True), sigma, np.nan)
     return Measured(value, sigma, usable), responses.dof

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import Lines, UsageError
-from livebode.fitting.transfer import Transfer
+from livebode.fitting.transfer import Transfer, roots
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -165,7 +165,7 @@ class PhysicalModel:
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 
-    @property
+    @cached_property
     def units(self) -> tuple[str, ...]:
         return tuple(p.unit for p in self.parameters)
 
@@ -194,15 +194,18 @@ class PhysicalModel:
 
     def derived(self, values: Floats) -> Floats:
         """From values (..., parameters): |p|/2π, −Re p/|p| and its half inverse for each pair, (..., derived_names)."""
-        transfer = self._transfer(values)
-        found = [_paired(roots) for roots in (transfer.poles(), transfer.zeros())]
+        transfer, rows = self._transfer(values), values.shape[:-1]
+        parts = [_paired(polynomial) for polynomial in (transfer.denominator, transfer.numerator)]
         # A polynomial without parameters in it has roots for one set of values only.
-        pairs = np.concatenate([np.broadcast_to(x, (*values.shape[:-1], *x.shape[-2:])) for x in found], axis=-2)
-        size = np.sqrt(np.abs(pairs[..., 0] * pairs[..., 1]))
+        product, total = (
+            np.concatenate([np.broadcast_to(x, (*rows, x.shape[-1])) for x in both], axis=-1) for both in zip(*parts)
+        )
+        quantities = np.empty((*product.shape, 3))
         with np.errstate(divide="ignore", invalid="ignore"):
-            damping = -(pairs[..., 0] + pairs[..., 1]).real / (2 * size)
-            quantities = np.stack([size / (2 * np.pi), damping, 1 / (2 * damping)], axis=-1)
-        return np.asarray(quantities.reshape(*values.shape[:-1], -1))
+            size = np.sqrt(np.abs(product))
+            damping = -total / (2 * size)
+            quantities[..., 0], quantities[..., 1], quantities[..., 2] = size / (2 * np.pi), damping, 1 / (2 * damping)
+        return quantities.reshape(*rows, -1)
 
     def _pairs(self) -> list[str]:
         transfer = self._transfer(np.array([p.start for p in self.parameters]))
@@ -237,7 +240,14 @@ def free_friction(name: str, unit: str) -> Parameter:
     return Parameter(name, unit, start=1e-3, low=0.0, high=1e12, held=0.0)
 
 
-def _paired(roots: Complex) -> Complex:
-    """Pairs of neighbours by size, shape (..., pairs, 2); the smallest real root, if left over, is not a mode."""
-    left = roots.shape[-1] % 2
-    return roots[..., left:].reshape(*roots.shape[:-1], -1, 2)
+def _paired(polynomial: Floats) -> tuple[Floats, Floats]:
+    """Product and sum of the roots of each pair of neighbours by size, shape (..., pairs).
+
+    The smallest real root, if left over, is not a mode.
+    """
+    if polynomial.shape[-1] == 3:
+        return polynomial[..., 2:] / polynomial[..., :1], -polynomial[..., 1:2] / polynomial[..., :1]
+    found = roots(polynomial)
+    left = found.shape[-1] % 2
+    one, other = found[..., left::2], found[..., left + 1 :: 2]
+    return np.abs(one * other), (one + other).real

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.core import RowArrays, UsageError, nearest_name
 from livebode.fitting.least_squares import Minimum, minimise
+from livebode.fitting.native import native_model
 from livebode.fitting.physical import EvaluationGrid, PhysicalModel
 
 Floats = NDArray[np.float64]
@@ -54,6 +55,11 @@ class Problem:
         Values at which parameters are fixed.
     free
         Names of parameters that are fitted although the model fixes them by default.
+
+    Attributes
+    ----------
+    native
+        The model as the kernel fits it; None where NumPy does.
     """
 
     def __init__(
@@ -102,6 +108,7 @@ class Problem:
         self._scale = np.array([1.0 if p.logarithmic else p.scale for p in chosen])
         self._unsized = np.array([p.unsized for p in chosen])
         self._ends = tuple(np.array([getattr(p, end) for p in chosen]) for end in ("low", "high"))
+        self.native = native_model(model, grid, self.held)
 
     def variant(
         self,

@@ -11,6 +11,7 @@ from livebode.core.parameters import OK
 from livebode.fitting.friction import held_by_friction
 from livebode.fitting.problem import Measured, Problem, Solution
 from livebode.fitting.weighing import chi_squared, lacks_more_than, own_epsilon, squares, weights
+from livebode.kernel import FitModel, FitRows, fit
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -35,6 +36,10 @@ SENTENCES = {
     "excitation, or free the model's viscous friction",
 }
 """The meaning of each status as text."""
+
+_WORDS = np.array(
+    [OK, NO_RESPONSE, NOT_CONVERGED, BOUND, NOT_SEEN, NO_FIT, FRICTION], dtype="<U20"
+)  # in the kernel's order
 
 EPSILON_MAX = 0.5
 _UNCERTAIN = 0.5  # of a logarithm
@@ -76,6 +81,8 @@ def fit_rows(
     `epsilon` (rows,) is fixed where it is given; else each row's own is found, such that its reduced chi² is 1.
     `noise_dof` (rows,) are the degrees of freedom behind the sigmas.
     """
+    if problem.native is not None:
+        return _fitted_natively(problem, problem.native, measured, noise_dof, start, epsilon)
     dof = 2.0 * np.count_nonzero(measured.use, axis=1) - problem.size
     if dof.size and (dof > 0).all():
         return _fitted_apart(problem, measured, noise_dof, start, epsilon, dof)
@@ -87,6 +94,24 @@ def fit_rows(
         for kept, other in zip(whole, found):
             kept[some] = other
     return whole
+
+
+def _fitted_natively(
+    problem: Problem,
+    native: FitModel,
+    measured: Measured,
+    noise_dof: Floats,
+    start: Floats | None,
+    epsilon: Floats | None,
+) -> FittedRows:
+    """All rows in C."""
+    grid = problem.grid
+    rows = FitRows(measured.value, measured.sigma, measured.use, noise_dof, start, epsilon)
+    found = fit(native, grid.frequency_hz, grid.rate_hz, rows)
+    status = _WORDS[found.status]
+    return FittedRows(
+        found.values, found.covariance, status, found.epsilon, found.chi2, found.dof, found.response, found.ended
+    )
 
 
 def _fitted_apart(

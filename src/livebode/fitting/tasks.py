@@ -37,11 +37,14 @@ class FitTask(NamedTuple):
 
 
 def fitted_together(tasks: Sequence[FitTask]) -> list[FittedRows]:
-    """The rows of each task; tasks of one kind are one computation."""
+    """The rows of each task; in NumPy, tasks of one kind are one computation."""
     kinds: dict[tuple[object, ...], list[int]] = {}
-    for i, task in enumerate(tasks):
-        kinds.setdefault(task.kind, []).append(i)
     found: dict[int, FittedRows] = {}
+    for i, task in enumerate(tasks):
+        if task.problem.native is not None:  # to join the arrays would cost more than it saves
+            found[i] = task.fitted()
+        else:
+            kinds.setdefault(task.kind, []).append(i)
     for members in kinds.values():
         found.update(zip(members, _fitted_alike([tasks[i] for i in members])))
     return [found[i] for i in range(len(tasks))]

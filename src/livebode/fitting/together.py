@@ -15,8 +15,8 @@ def fit_together(
 ) -> list[Parameters]:
     """Parameters of each batch, to rounding as `process` of its fitter gives them; a fitter may be there once.
 
-    Fitters with the same model, lines and free parameters share the computation of their rows: a call for one row costs
-    nearly what it costs for sixteen (`python -m bench.fits`).
+    Fitters with the same model, lines and free parameters share the computation of their rows where NumPy fits them: a
+    call for one row costs nearly what it costs for sixteen (`python -m bench.fits`).
 
     Parameters
     ----------
@@ -65,7 +65,8 @@ def fit_each(
                 errors[i] = error
             done[i] += len(tasks[i].responses)
         waiting = [i for i in waiting if i not in errors and done[i] < len(batches[i])]
-    return {i: Parameters.join(parts[i]) for i in range(len(fitters)) if i not in errors}, errors
+    whole = {i: own[0] if len(own) == 1 else Parameters.join(own) for i, own in enumerate(parts) if i not in errors}
+    return whole, errors
 
 
 def _fitted(tasks: dict[int, FitTask], errors: dict[int, Exception]) -> dict[int, FittedRows]:

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.fitting.problem import Measured
+from livebode.kernel import fit_epsilon
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_STEPS, _CLOSE = 30, 1e-6
 _MANY = 1e9  # degrees of freedom of a sigma that is known
 
 
@@ -29,24 +29,7 @@ def epsilon_for(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Float
 
     Zero where noise alone explains the residuals: Σ 2·rest/noise ≤ dof.
     """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        used = rest > 0
-        # No line has more than all together, which bounds ε² from below; from there the left side is convex and falls,
-        # so that Newton's steps climb to the root and never pass it.
-        least = (2 * rest / dof[:, np.newaxis] - noise) / size
-        square = np.max(np.where(used & np.isfinite(least), least, 0.0), axis=-1, initial=0.0)
-        noisy = _reduced(rest, noise, size, np.zeros(len(rest))) <= dof
-        moving = ~noisy  # each row by itself, so that its result does not depend on the other rows
-        for _ in range(_STEPS):
-            share = np.where(used, 1 / (noise + square[:, np.newaxis] * size), 0.0)
-            total = 2 * np.einsum("rl,rl->r", rest, share)
-            slope = 2 * np.einsum("rl,rl,rl,rl->r", rest, size, share, share)
-            step = np.where(moving & (slope > 0), (total - dof) / slope, 0.0)
-            square = square + np.maximum(step, 0.0)
-            moving &= step > _CLOSE * square
-            if not moving.any():
-                break
-    return np.where(noisy | ~(dof > 0) | ~np.isfinite(square), 0.0, np.sqrt(square))
+    return fit_epsilon(np.ascontiguousarray(rest), np.ascontiguousarray(noise), np.ascontiguousarray(size), dof)
 
 
 def squares(measured: Measured, response: Complex) -> tuple[Floats, Floats, Floats]:

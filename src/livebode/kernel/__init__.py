@@ -1,8 +1,20 @@
-"""The sliding DFT and the line stage in C, and their NumPy twins, the readable definitions.
+"""The sliding DFT, the line stage and the fit in C, and their NumPy twins, the readable definitions.
 
-The twins are `livebode.kernel.twin` and `livebode.kernel.line_twin`.
+The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin` and `livebode.kernel.fit_twin`.
 """
 
+from livebode.kernel._fit import (
+    FeedbackSeries,
+    FitFound,
+    FitModel,
+    FitRows,
+    MarginGrid,
+    MarginRows,
+    fit,
+    fit_epsilon,
+    fit_margins,
+    fit_response,
+)
 from livebode.kernel._hopping import HoppingDFT, fft_is_cheaper
 from livebode.kernel._instructions import VARIABLE as INSTRUCTION_SET_VARIABLE
 from livebode.kernel._instructions import instruction_set, instruction_sets
@@ -29,15 +41,25 @@ __all__ = [
     "NOISE_MOVING",
     "NOISE_SCATTER",
     "SCATTER",
+    "FeedbackSeries",
+    "FitFound",
+    "FitModel",
+    "FitRows",
     "HoppingDFT",
     "LineMoments",
     "LineRows",
     "LineSettings",
     "LineWindows",
+    "MarginGrid",
+    "MarginRows",
     "SlidingDFT",
     "WeightSums",
     "add_windows",
     "fft_is_cheaper",
+    "fit",
+    "fit_epsilon",
+    "fit_margins",
+    "fit_response",
     "instruction_set",
     "instruction_sets",
     "process_lines",

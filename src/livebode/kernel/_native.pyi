@@ -20,6 +20,40 @@ def add_windows(
 def process_lines(
     settings: tuple[Any, ...], moments: tuple[Any, ...], windows: tuple[Any, ...], out: tuple[Any, ...], /
 ) -> float: ...
+def fit(
+    model: tuple[Any, ...],
+    frequency_hz: npt.NDArray[np.float64],
+    rate_hz: float,
+    rows: tuple[Any, ...],
+    out: tuple[Any, ...],
+    /,
+) -> None: ...
+def fit_epsilon(
+    rest: npt.NDArray[np.float64],
+    noise: npt.NDArray[np.float64],
+    size: npt.NDArray[np.float64],
+    dof: npt.NDArray[np.float64],
+    out: npt.NDArray[np.float64],
+    /,
+) -> None: ...
+def fit_response(
+    model: tuple[Any, ...],
+    rate_hz: float,
+    values: npt.NDArray[np.float64],
+    frequency_hz: npt.NDArray[np.float64],
+    is_shared: bool,
+    out: npt.NDArray[np.complex128],
+    /,
+) -> None: ...
+def fit_margins(
+    model: tuple[Any, ...],
+    feedback: tuple[Any, ...],
+    grid: tuple[Any, ...],
+    values: npt.NDArray[np.float64],
+    covariance: npt.NDArray[np.float64],
+    out: tuple[Any, ...],
+    /,
+) -> None: ...
 
 class Engine:
     def __init__(

@@ -108,18 +108,20 @@ class Margins(RowArrays):
 
     def parameters(self) -> tuple[Parameters, ...]:
         """For a table in long form: each margin and where it was read, with its place as status."""
-        empty = np.full(len(self), np.nan)
+        empty, ok = np.full(len(self), np.nan), self.ok
+        value = np.stack([self.value, self.frequency_hz], axis=2)
+        spread = np.stack([self.sigma, self.frequency_sigma_hz], axis=2)
+        covariance = (spread**2)[..., np.newaxis] * np.eye(2)
         found = []
         for i, (name, unit) in enumerate(zip(NAMES, UNITS)):
-            spread = np.stack([self.sigma[:, i], self.frequency_sigma_hz[:, i]], axis=1)
             found.append(
                 Parameters(
                     model="margins",
                     names=(name, f"{name}_frequency"),
                     units=(unit, "Hz"),
-                    value=np.stack([self.value[:, i], self.frequency_hz[:, i]], axis=1),
-                    covariance=np.einsum("rn,nm->rnm", spread**2, np.eye(2)),
-                    status=np.where(self.ok, self.place[:, i], self.status),
+                    value=value[:, i],
+                    covariance=covariance[:, i],
+                    status=np.where(ok, self.place[:, i], self.status),
                     epsilon=empty,
                     chi2=empty,
                     dof=empty,

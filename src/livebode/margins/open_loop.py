@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import FitError, Loop, Model
 from livebode.fitting import EvaluationGrid, PhysicalModel
+from livebode.fitting.native import described
 from livebode.fitting.physical import Hold
+from livebode.kernel import FeedbackSeries, FitModel, MarginGrid
+from livebode.margins.feedback import series_of
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -21,6 +25,7 @@ _POINTS_IN_A_PEAK = 3.0  # in half the width of a resonance
 _POINTS_MAX = 4000
 _FREQUENCY_STEP, _DAMPING_STEP = 1.25, 2.0  # factors, to which resonances are rounded
 _STEPS_MAX, _NO_PEAK = 1000, 1 << 20
+_KNOWN_MAX = 32
 
 
 @dataclass(frozen=True)
@@ -64,10 +69,31 @@ class OpenLoop:
     def at(self, values: Floats, frequency_hz: Floats) -> Complex:
         """L for values (rows, parameters) at frequencies (lines,) or (rows, lines): shape (rows, lines)."""
         plant = self.plant.at(values, EvaluationGrid(frequency_hz, self.rate_hz, self.hold))
+        return np.asarray(plant * self._behind(frequency_hz))
+
+    def _behind(self, frequency_hz: Floats) -> Complex:
+        """F with the filters."""
         behind = self.loop.feedback_at(frequency_hz)
         for part in self.filters:
             behind = behind * part.response(frequency_hz)
-        return np.asarray(plant * behind)
+        return np.asarray(behind)
+
+    @cached_property
+    def native(self) -> tuple[FitModel, FeedbackSeries] | None:
+        """The plant and F as the kernel evaluates them; None where only NumPy can.
+
+        F is not smooth enough where it was measured, for example.
+        """
+        model = described(self.plant, {}) if self.hold == "zero-order" else None
+        if model is None:
+            return None
+        series = series_of(self._behind, 0.99 * _LOWEST * self.rate_hz, 1.01 * self.rate_hz / 2)
+        return None if series is None else (model, series)
+
+    @cached_property
+    def _known(self) -> dict[object, MarginGrid]:
+        """Grids that similar fits share."""
+        return {}
 
     def behind(self, extra: Model) -> OpenLoop:
         """The same with one more filter in series."""
@@ -78,19 +104,31 @@ class OpenLoop:
         poles = self.plant.continuous(values).poles()
         return np.asarray(np.count_nonzero(poles.real > 0, axis=-1))
 
-    def grids(self, values: Floats, band_hz: tuple[float, float]) -> Iterator[tuple[NDArray[np.int64], Floats]]:
-        """Rows with the same grid, and its frequencies up to half the rate, dense enough for every crossing and peak.
+    def grids(self, values: Floats, band_hz: tuple[float, float]) -> Iterator[tuple[NDArray[np.int64], MarginGrid]]:
+        """Rows with the same grid, which goes up to half the rate, dense enough for every crossing and peak.
 
         Logarithmic; denser in and around the band, and around a resonance of the model as dense as its damping
         requires. Resonances and dampings are rounded to steps, so that similar rows share a grid, which is the one that
         each of them has alone: its results do not depend on the other rows.
         """
         peaks = self._peaks(values)
+        if len(peaks) == 1:
+            yield np.zeros(1, dtype=np.int64), self._grid(peaks[0], band_hz)
+            return
         kinds, kind = np.unique(peaks, axis=0, return_inverse=True)
-        for number, steps in enumerate(kinds.reshape(len(kinds), -1, 2)):
+        for number, steps in enumerate(kinds):
             yield np.flatnonzero(kind.ravel() == number), self._grid(steps, band_hz)
 
-    def _grid(self, peaks: NDArray[np.int64], band_hz: tuple[float, float]) -> Floats:
+    def _grid(self, peaks: NDArray[np.int64], band_hz: tuple[float, float]) -> MarginGrid:
+        key = peaks.tobytes(), band_hz
+        if key not in self._known:
+            if len(self._known) >= _KNOWN_MAX:
+                self._known.clear()
+            frequency_hz = self._spaced(peaks.reshape(-1, 2), band_hz)
+            self._known[key] = MarginGrid(frequency_hz, self._behind(frequency_hz), self.rate_hz)
+        return self._known[key]
+
+    def _spaced(self, peaks: NDArray[np.int64], band_hz: tuple[float, float]) -> Floats:
         nyquist = self.rate_hz / 2
         low, high = band_hz[0] / 10, nyquist
         parts = [_spaced(_LOWEST * self.rate_hz, low, _PER_DECADE_OUTSIDE), _spaced(low, high, _PER_DECADE)]

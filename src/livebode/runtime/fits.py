@@ -34,6 +34,7 @@ class Fits:
         self._newest: Parameters | None = None
         self._newest_response: Responses | None = None
         self._epsilons: list[float] = []
+        self._open_loop: OpenLoop | None = None
 
     @classmethod
     def of(cls, section: FitSection, loop: Loop, kinds: PlantKinds) -> Fits:
@@ -50,8 +51,8 @@ class Fits:
 
     def take(self, found: Parameters, responses: Responses) -> None:
         """Count the fits of these responses, and remember the newest."""
-        for word, count in zip(*np.unique(found.status, return_counts=True)):
-            self._counts[str(word)] = self._counts.get(str(word), 0) + int(count)
+        for word in found.status.tolist():
+            self._counts[word] = self._counts.get(word, 0) + 1
         good = np.flatnonzero(found.ok)
         if good.size:
             epsilon = found.epsilon[good]
@@ -64,8 +65,17 @@ class Fits:
     def around(self, found: Parameters, responses: Responses) -> tuple[Parameters, ...]:
         """Quantities derived from the fits of these responses, and the margins."""
         fitter = self.fitter(responses.unit)
-        margins = () if self.loop is None else _margins(found, responses, fitter, self.loop)
+        margins = () if self.loop is None else self._margins(found, responses, fitter, self.loop)
         return fitter.derived(found), *margins
+
+    def _margins(self, fits: Parameters, responses: Responses, fitter: Fitter, loop: Loop) -> tuple[Parameters, ...]:
+        """Rows for parameters.parquet: each margin at each fit that the lines of its response do not contradict."""
+        grid = fitter.grid
+        around = self._open_loop
+        if around is None or around.plant is not fitter.model:
+            around = self._open_loop = OpenLoop(fitter.model, loop, grid.rate_hz, grid.hold)
+        band_hz = float(grid.frequency_hz[0]), float(grid.frequency_hz[-1])
+        return against_lines(margins(fits, around, band_hz), responses, loop).parameters()
 
     def snapshot(self) -> bytes:
         """State that the next fit depends on, as bytes; see `restore`."""
@@ -117,11 +127,3 @@ class Fits:
             "statuses": self._counts,
             "newest": None if newest is None else plain_fit(newest),
         }
-
-
-def _margins(fits: Parameters, responses: Responses, fitter: Fitter, loop: Loop) -> tuple[Parameters, ...]:
-    """Rows for parameters.parquet: each margin at each fit that the lines of its response do not contradict."""
-    grid = fitter.grid
-    band_hz = float(grid.frequency_hz[0]), float(grid.frequency_hz[-1])
-    found = margins(fits, OpenLoop(fitter.model, loop, grid.rate_hz, grid.hold), band_hz)
-    return against_lines(found, responses, loop).parameters()

@@ -19,8 +19,8 @@ def process_together(fits: Sequence[Fits], batches: Sequence[Responses]) -> list
 
     Of an axis whose fit raises, the error instead; it disturbs no other axis.
 
-    A process with many axes should collect their responses, since a call for one row costs nearly what it costs for
-    sixteen (`python -m bench.fits`).
+    A process with many axes should collect their responses: derived quantities and margins of one row cost nearly what
+    they cost for sixteen (`python -m bench.fits`).
     """
     fitters = [one.fitter(batch.unit) for one, batch in zip(fits, batches)]
     events: list[list[Event]] = [[] for _ in fits]
@@ -45,6 +45,9 @@ def process_together(fits: Sequence[Fits], batches: Sequence[Responses]) -> list
 
 def _around(members: Sequence[tuple[Fits, Parameters, Responses]]) -> list[tuple[Parameters, ...]]:
     """`Fits.around` of axes that are alike, as one computation."""
+    if len(members) == 1:
+        ((one, parameters, batch),) = members
+        return [one.around(parameters, batch)]
     fits, found, batches = zip(*members)
     ends = np.cumsum([0, *map(len, found)]).tolist()
     every = fits[0].around(Parameters.join(found), Responses.join(batches))

@@ -1,0 +1,175 @@
+"""Drive models fitted to rows of responses, in C; `livebode.kernel.fit_twin` defines it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from livebode.kernel import _native
+
+Floats = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Flags = npt.NDArray[np.bool_]
+Integers = npt.NDArray[np.int64]
+
+RIGID, TWO_MASS, TWO_MASS_GAIN = range(3)
+FITTED, NO_RESPONSE, NOT_CONVERGED, AT_BOUND, NOT_SEEN, NO_MODEL, FRICTION = range(7)
+"""Status of a row: fitted; too few lines; no minimum; a parameter at its bound; one uncertain by more than half; an
+error of the model above half of |G|; one above 3 %, of which a viscous friction explains more than half."""
+
+
+class FitModel(NamedTuple):
+    """A model behind a zero-order hold, whose frictions are fixed.
+
+    Attributes
+    ----------
+    kind
+        RIGID, TWO_MASS or TWO_MASS_GAIN.
+    integrators
+        1 for a velocity, 2 for a position.
+    at_load
+        Whether the output is that of the last mass.
+    lever
+        Of the output, m/rad or 1.
+    arm
+        r² from load to shaft, or 1.
+    ratio
+        Load's inertia over the motor's; 0 if not known, so that the load is a parameter.
+    table
+        Start, low, high, scale and fixed value (NaN: free) of each parameter, shape (5, parameters).
+    """
+
+    kind: int
+    integrators: int
+    at_load: bool
+    lever: float
+    arm: float
+    ratio: float
+    table: Floats
+
+
+class FitRows(NamedTuple):
+    """Measured rows.
+
+    Attributes
+    ----------
+    value, sigma, use
+        Shape (rows, lines); E|e|² = sigma², NaN where it is not known; lines that are used.
+    noise_dof
+        Degrees of freedom of the sigmas, shape (rows,).
+    start
+        Where the search begins, shape (rows, parameters); None: at a scan.
+    epsilon
+        Error of the model as a share of |G|, shape (rows,); None: that of each row's own residuals.
+    """
+
+    value: Complex
+    sigma: Floats
+    use: Flags
+    noise_dof: Floats
+    start: Floats | None
+    epsilon: Floats | None
+
+
+class FitFound(NamedTuple):
+    """Results; values, covariance and epsilon are NaN where the status is not FITTED.
+
+    Attributes
+    ----------
+    values, covariance
+        Shape (rows, parameters) and (rows, parameters, parameters).
+    status
+        Shape (rows,).
+    epsilon, chi2, dof
+        Shape (rows,); chi2 by sigma alone.
+    response
+        Of the model, shape (rows, lines), also where the fit failed.
+    ended
+        Where the search ended, shape (rows, parameters).
+    """
+
+    values: Floats
+    covariance: Floats
+    status: Integers
+    epsilon: Floats
+    chi2: Floats
+    dof: Floats
+    response: Complex
+    ended: Floats
+
+    @classmethod
+    def empty(cls, rows: int, lines: int, parameters: int) -> FitFound:
+        return cls(
+            np.empty((rows, parameters)),
+            np.empty((rows, parameters, parameters)),
+            np.empty(rows, np.int64),
+            np.empty(rows),
+            np.empty(rows),
+            np.empty(rows),
+            np.empty((rows, lines), np.complex128),
+            np.empty((rows, parameters)),
+        )
+
+
+def fit(model: FitModel, frequency_hz: Floats, rate_hz: float, rows: FitRows) -> FitFound:
+    """Weighted least squares of each row by itself (docs/explanation/fits.md); frequencies of shape (lines,)."""
+    count, lines = rows.value.shape
+    found = FitFound.empty(count, lines, model.table.shape[1])
+    arrays = tuple(None if x is None else np.ascontiguousarray(x) for x in rows)
+    _native.fit(model, frequency_hz, rate_hz, arrays, found)
+    return found
+
+
+def fit_epsilon(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Floats:
+    """ε ≥ 0 with Σ 2·rest/(noise + ε²·size) = dof, (rows,); all are squares, (rows, lines), zero where not used.
+
+    Zero where noise alone explains the residuals: Σ 2·rest/noise ≤ dof.
+    """
+    found = np.empty(len(rest))
+    _native.fit_epsilon(rest, noise, size, dof, found)
+    return found
+
+
+def fit_response(model: FitModel, rate_hz: float, values: Floats, frequency_hz: Floats) -> Complex:
+    """Response (rows, lines) for values (rows, parameters) at frequencies (lines,) or (rows, lines)."""
+    found = np.empty((len(values), frequency_hz.shape[-1]), np.complex128)
+    _native.fit_response(model, rate_hz, values, frequency_hz, frequency_hz.ndim == 1, found)
+    return found
+
+
+class FeedbackSeries(NamedTuple):
+    """F over ln f: pieces of equal `width` from `begin` on, each a series of Chebyshev polynomials, (pieces, 16)."""
+
+    begin: float
+    width: float
+    coefficients: Complex
+
+
+class MarginGrid(NamedTuple):
+    """Frequencies at which a loop is searched, ascending to half the rate, and F there, shape (points,)."""
+
+    frequency_hz: Floats
+    feedback: Complex
+    rate_hz: float
+
+
+class MarginRows(NamedTuple):
+    """Margins in the order of `livebode.margins.NAMES`, shape (rows, 6), and stable rows (rows,); NaN in the others."""
+
+    value: Floats
+    sigma: Floats
+    frequency_hz: Floats
+    frequency_sigma_hz: Floats
+    stable: Flags
+
+
+def fit_margins(
+    model: FitModel, feedback: FeedbackSeries, grid: MarginGrid, values: Floats, covariance: Floats
+) -> MarginRows:
+    """Margins of L = F·G for values (rows, parameters) and their covariance (rows, parameters, parameters)."""
+    value, sigma, at_hz, at_sigma_hz = (np.empty((len(values), 6)) for _ in range(4))
+    found = MarginRows(value, sigma, at_hz, at_sigma_hz, np.empty(len(values), np.bool_))
+    _native.fit_margins(model, feedback, grid, np.ascontiguousarray(values), np.ascontiguousarray(covariance), found)
+    return found
