@@ -142,7 +142,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         if self._repeating is not None:
             at = positions(self._aside, block.start, block.stop)
             judged = replace(rows, left_out=np.union1d(rows.left_out, at)) if at.size else rows
-            repeating = self._repeating.process(channels, judged, schedule, block)
+            repeating = self._repeating.process(channels, judged, schedule if s.schedule else None, block)
         place = (rows.sample + 1) % s.lines.window
         ripple = None
         if self._speed is not None:

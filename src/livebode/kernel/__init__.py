@@ -1,6 +1,6 @@
-"""The sliding DFT and the line stage in C, and their NumPy twins, the readable definitions.
+"""The sliding DFT, the line stage and the verdicts on lines in C, and their NumPy twins, the readable definitions.
 
-The twins are `livebode.kernel.twin` and `livebode.kernel.line_twin`.
+The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin` and `livebode.estimation.repeating_twin`.
 """
 
 from livebode.kernel._instructions import VARIABLE as INSTRUCTION_SET_VARIABLE
@@ -19,23 +19,53 @@ from livebode.kernel._lines import (
     add_windows,
     process_lines,
 )
+from livebode.kernel._repeating import (
+    ADDED,
+    FORGOTTEN,
+    JUDGED,
+    NEWS,
+    NEWS_GONE,
+    NEWS_INVALID,
+    REASONS,
+    PeriodSpectra,
+    PeriodState,
+    PeriodVerdicts,
+    RepeatingPlan,
+    RepeatingSettings,
+    Tones,
+    judge_periods,
+)
 from livebode.kernel._sliding import SlidingDFT
 
 __all__ = [
+    "ADDED",
+    "FORGOTTEN",
     "INSTRUCTION_SET_VARIABLE",
+    "JUDGED",
     "MEANS",
+    "NEWS",
+    "NEWS_GONE",
+    "NEWS_INVALID",
     "NOISE_LARGER",
     "NOISE_MOVING",
     "NOISE_SCATTER",
+    "REASONS",
     "SCATTER",
     "LineMoments",
     "LineRows",
     "LineSettings",
     "LineWindows",
+    "PeriodSpectra",
+    "PeriodState",
+    "PeriodVerdicts",
+    "RepeatingPlan",
+    "RepeatingSettings",
     "SlidingDFT",
+    "Tones",
     "WeightSums",
     "add_windows",
     "instruction_set",
     "instruction_sets",
+    "judge_periods",
     "process_lines",
 ]

@@ -20,6 +20,12 @@ def add_windows(
 def process_lines(
     settings: tuple[Any, ...], moments: tuple[Any, ...], windows: tuple[Any, ...], out: tuple[Any, ...], /
 ) -> float: ...
+def judge_periods(
+    plan: RepeatingPlan, state: tuple[Any, ...], periods: tuple[Any, ...], out: tuple[Any, ...], /
+) -> tuple[float, float]: ...
+
+class RepeatingPlan:
+    def __init__(self, settings: tuple[Any, ...], /) -> None: ...
 
 class Engine:
     def __init__(
