@@ -104,7 +104,7 @@ static void take_excess(const lb_verdict_facts *f, double *found)
     }
     for (size_t i = 0; i < f->plan->lines; ++i) {
         const double as_input = at_line(f, s->beside, i) * lb_power(s->ratio + 2u * i);
-        found[i] = lb_maximum(lb_fmax(found[i], as_input), 0.0);
+        found[i] = lb_maximum(lb_fmax(found[i], as_input), 0.0) + 0.0; /* which zero a maximum is, is not specified */
     }
 }
 

@@ -104,7 +104,7 @@ class Distortion:
             mean = np.where(excited, np.nan, mean)
         as_output = self.groups.at(mean - noise)
         as_input = self.groups.at((mean - noise) / power(model)) * power(ratio)
-        found = np.maximum(np.fmax(as_output, as_input), 0.0)
+        found = np.maximum(np.fmax(as_output, as_input), 0.0) + 0.0  # which zero a maximum is, is not specified
         strength = power(numerator[:, lines])
         stronger = np.maximum(strength / _mean(strength), 1.0)
         coherent = (_COHERENT**2 * stronger - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
