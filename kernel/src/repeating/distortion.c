@@ -124,7 +124,7 @@ static lb_repeats over_noise(const lb_verdict_facts *f)
         }
         const double smooth = sum / known;
         if (is_known(s, i)) {
-            s->beside[found.known++] = smooth > 0.0 ? s->mean[i] / smooth : (double)INFINITY;
+            s->beside[found.known++] = smooth > 0.0 ? s->mean[i] / smooth : lb_infinite();
         }
     }
     found.over_noise = found.known ? mean_of(s->beside, found.known) : 0.0;

@@ -43,7 +43,7 @@ void lb_times(const double *a, const double *b, double *out)
 
 void lb_divide(const double *a, const double *b, double *out)
 {
-    const double re = fabs(b[0]), im = fabs(b[1]);
+    const double re = lb_absolute(b[0]), im = lb_absolute(b[1]);
     if (re == 0.0 && im == 0.0) {
         out[0] = a[0] / re;
         out[1] = a[1] / re;

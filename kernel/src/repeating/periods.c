@@ -246,8 +246,8 @@ static void judge_distortion(const job *j, const lb_verdict_facts *f, double *di
     const uint8_t *before = against - LB_VERDICT_KINDS * lines;
     const lb_repeats repeats = lb_distortion_variance(f, distortion);
     for (size_t i = 0; i < lines; ++i) {
-        distortion[i] = sqrt(distortion[i]) / sqrt(lb_power(f->pair + 2u * (lines + i)));
-        against[i] = distortion[i] > distorted * sqrt(lb_power(j->scratch.ratio + 2u * i));
+        distortion[i] = lb_root(distortion[i]) / lb_root(lb_power(f->pair + 2u * (lines + i)));
+        against[i] = distortion[i] > distorted * lb_root(lb_power(j->scratch.ratio + 2u * i));
         any |= against[i];
     }
     if (any && !is_significant(j, f, &repeats)) {
@@ -261,7 +261,7 @@ static void judge_distortion(const job *j, const lb_verdict_facts *f, double *di
 static void judge_steps(const job *j, const lb_verdict_facts *f, double *steps, uint8_t *against)
 {
     for (size_t i = 0; i < j->plan->lines; ++i) {
-        const double amplitude = 2.0 * sqrt(lb_power(f->pair + 2u * i)) / (double)j->plan->window;
+        const double amplitude = 2.0 * lb_root(lb_power(f->pair + 2u * i)) / (double)j->plan->window;
         const double noise = j->state->moments.scatter[i] / f->unbiased;
         steps[i] = amplitude / lb_step_at(f, i);
         against[i] = steps[i] < steps_least && noise < lb_variance_of_steps(f, i);
@@ -380,6 +380,15 @@ static int is_missing(const lb_repeating_plan *plan, const lb_repeating_state *s
     return !(plan->bin && plan->difference && state && before && after && (of_periods || !in->count));
 }
 
+static int has_too_many_neighbours(const lb_mains *mains)
+{
+    int found = mains->excited.beside > LB_NEIGHBOURS_MAX;
+    for (size_t i = 0; i < LB_MAINS; ++i) {
+        found |= mains->free[i].beside > LB_NEIGHBOURS_MAX;
+    }
+    return found;
+}
+
 lb_status lb_repeating_process(const lb_repeating_plan *plan, lb_repeating_state *state, const lb_periods *periods,
                                const lb_verdicts *out)
 {
@@ -387,6 +396,9 @@ lb_status lb_repeating_process(const lb_repeating_plan *plan, lb_repeating_state
         return LB_ERROR_NULL;
     }
     if (!plan->lines || !plan->judged_every || state->moments.places != 1u || state->moments.lines != bins_of(plan)) {
+        return LB_ERROR_SIZE;
+    }
+    if (has_too_many_neighbours(&plan->mains)) {
         return LB_ERROR_SIZE;
     }
     const job j = {plan, state, periods, out, scratch_of(plan, periods->scratch)};

@@ -2,8 +2,6 @@
 #ifndef LB_REPEATING_H
 #define LB_REPEATING_H
 
-#include <math.h>
-
 #include "../lines/moments.h"
 #include "livebode/repeating.h"
 
@@ -36,13 +34,33 @@ typedef struct {
     size_t known;      /* detection lines */
 } lb_repeats;
 
-static inline double lb_not_a_number(void)
+#ifndef __GNUC__
+#include <math.h>
+#endif
+
+static inline double lb_of_bits(uint64_t bits)
 {
     const union {
         uint64_t bits;
         double value;
-    } found = {0x7ff8000000000000u};
+    } found = {bits};
     return found.value;
+}
+
+static inline double lb_not_a_number(void) { return lb_of_bits(0x7ff8000000000000u); }
+static inline double lb_infinite(void) { return lb_of_bits(0x7ff0000000000000u); }
+
+/* |x|, of zeros the positive one. */
+static inline double lb_absolute(double x) { return x > 0.0 ? x : 0.0 - x; }
+
+/* Exactly rounded; one instruction, without libm. */
+static inline double lb_root(double x)
+{
+#ifdef __GNUC__
+    return __builtin_sqrt(x);
+#else
+    return sqrt(x);
+#endif
 }
 
 /* |x|², as pairs of re and im. */
