@@ -137,7 +137,9 @@ def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factor
     hashes = {}
     for name, (compiler, _, objects) in builds.items():
         (tmp_path / f"run {name}").mkdir()
-        hashes[name] = tuple(program(tmp_path / f"run {name}", compiler, objects, part) for part in ("bits", "lines", "repeating"))
+        hashes[name] = tuple(
+            program(tmp_path / f"run {name}", compiler, objects, part) for part in ("bits", "lines", "repeating")
+        )
     assert len(set(hashes.values())) == 1, hashes
 
 

@@ -16,7 +16,6 @@ from livebode.kernel._lines import (
     LineSettings,
     LineWindows,
     WeightSums,
-    add_windows,
     process_lines,
 )
 from livebode.kernel._repeating import (
@@ -63,7 +62,6 @@ __all__ = [
     "SlidingDFT",
     "Tones",
     "WeightSums",
-    "add_windows",
     "instruction_set",
     "instruction_sets",
     "judge_periods",

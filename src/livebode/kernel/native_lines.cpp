@@ -28,21 +28,6 @@ struct Moments {
     }
 };
 
-void add(nb::tuple moments, double forgetting, nb::handle table, size_t place, nb::handle spectra, nb::handle powers,
-         nb::handle usable, nb::tuple out)
-{
-    const Moments m(moments, forgetting, table);
-    const size_t rows = length_of(spectra, 1);
-    const Array three(spectra, COMPLEX, {3, rows, m.lines}), four(powers, REAL, {4, rows, m.lines});
-    const Array used(usable, FLAG, {rows}), after(out[0], INTEGER, {rows}, WRITE);
-    const Array means(out[1], REAL, {LB_LINE_MEANS, rows, m.lines}, WRITE);
-    const Array scatter(out[2], REAL, {LB_LINE_SCATTER, rows, m.lines}, WRITE);
-    call(rows * m.lines, [&] {
-        return lb_lines_add(&m.weights, &m.moments, place, rows, three.data<double>(), four, used, after, means,
-                            scatter);
-    });
-}
-
 double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tuple out)
 {
     const Moments m(moments, nb::cast<double>(settings[0]), settings[1]);
@@ -93,8 +78,4 @@ double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tup
 
 } // namespace
 
-void bind_lines(nb::module_ &m)
-{
-    m.def("add_windows", &add);
-    m.def("process_lines", &process);
-}
+void bind_lines(nb::module_ &m) { m.def("process_lines", &process); }
