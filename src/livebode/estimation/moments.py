@@ -44,11 +44,6 @@ class Moments:
         return pair
 
     @property
-    def reference(self) -> Complex:
-        """Mean of the reference, shape (rows, lines)."""
-        return np.asarray(self.means[4] + 1j * self.means[5])
-
-    @property
     def repeatability(self) -> Floats:
         """|S_r|²/S_rr: the share of the reference's power that its mean has, shape (rows, lines)."""
         return np.asarray((self.means[4] ** 2 + self.means[5] ** 2) / self.means[6])
