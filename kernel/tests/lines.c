@@ -210,13 +210,7 @@ static uint64_t run(size_t lines, size_t places, unsigned options, uint64_t hash
     hash = hashed(hash_of_moments(hash_of_rows(hash, &out, ROWS, lines), &m), &largest, 1);
     demand_one_by_one(&weights, &set, &in, &m, largest);
 
-    double *spectra = noises(6 * n, &state, 0), *powers = noises(4 * n, &state, 1);
-    double *means = reals(LB_LINE_MEANS * n), *scatter = reals(LB_LINE_SCATTER * n);
-    int64_t after[ROWS];
-    DEMAND(lb_lines_add(&weights, &m, 0, ROWS, spectra, powers, whole, after, means, scatter) == LB_OK);
-    hash = hash_of_moments(hashed(hashed(hash, means, LB_LINE_MEANS * n), scatter, LB_LINE_SCATTER * n), &m);
-    void *every[] = {output, reference, detected, distortion, moment, whole, clean,
-                     aside,  moving,    invalid,  spectra,    powers, means, scatter};
+    void *every[] = {output, reference, detected, distortion, moment, whole, clean, aside, moving, invalid};
     for (size_t i = 0; i < sizeof every / sizeof *every; ++i) {
         free(every[i]);
     }
@@ -231,7 +225,7 @@ static void refuse_misuse(void)
     const lb_line_settings set = {0, 0, LB_NOISE_SCATTER, 1, 1};
     lb_line_moments m = moments_of(1, 2), missing = m;
     lb_line_rows out = rows_of(1, 2), partial = out;
-    const double spectrum[4] = {1, 2, 3, 4}, powers[8] = {0}, moment[3] = {0};
+    const double spectrum[4] = {1, 2, 3, 4}, moment[3] = {0};
     const uint8_t yes[1] = {1};
     double largest = 0;
     lb_line_windows in = {0, 1, 2, spectrum, spectrum, spectrum, NULL, yes, yes, NULL, NULL, NULL, NULL, moment};
@@ -249,8 +243,6 @@ static void refuse_misuse(void)
     wrong = in, wrong.stride = 1;
     DEMAND(lb_lines_process(&weights, &m, &largest, &set, &wrong, &out) == LB_ERROR_SIZE);
     DEMAND(lb_lines_process(&none, &m, &largest, &set, &in, &out) == LB_ERROR_SIZE);
-    DEMAND(lb_lines_add(&weights, &m, 0, 1, spectrum, powers, yes, NULL, out.value, out.value) == LB_ERROR_NULL);
-    DEMAND(lb_lines_add(&weights, &m, 1, 0, NULL, NULL, NULL, NULL, NULL, NULL) == LB_ERROR_SIZE);
     DEMAND(m.count[0] == 0 && largest == 0);
     release_rows(&out);
     release_moments(&m);

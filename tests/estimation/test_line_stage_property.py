@@ -1,4 +1,4 @@
-"""A tracker whose line stage is the NumPy twin gives the same responses, bit for bit."""
+"""A tracker whose line stage and verdicts are those of the NumPy twins gives the same responses, bit for bit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Block, Lines, Loop, Responses
-from livebode.estimation import RippleOrder, Settings, Tracker, line_stage, moments
+from livebode.estimation import RippleOrder, Settings, Tracker, line_stage, repeating_twin
+from livebode.estimation.verdicts import Judge
 from livebode.excitation import multisine
 from livebode.kernel import line_twin
 
@@ -81,10 +82,10 @@ def responses(made: Settings, pieces: list[Block]) -> Responses:
     st.lists(st.integers(1, SAMPLES - 1), max_size=4),
     st.sampled_from([0, 0, 5, 60]),
 )
-def test_a_tracker_gives_the_bits_of_its_twin(drawn, seed, faults, edges, missing):
+def test_a_tracker_gives_the_bits_of_its_twins(drawn, seed, faults, edges, missing):
     made, pieces = possible(drawn), blocks(seed, faults, edges, missing)
     found = responses(made, pieces)
     process = patch.object(line_stage, "process_lines", line_twin.process_lines)
-    with process, patch.object(moments, "add_windows", line_twin.add_windows):
+    with process, patch.object(Judge, "take", repeating_twin.take):
         expected = responses(made, pieces)
     assert found.equals(expected)

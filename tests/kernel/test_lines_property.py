@@ -17,7 +17,6 @@ from livebode.kernel import (
     LineMoments,
     LineSettings,
     LineWindows,
-    add_windows,
     line_twin,
     process_lines,
 )
@@ -165,19 +164,6 @@ def test_any_division_of_the_windows_gives_the_same_bits(case):
     joined = [np.concatenate([getattr(one, name) for one in found], axis=axis[name]) for name in axis]
     assert_same_bits(expected, type(expected)(*joined))
     assert_same_bits(whole, parts)
-
-
-@settings(max_examples=60, deadline=None)
-@given(cases)
-def test_added_windows_have_the_bits_of_the_twin(case):
-    numbers, moments, of_twin, place = Numbers(case), case.moments(), case.moments(), 0
-    weights = case.settings.weights
-    for rows in case.pieces:
-        spectra, powers = numbers.complex_(3, rows, case.lines), numbers.reals(4, rows, case.lines)
-        about = case.forgetting, weights, place, spectra, powers, numbers.flags(0.7, rows)
-        assert_same_bits(add_windows(moments, *about), line_twin.add_windows(of_twin, *about))
-        assert_same_bits(moments, of_twin)
-        place = (place + rows) % case.places
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 KERNEL = ROOT / "kernel"
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror"]
 # The flags that kernel/CMakeLists.txt sets.
-ALWAYS = ["-ffp-contract=off"]
+ALWAYS = ["-ffp-contract=off", "-fno-math-errno"]
 SETS = {"avx2": ["-mavx2", "-mno-fma"], "avx512": ["-mavx512f", "-mavx512vl"]}
 TYPED = ["layout", "rows", "stage", "stream", "read", "recur", "snapshot", "dispatch", "tiles", "one", "tile"]
 X86 = os.uname().machine == "x86_64"
@@ -43,6 +43,7 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86) -> 
     switch = ["-DLB_DISPATCH"] if dispatch else []
     jobs: list[tuple[str, str, list[str]]] = [(name, name, []) for name in ("twiddle", "machine")]
     jobs += [(f"lines/{name}", name, []) for name in ("moments", "lines")]
+    jobs += [(f"repeating/{name}", name, []) for name in ("numbers", "hum", "distortion", "periods")]
     for bits in (32, 64):
         jobs += [(name, f"{name}{bits}", [f"-DLB_BITS={bits}"]) for name in TYPED]
         for name, isa in SETS.items() if dispatch else ():
@@ -136,7 +137,9 @@ def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factor
     hashes = {}
     for name, (compiler, _, objects) in builds.items():
         (tmp_path / f"run {name}").mkdir()
-        hashes[name] = tuple(program(tmp_path / f"run {name}", compiler, objects, part) for part in ("bits", "lines"))
+        hashes[name] = tuple(
+            program(tmp_path / f"run {name}", compiler, objects, part) for part in ("bits", "lines", "repeating")
+        )
     assert len(set(hashes.values())) == 1, hashes
 
 
@@ -166,6 +169,7 @@ def test_sanitizers_find_nothing(tmp_path):
     program(tmp_path, compiler, objects, "misuse", *sanitize)
     program(tmp_path, compiler, objects, "bits", *sanitize)
     program(tmp_path, compiler, objects, "lines", *sanitize)
+    program(tmp_path, compiler, objects, "repeating", *sanitize)
 
 
 VIOLATIONS = {
@@ -226,5 +230,5 @@ def test_the_documented_example_compiles_and_runs(built, tmp_path):
 
 def test_the_header_is_also_cpp(tmp_path):
     source = tmp_path / "header.cpp"
-    source.write_text('#include "livebode/lines.h"\nint main() { return lb_best_instruction_set() == LB_BEST; }\n')
+    source.write_text('#include "livebode/repeating.h"\nint main() { return lb_best_instruction_set() == LB_BEST; }\n')
     run(needed("g++"), "-Wall", "-Wextra", "-Werror", f"-I{KERNEL / 'include'}", "-c", source, "-o", tmp_path / "o")

@@ -38,16 +38,6 @@ typedef struct {
     double *moment;  /* [3][places]: means of time and schedule, number of the oldest sample; updated with averages */
 } lb_line_moments;
 
-/* Adds windows at consecutive places, from `place` on, and gives the moments after each.
- *
- * spectra[3][rows][lines][2]: numerator, denominator, reference; powers[4][rows][lines]; usable[rows], 0 for a window
- * that changes nothing; after[rows] receives the count, means[LB_LINE_MEANS][rows][lines] and
- * scatter[LB_LINE_SCATTER][rows][lines] the moments. LB_ERROR_NULL for a missing pointer, LB_ERROR_SIZE for a place
- * that the period does not have, or no places. */
-lb_status lb_lines_add(const lb_line_weights *weights, const lb_line_moments *moments, size_t place, size_t rows,
-                       const double *spectra, const double *powers, const uint8_t *usable, int64_t *after,
-                       double *means, double *scatter);
-
 /* Where the variance of numerator − Ĝ·denominator is from. */
 typedef enum {
     LB_NOISE_SCATTER = 0, /* the scatter between periods */

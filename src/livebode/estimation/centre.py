@@ -26,8 +26,13 @@ class Centre(StatefulBase):
     def restart(self) -> None:
         self._past[:] = np.nan
 
-    def at(self, schedule: Floats, position: NDArray[np.int64]) -> Floats:
-        """Schedule at the centres of the windows that end at these positions of the next stretch, `schedule`."""
+    def at(self, schedule: Floats | None, position: NDArray[np.int64]) -> Floats:
+        """Schedule at the centres of the windows that end at these positions of the next stretch, `schedule`.
+
+        NaN without a schedule.
+        """
+        if schedule is None:
+            return np.full(position.size, np.nan)
         known = np.concatenate([self._past, schedule])
         self._past = known[known.size - self._early :]
         return np.asarray((known[position] + known[position + self._early - self._late]) / 2)

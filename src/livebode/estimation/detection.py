@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import GridError, Lines
-from livebode.estimation.products import power, times
+from livebode.estimation.products import power, scaled, times
 from livebode.estimation.settings import DETECTION_LINES_MIN
 
 Floats = NDArray[np.float64]
@@ -32,24 +32,18 @@ class Interpolation:
 
     def __init__(self, lines: NDArray[np.int64], bins: NDArray[np.int64]) -> None:
         right = np.searchsorted(lines, bins).clip(0, len(lines) - 1)
-        self._left, self._right = np.where(lines[right] > bins, np.maximum(right - 1, 0), right), right
-        width = np.maximum(lines[self._right] - lines[self._left], 1)
-        self._share = np.where(self._right > self._left, (bins - lines[self._left]) / width, 0.0)
+        self.left, self.right = np.where(lines[right] > bins, np.maximum(right - 1, 0), right), right
+        width = np.maximum(lines[self.right] - lines[self.left], 1)
+        self.share = np.where(self.right > self.left, (bins - lines[self.left]) / width, 0.0)
 
     def at(self, ratio: Complex) -> Complex:
-        left, right = ratio[..., self._left], ratio[..., self._right]
+        left, right = ratio[..., self.left], ratio[..., self.right]
         falls = times(right, left.conj()).imag < 0
-        straight = left + _scaled(right - left, self._share)
-        across = right + _scaled(left - right, self._share)
+        straight = left + scaled(right - left, self.share)
+        across = right + scaled(left - right, self.share)
         size = power(across)
         inverse = times(times(left, right), across.conj())
-        return np.where(falls, _scaled(inverse, 1 / size), straight)
-
-
-def _scaled(one: Complex, factor: Floats) -> Complex:
-    product = np.empty(one.shape, dtype=np.complex128)
-    product.real, product.imag = one.real * factor, one.imag * factor
-    return product
+        return np.where(falls, scaled(inverse, 1 / size), straight)
 
 
 class Groups:
@@ -62,23 +56,23 @@ class Groups:
         above = np.searchsorted(bins, lines)[:, np.newaxis] + np.arange(_BESIDE)
         at = np.stack([above - _BESIDE, above])  # (sides, lines, bins of a side)
         member = (at >= 0) & (at < len(bins))
-        self._at, self._member = at.clip(0, max(len(bins) - 1, 0)), member
+        self.places, self.member = at.clip(0, max(len(bins) - 1, 0)), member
         count = member.sum(axis=2)
         with np.errstate(invalid="ignore", divide="ignore"):
-            centre = np.where(member, bins[self._at], 0).sum(axis=2) / count
-            self._share = np.nan_to_num((lines - centre[0]) / (centre[1] - centre[0]))
-        weight = np.stack([np.where(count[1] > 0, 1 - self._share, 1.0), np.where(count[0] > 0, self._share, 1.0)])
+            centre = np.where(member, bins[self.places], 0).sum(axis=2) / count
+            self.position = np.nan_to_num((lines - centre[0]) / (centre[1] - centre[0]))
+        weight = np.stack([np.where(count[1] > 0, 1 - self.position, 1.0), np.where(count[0] > 0, self.position, 1.0)])
         self.dof = 1 / np.sum(weight**2 / np.where(count > 0, count, np.inf), axis=0)
 
     def at(self, powers: Floats) -> Floats:
         """Shape (rows, bins) to (rows, lines)."""
-        beside = powers[:, self._at]  # (rows, sides, lines, bins of a side)
-        known = self._member & np.isfinite(beside)
+        beside = powers[:, self.places]  # (rows, sides, lines, bins of a side)
+        known = self.member & np.isfinite(beside)
         with np.errstate(invalid="ignore", divide="ignore"):
             # One by one: the order of NumPy's own sums depends on how many rows there are.
             side = sum(np.moveaxis(np.where(known, beside, 0.0), 3, 0)) / known.sum(axis=3)
         below, above = side[:, 0], side[:, 1]
-        between = below + (above - below) * self._share
+        between = below + (above - below) * self.position
         return np.asarray(np.where(np.isnan(below), above, np.where(np.isnan(above), below, between)))
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from livebode.core import Lines
 from livebode.estimation.detection import Groups, Interpolation
 from livebode.estimation.moments import Moments
-from livebode.estimation.products import power, times
+from livebode.estimation.products import divided, power, times
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -71,9 +71,9 @@ class Distortion:
     def __init__(self, lines: Lines) -> None:
         at = np.asarray(lines.bins)
         self.bins = reached(lines)
-        self._interpolation = Interpolation(at, self.bins)
-        self._groups = Groups(at, self.bins)
-        self.dof = float(self._groups.dof.min())
+        self.interpolation = Interpolation(at, self.bins)
+        self.groups = Groups(at, self.bins)
+        self.dof = float(self.groups.dof.min())
 
     def repeats(
         self, moments: Moments, pair: Complex, lines: slice, beside: slice, instrument: bool, steps: Floats
@@ -93,8 +93,8 @@ class Distortion:
             lines act as dither, so the factor of three does not apply to them.
         """
         numerator, denominator = pair
-        ratio = numerator[:, lines] / denominator[:, lines]
-        model = self._interpolation.at(ratio)
+        ratio = divided(numerator[:, lines], denominator[:, lines])
+        model = self.interpolation.at(ratio)
         mean = power(numerator[:, beside] - times(model, denominator[:, beside]))
         scatter = replace(moments, scatter=moments.scatter[:, :, beside]).unexplained(model)
         noise = scatter / moments.weights.unbiased[:, np.newaxis] * moments.weights.of_mean[:, np.newaxis]
@@ -102,9 +102,9 @@ class Distortion:
             reference = moments.power[0]
             excited = reference[:, beside] > _POWERLESS * _mean(reference[:, lines])
             mean = np.where(excited, np.nan, mean)
-        as_output = self._groups.at(mean - noise)
-        as_input = self._groups.at((mean - noise) / power(model)) * power(ratio)
-        found = np.maximum(np.fmax(as_output, as_input), 0.0)
+        as_output = self.groups.at(mean - noise)
+        as_input = self.groups.at((mean - noise) / power(model)) * power(ratio)
+        found = np.maximum(np.fmax(as_output, as_input), 0.0) + 0.0  # which zero a maximum is, is not specified
         strength = power(numerator[:, lines])
         stronger = np.maximum(strength / _mean(strength), 1.0)
         coherent = (_COHERENT**2 * stronger - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
@@ -132,10 +132,6 @@ class Repeats:
     over_noise: Floats
     known: NDArray[np.int64]
     dof: Floats
-
-    def is_significant(self, row: int) -> bool:
-        """Whether noise alone has this power with a probability below 1e-4."""
-        return bool(self.over_noise[row] > _by_chance(int(self.known[row]), float(self.dof[row])))
 
 
 def _mean(rows: Floats) -> Floats:
@@ -167,7 +163,7 @@ def _share(over_noise: Floats) -> Floats:
 
 
 @lru_cache(maxsize=1024)
-def _by_chance(known: int, dof: float) -> float:
+def by_chance(known: int, dof: float) -> float:
     """What noise alone exceeds over itself with a probability of 1e-4: a quantile of the F distribution.
 
     Of as many detection lines as the noise is averaged over; the mean over more of them exceeds it less often.

@@ -11,6 +11,7 @@ Floats = NDArray[np.float64]
 
 # Against a sample this much larger, 16 digits leave 8 for everything else until the kernel renews its sums.
 _FACTOR = 1e8
+_NONE = np.zeros(0, dtype=np.intp)
 
 
 class PlausibleRange(StatefulBase):
@@ -34,15 +35,16 @@ class PlausibleRange(StatefulBase):
         self._at = (self._at + size.shape[1]) % self._window
         if self._at == 0:
             self._end_period()
-        return np.concatenate(found) if found else np.zeros(0, dtype=np.intp)
+        return np.concatenate(found) if found else _NONE
 
     def _found(self, size: Floats, starts: NDArray[np.intp]) -> list[NDArray[np.intp]]:
         """The same, in pieces that begin a period, or continue the one that has begun."""
         every = np.maximum.reduceat(size, starts, axis=1)
         every[:, 0] = np.maximum(self._largest, every[:, 0])
-        limits = np.concatenate([self._limit[:, np.newaxis], _limits(every)], axis=1)
-        if not (every > limits[:, :-1]).any():  # nearly always
-            self._largest, self._limit = every[:, -1].copy(), limits[:, -2].copy()
+        limits = np.empty(every.shape)
+        limits[:, 0], limits[:, 1:] = self._limit, _limits(every[:, :-1])
+        if not (every > limits).any():  # nearly always
+            self._largest, self._limit = every[:, -1].copy(), limits[:, -1].copy()
             return []
         found: list[NDArray[np.intp]] = []
         for i, largest in enumerate(every.T):

@@ -50,10 +50,10 @@ class Mains:
         # at these distances it is like that at the harmonic.
         distances = _BESIDE * int(np.lcm(2, gcd(*lines.bins)))
         barred = np.concatenate([at, *free])
-        self._free = [_Neighbours(tones, distances, barred, highest) for tones in free]
+        self.free = [Neighbours(tones, distances, barred, highest) for tones in free]
         barred = np.concatenate(free)
-        self._excited = _Neighbours(at if self._any.any() else at[:0], 2 * _BESIDE, barred, highest)
-        groups = [*self._free, self._excited]
+        self.excited = Neighbours(at if self._any.any() else at[:0], 2 * _BESIDE, barred, highest)
+        groups = [*self.free, self.excited]
         self.bins = np.unique(np.concatenate([group.bins for group in groups]))
         for group in groups:
             group.place_in(self.bins)
@@ -66,8 +66,8 @@ class Mains:
         """Lines that may contain hum, (rows, lines), by the power of the mean output at `bins`, (rows, bins)."""
         if not self.any:
             return np.zeros((len(output), self._any.size), dtype=np.bool_)
-        least = _MATTERS * output[:, self._excited.tones].max(axis=1, keepdims=True)
-        found = [(group.stand_out(output) & (output[:, group.tones] > least)).any(axis=1) for group in self._free]
+        least = _MATTERS * output[:, self.excited.tones].max(axis=1, keepdims=True)
+        found = [(group.stand_out(output) & (output[:, group.tones] > least)).any(axis=1) for group in self.free]
         return np.asarray((self.lines & np.array(found).T[:, :, np.newaxis]).any(axis=1))
 
     def alone(self, output: Floats) -> tuple[Floats, NDArray[np.bool_]]:
@@ -77,7 +77,7 @@ class Mains:
         """
         if not self.any:
             return np.zeros(self._any.size), self._any
-        return output[self._excited.tones], self._any & self._excited.stand_out(output)
+        return output[self.excited.tones], self._any & self.excited.stand_out(output)
 
 
 @lru_cache(maxsize=64)
@@ -86,32 +86,32 @@ def mains_of(lines: Lines) -> Mains:
     return Mains(lines)
 
 
-class _Neighbours:
+class Neighbours:
     """Bins at which a tone may be, and the neighbours with which each is compared."""
 
     def __init__(
         self, tones: NDArray[np.int64], distances: NDArray[np.int64], barred: NDArray[np.int64], highest: int
     ) -> None:
         beside = tones[:, np.newaxis] + distances
-        self._usable = (beside > 0) & (beside <= highest) & ~np.isin(beside, barred)
-        self.tones, self._beside = tones, beside.clip(0, highest)
-        count = self._usable.sum(axis=1)
-        self._count = np.maximum(count, 1)
-        self._enough = count >= distances.size // 2
-        self._times = np.array([prominence(n) for n in count])
+        self.usable = (beside > 0) & (beside <= highest) & ~np.isin(beside, barred)
+        self.tones, self.beside = tones, beside.clip(0, highest)
+        count = self.usable.sum(axis=1)
+        self.known = np.maximum(count, 1).astype(np.float64)
+        self.enough = count >= distances.size // 2
+        self.times = np.array([prominence(n) for n in count])
 
     @property
     def bins(self) -> NDArray[np.int64]:
-        return np.concatenate([self.tones, self._beside.ravel()])
+        return np.concatenate([self.tones, self.beside.ravel()])
 
     def place_in(self, bins: NDArray[np.int64]) -> None:
         """Restrict the powers to these bins."""
-        self.tones, self._beside = np.searchsorted(bins, self.tones), np.searchsorted(bins, self._beside)
+        self.tones, self.beside = np.searchsorted(bins, self.tones), np.searchsorted(bins, self.beside)
 
     def stand_out(self, power: Floats) -> NDArray[np.bool_]:
         """Bins whose power exceeds that of their neighbours by more than chance, (…, bins) to (…, tones)."""
-        level = np.where(self._usable, np.take(power, self._beside, axis=-1), 0.0).sum(axis=-1) / self._count
-        return np.asarray(self._enough & (power[..., self.tones] > self._times * level))
+        level = np.where(self.usable, np.take(power, self.beside, axis=-1), 0.0).sum(axis=-1) / self.known
+        return np.asarray(self.enough & (power[..., self.tones] > self.times * level))
 
 
 def prominence(neighbours: int) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Stage, StatefulBase
-from livebode.kernel import MEANS, SCATTER, LineMoments, WeightSums, add_windows
+from livebode.kernel import MEANS, SCATTER, LineMoments, WeightSums
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -44,11 +44,6 @@ class Moments:
         return pair
 
     @property
-    def reference(self) -> Complex:
-        """Mean of the reference, shape (rows, lines)."""
-        return np.asarray(self.means[4] + 1j * self.means[5])
-
-    @property
     def repeatability(self) -> Floats:
         """|S_r|²/S_rr: the share of the reference's power that its mean has, shape (rows, lines)."""
         return np.asarray((self.means[4] ** 2 + self.means[5] ** 2) / self.means[6])
@@ -57,11 +52,6 @@ class Moments:
     def power(self) -> Floats:
         """Means of the powers, shape (4, rows, lines)."""
         return self.means[6:]
-
-    def rows(self, at: NDArray[np.int64]) -> Moments:
-        """Some of the rows."""
-        means, scatter = np.take(self.means, at, axis=1), np.take(self.scatter, at, axis=1)
-        return Moments(means, scatter, WeightSums(*(sums[at] for sums in self.weights)))
 
     def unexplained(self, ratio: Complex) -> Floats:
         """Σλ^i|δnum − ratio·δden|², shape (rows, lines)."""
@@ -112,27 +102,10 @@ class PeriodMoments(StatefulBase):
         """The moments at every place in the period."""
         return Moments(self._means, self._scatter, self.weights.after(self._count))
 
-    def add(self, place: int, spectra: Complex, power: Floats) -> Moments:
-        """Add windows at consecutive places from `place` on and return the Moments after each.
-
-        Parameters
-        ----------
-        spectra, power
-            Numerator, denominator, reference, shape (3, rows, lines), and four powers, shape (4, rows, lines): of
-            reference and output, of the noise at detection lines, and of the denominator's signal.
-        """
-        weights, usable = self.weights, np.ones(spectra.shape[1], dtype=np.bool_)
-        three = np.ascontiguousarray(spectra)
-        found = add_windows(self.arrays, weights.forgetting, weights.table, place, three, power, usable)
-        return Moments(found.means, found.scatter, weights.after(found.windows))
-
-    def copy(self) -> PeriodMoments:
-        """The same moments, which are updated on their own."""
-        other = PeriodMoments.__new__(PeriodMoments)  # copy.copy takes as long as a block's moments
-        other.weights = self.weights
-        other._count, other._means = self._count.copy(), self._means.copy()
-        other._scatter, other._moment = self._scatter.copy(), self._moment.copy()
-        return other
+    def forget(self) -> None:
+        """As before the first window."""
+        for part in (self._count, self._means, self._scatter, self._moment):
+            part[:] = 0
 
 
 class Weights:

@@ -97,7 +97,8 @@ class NonPeriodicTracker(StreamEstimator[InputStatistics]):
         rows: list[Row] = []
         for stretch in _stretches(finite):
             if finite[stretch.start]:
-                rows += self._take(data[:, stretch], schedule[stretch], block.start + stretch.start, block)
+                part = None if schedule is None else schedule[stretch]
+                rows += self._take(data[:, stretch], part, block.start + stretch.start, block)
             else:
                 self._restart()
         responses = self._lines.responses(rows, block.channels)
@@ -109,7 +110,7 @@ class NonPeriodicTracker(StreamEstimator[InputStatistics]):
         self._newest.count = 0
         self._centre.restart()
 
-    def _take(self, data: Floats, schedule: Floats, start: int, block: Block) -> list[Row]:
+    def _take(self, data: Floats, schedule: Floats | None, start: int, block: Block) -> list[Row]:
         """The rows at the hops of these samples, of which all are finite; the first one has the number `start`."""
         span, hop = self.settings.span, self.settings.step
         before = self._newest.count

@@ -25,17 +25,17 @@ class Periods:
     signals
         Shape (signals, periods, N).
     schedule
-        Shape (periods, N).
+        Shape (periods, N); None where there is none.
     complete
         Whether no sample is missing or left out, shape (periods,).
     stop
-        Index behind the last sample, shape (periods,).
+        Index behind the last sample of the first period.
     """
 
     signals: Floats
-    schedule: Floats
+    schedule: Floats | None
     complete: NDArray[np.bool_]
-    stop: NDArray[np.int64]
+    stop: int
 
 
 class PeriodCutter(StatefulBase):
@@ -52,7 +52,8 @@ class PeriodCutter(StatefulBase):
     _STATE: ClassVar[tuple[str, ...]] = ("_samples", "_position", "_at", "_whole")
 
     def __init__(self, window: int, differenced: NDArray[np.bool_]) -> None:
-        self._window, self._differenced = window, differenced
+        self._window, self._differenced = window, differenced[:, np.newaxis]
+        self._lead = int(differenced.any())  # samples before a period that are needed
         self._samples = np.zeros((differenced.size, window + 1))  # with the one before the period
         self._position = np.full(window, np.nan)
         self._at, self._whole = 0, False
@@ -62,13 +63,13 @@ class PeriodCutter(StatefulBase):
         self._at = sample % self._window
         self._whole, self._position[:] = False, np.nan
 
-    def _cut(self, data: Floats, schedule: Floats, left_out: NDArray[np.int64]) -> Iterator[Periods]:
+    def _cut(self, data: Floats, schedule: Floats | None, left_out: NDArray[np.int64]) -> Iterator[Periods]:
         """The periods that end in these samples, some at a time.
 
         Parameters
         ----------
         data, schedule
-            Shapes (signals, samples) and (samples,).
+            Shapes (signals, samples) and (samples,); no schedule: None.
         left_out
             Indices of the samples without which a period does not count.
         """
@@ -76,30 +77,42 @@ class PeriodCutter(StatefulBase):
         count = (at + samples) // window
         complete = np.ones(count + 1, dtype=np.bool_)
         complete[0] = self._whole
-        complete[(at + left_out) // window] = False
+        if left_out.size:
+            complete[(at + left_out) // window] = False
         together = max(1, _TOGETHER // window)
         for first in range(0, count, together):
             last = min(count, first + together)
-            begin, end = max(first * window - at, 0), last * window - at
-            before = first * window - at < 1  # the sample before them is not in the data
-            signals = np.hstack([self._samples[:, : at + 1], data[:, :end]]) if before else data[:, begin - 1 : end]
-            position = np.concatenate([self._position[:at], schedule[:end]]) if before else schedule[begin:end]
+            begin, end = first * window - at, last * window - at
+            signals, position = self._signals(data, begin, end), self._positions(schedule, begin, end)
             yield Periods(
                 self._differences(signals).reshape(len(data), last - first, window),
-                position.reshape(last - first, window),
+                None if position is None else position.reshape(last - first, window),
                 complete[first:last],
-                np.arange(first + 1, last + 1) * window - at,
+                begin + window,
             )
             if last == count:
-                self._samples[:], self._position[:] = signals[:, -window - 1 :], position[-window:]
+                self._samples[:, 1:] = signals[:, -window:]
                 self._samples[:, 0] = self._samples[:, -1]
+                if position is not None:
+                    self._position[:] = position[-window:]
         rest, at = (samples, at) if not count else ((at + samples) % window, 0)
         self._samples[:, at + 1 : at + 1 + rest] = data[:, samples - rest :]
-        self._position[at : at + rest] = schedule[samples - rest :]
+        if schedule is not None:
+            self._position[at : at + rest] = schedule[samples - rest :]
         self._at, self._whole = at + rest, bool(complete[count])
+
+    def _signals(self, data: Floats, begin: int, end: int) -> Floats:
+        """Samples from `begin` on, which may be before the data, with the one before them where it is needed."""
+        first = begin - self._lead
+        if first >= 0:
+            return data[:, first:end]
+        return np.concatenate([self._samples[:, 1 - self._lead : 1 - begin], data[:, :end]], axis=1)
+
+    def _positions(self, schedule: Floats | None, begin: int, end: int) -> Floats | None:
+        if schedule is None or begin >= 0:
+            return schedule if schedule is None else schedule[begin:end]
+        return np.concatenate([self._position[:-begin], schedule[:end]])
 
     def _differences(self, signals: Floats) -> Floats:
         """Signals without the sample before them, some of them differenced."""
-        if not self._differenced.any():
-            return signals[:, 1:]
-        return np.where(self._differenced[:, np.newaxis], np.diff(signals), signals[:, 1:])
+        return np.where(self._differenced, np.diff(signals), signals[:, 1:]) if self._lead else signals

@@ -9,16 +9,16 @@ from livebode.core import Stage, StatefulBase
 
 Floats = NDArray[np.float64]
 
-_PERIODS = 9
+PERIODS = 9
 """Periods of silence after an excitation before a tone counts as hum.
 
 A mode with a damping ratio of 0.1 % at 50 Hz loses 31 % of its power from the first to the last third of nine periods
 of 0.1 s; in two periods a damping ratio of 0.5 % cannot be separated from noise.
 """
-_PERIODS_FIRST = 3  # of silence before the first excitation: thirds that a tone can decay over
+PERIODS_FIRST = 3  # of silence before the first excitation: thirds that a tone can decay over
 STEADY = 0.9  # of the power in the first third of the periods: in the last third a tone that does not decay has more
-_GONE = 0.25  # of the previous power of the hum: below this, and without a tone, it has disappeared
-_GONE_PERIODS = 2  # in a row
+GONE = 0.25  # of the previous power of the hum: below this, and without a tone, it has disappeared
+GONE_PERIODS = 2  # in a row
 
 
 class SilentHum(StatefulBase):
@@ -38,46 +38,17 @@ class SilentHum(StatefulBase):
     _STATE = ("_power", "_found", "_low", "_counts")
 
     def __init__(self, lines: int) -> None:
-        self._power = np.full((_PERIODS, lines), np.nan)  # of the newest periods of this silence, newest last
+        self._power = np.full((PERIODS, lines), np.nan)  # of the newest periods of this silence, newest last
         self._found = np.zeros(lines)  # the hum's power, 0 where there is none
         self._low = np.zeros(lines)  # consecutive periods without it
         self._counts = np.zeros(2)  # periods of this silence, and of excitation before it
 
     @property
-    def lines(self) -> NDArray[np.bool_]:
-        """Which lines have hum, shape (lines,)."""
-        return np.asarray(self._found > 0)
-
-    def take(self, power: Floats, is_prominent: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """A period without excitation: the power at each line, and whether it is that of a tone.
-
-        Returns the lines whose hum is withdrawn, shape (lines,).
-        """
-        self._power[:-1] = self._power[1:]
-        self._power[-1] = np.where(is_prominent, power, np.nan)
-        self._counts[0] += 1
-        if self._counts[0] >= _PERIODS:
-            self._find(_PERIODS)
-        self._low = np.where((power < _GONE * self._found) & ~is_prominent, self._low + 1, 0.0)
-        gone = self._low >= _GONE_PERIODS
-        self._found[gone] = 0.0
-        return np.asarray(gone)
-
-    def end(self) -> None:
-        """A period with excitation."""
-        silent, excited = self._counts
-        if not excited and _PERIODS_FIRST <= silent < _PERIODS:
-            self._find(int(silent))
-        self._counts[:] = 0, 1
-        self._power[:] = np.nan
+    def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """The state, which `Judge.take` changes in place: as the last ones of `PeriodState`."""
+        return self._power, self._found, self._low, self._counts
 
     def interrupt(self) -> None:
         """The next period does not follow the previous one."""
         self._counts[0] = 0
         self._power[:] = np.nan
-
-    def _find(self, periods: int) -> None:
-        part, third = self._power[-periods:], periods // 3
-        first, last = part[:third].mean(axis=0), part[-third:].mean(axis=0)
-        steady = np.isfinite(part).all(axis=0) & (last >= STEADY * first)
-        self._found = np.where(steady & (self._found == 0), last, self._found)

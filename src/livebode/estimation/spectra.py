@@ -123,7 +123,7 @@ class LineSpectra(StatefulBase):
         if implausible.size:
             finite = finite.copy()
             finite[:, implausible] = 0.0
-        missing = np.concatenate([not_finite, implausible])
+        missing = _joined(not_finite, implausible)
         # The substitute for a missing sample may differ, but is not a spike of the signal.
         spikes = _NONE
         if self._spikes is not None:
@@ -132,16 +132,20 @@ class LineSpectra(StatefulBase):
         left_out = self._positions(self.left_out, data.shape[1])
         step = max(self._step, _ROW_VALUES_MAX // (self._after.size or 1) * self._step)
         parts = [self._spectra(finite[:, i : i + step], i) for i in range(0, finite.shape[1], step)]
-        spectrum = np.concatenate([p[0] for p in parts], axis=1)
-        position = np.concatenate([p[1] for p in parts])
+        spectrum, position = parts[0]
+        if len(parts) > 1:
+            spectrum = np.concatenate([p[0] for p in parts], axis=1)
+            position = np.concatenate([p[1] for p in parts])
         whole = self._without(missing, 0, data.shape[1], position)
-        clean = whole & self._without(np.concatenate([spikes, left_out]), 1, data.shape[1], position)
+        clean = whole & self._without(_joined(spikes, left_out), 1, data.shape[1], position)
         rows = SpectraRows(spectrum, self._next + position, whole, clean, not_finite, implausible, spikes, left_out)
         self._next += data.shape[1]
         return rows
 
     def _positions(self, samples: NDArray[np.int64], count: int) -> NDArray[np.intp]:
         """Positions of these samples, by number and ascending, in the next `count` ones."""
+        if not samples.size:
+            return _NONE
         first, stop = np.searchsorted(samples, (self._next, self._next + count))
         return np.asarray(samples[first:stop] - self._next, dtype=np.intp)
 
@@ -188,6 +192,11 @@ class LineSpectra(StatefulBase):
             number = np.maximum.accumulate(number)
             self._last_bad[kind], last_bad = int(number[-1]), number[position]
         return np.asarray(self._next + position - last_bad >= self._window)
+
+
+def _joined(one: NDArray[np.intp], other: NDArray[np.intp]) -> NDArray[np.intp]:
+    """One after the other; nearly always there are none."""
+    return np.concatenate([one, other]) if other.size else one
 
 
 def after(bins: NDArray[np.int64], window: int, differenced: NDArray[np.bool_], advanced: NDArray[np.int64]) -> Complex:

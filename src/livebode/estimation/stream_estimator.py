@@ -97,8 +97,8 @@ class StreamEstimator(StatefulBase, Generic[W]):
             part.restore(state[name])
 
 
-def signals_of(block: Block, settings: Settings) -> tuple[Floats, Floats]:
-    """Signals of a Block in the order of the settings' roles, (signals, samples), and its schedule, NaN without one.
+def signals_of(block: Block, settings: Settings) -> tuple[Floats, Floats | None]:
+    """Signals of a Block in the order of the settings' roles, (signals, samples), and its schedule, if there is one.
 
     SignalError if it has no samples, another rate than the lines, or not the channels.
     """
@@ -113,4 +113,4 @@ def signals_of(block: Block, settings: Settings) -> tuple[Floats, Floats]:
     if not len(block):
         raise SignalError("empty", "the block is empty", "leave it out")
     data = block.data[[block.index(settings.channel(role) or "") for role in settings.roles]]
-    return data, block[settings.schedule] if settings.schedule else np.full(len(block), np.nan)
+    return data, block[settings.schedule] if settings.schedule else None

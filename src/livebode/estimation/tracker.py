@@ -15,7 +15,7 @@ from livebode.estimation.repeating import RepeatingErrors
 from livebode.estimation.ripple import RippleSpeed, ripple_power
 from livebode.estimation.set_aside import NOTHING, Integers, contains, positions
 from livebode.estimation.settings import Settings
-from livebode.estimation.spectra import LineSpectra
+from livebode.estimation.spectra import LineSpectra, SpectraRows
 from livebode.estimation.spikes import SpikeGate
 from livebode.estimation.stream_estimator import StreamEstimator, signals_of
 from livebode.estimation.watch import InputStatistics
@@ -136,16 +136,15 @@ class Tracker(StreamEstimator[InputStatistics]):
                 self._repeating.restart(block.start)
         rows = self._spectra.process(channels)
         self._watch.take(block, rows)
-        centre_s = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
-        centre = np.stack([centre_s, self._centre.at(schedule, rows.sample - block.start)])
+        centre = np.empty((2, len(rows.sample)))
+        centre[0] = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
+        centre[1] = self._centre.at(schedule, rows.sample - block.start)
         repeating = None
         if self._repeating is not None:
-            at = positions(self._aside, block.start, block.stop)
-            judged = replace(rows, left_out=np.union1d(rows.left_out, at)) if at.size else rows
-            repeating = self._repeating.process(channels, judged, schedule, block)
+            repeating = self._repeating.process(channels, self._judged(rows, block), schedule, block)
         place = (rows.sample + 1) % s.lines.window
         ripple = None
-        if self._speed is not None:
+        if self._speed is not None and schedule is not None:
             ripple = ripple_power(s.ripple, s.lines, self._speed.at(schedule, rows.sample - block.start))
         aside = contains(self._aside, rows.sample - s.lines.window + 1, rows.sample) if len(self._aside) else None
         responses = self._lines.process(rows, place, centre, block.channels, repeating, ripple, aside)
@@ -153,6 +152,13 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._end = block.stop - 1, block.origin_s + (block.stop - 1) / block.rate_hz
         hand_over(self._events, emit)
         return responses
+
+    def _judged(self, rows: SpectraRows, block: Block) -> SpectraRows:
+        """Without the samples that are set aside."""
+        if not len(self._aside):
+            return rows
+        at = positions(self._aside, block.start, block.stop)
+        return replace(rows, left_out=np.union1d(rows.left_out, at)) if at.size else rows
 
     def finish(self, emit: Emit = ignore, /) -> Responses | None:
         """An empty batch, None where no samples came; reports even and odd distortion, if the lines show them."""

@@ -1,6 +1,7 @@
-"""The sliding DFT, the line stage and the fit in C, and their NumPy twins, the readable definitions.
+"""The sliding DFT, the line stage, the verdicts on lines and the fit in C, and their NumPy twins, the definitions.
 
-The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin` and `livebode.kernel.fit_twin`.
+The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.estimation.repeating_twin` and
+`livebode.kernel.fit_twin`.
 """
 
 from livebode.kernel._fit import (
@@ -29,17 +30,39 @@ from livebode.kernel._lines import (
     LineSettings,
     LineWindows,
     WeightSums,
-    add_windows,
     process_lines,
+)
+from livebode.kernel._repeating import (
+    ADDED,
+    FORGOTTEN,
+    JUDGED,
+    NEWS,
+    NEWS_GONE,
+    NEWS_INVALID,
+    REASONS,
+    PeriodSpectra,
+    PeriodState,
+    PeriodVerdicts,
+    RepeatingPlan,
+    RepeatingSettings,
+    Tones,
+    judge_periods,
 )
 from livebode.kernel._sliding import SlidingDFT
 
 __all__ = [
+    "ADDED",
+    "FORGOTTEN",
     "INSTRUCTION_SET_VARIABLE",
+    "JUDGED",
     "MEANS",
+    "NEWS",
+    "NEWS_GONE",
+    "NEWS_INVALID",
     "NOISE_LARGER",
     "NOISE_MOVING",
     "NOISE_SCATTER",
+    "REASONS",
     "SCATTER",
     "FeedbackSeries",
     "FitFound",
@@ -52,9 +75,14 @@ __all__ = [
     "LineWindows",
     "MarginGrid",
     "MarginRows",
+    "PeriodSpectra",
+    "PeriodState",
+    "PeriodVerdicts",
+    "RepeatingPlan",
+    "RepeatingSettings",
     "SlidingDFT",
+    "Tones",
     "WeightSums",
-    "add_windows",
     "fft_is_cheaper",
     "fit",
     "fit_epsilon",
@@ -62,5 +90,6 @@ __all__ = [
     "fit_response",
     "instruction_set",
     "instruction_sets",
+    "judge_periods",
     "process_lines",
 ]

@@ -176,14 +176,6 @@ class LineRows(NamedTuple):
     usable: Flags
 
 
-class MomentRows(NamedTuple):
-    """Windows so far (rows,), means (10, rows, lines) and scatter (4, rows, lines) after each window."""
-
-    windows: Integers
-    means: Floats
-    scatter: Floats
-
-
 def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWindows) -> tuple[LineRows, float]:
     """Results of the windows, which are added to the moments, and the largest power of the reference so far."""
     rows, lines = len(windows.whole), moments.means.shape[2]
@@ -201,23 +193,3 @@ def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWin
         np.empty(rows, np.bool_),
     )
     return found, _native.process_lines(settings, moments, windows, found)
-
-
-def add_windows(
-    moments: LineMoments, forgetting: float, weights: Floats, place: int, spectra: Complex, powers: Floats, used: Flags
-) -> MomentRows:
-    """Add windows at consecutive places, from `place` on, and return the moments after each.
-
-    Parameters
-    ----------
-    moments, forgetting, weights
-        As those of `process_lines`.
-    spectra, powers
-        Numerator, denominator and reference, shape (3, rows, lines), and the four powers, shape (4, rows, lines).
-    used
-        Windows that are added; others change nothing, shape (rows,).
-    """
-    _, rows, lines = spectra.shape
-    found = MomentRows(np.empty(rows, np.int64), np.empty((MEANS, rows, lines)), np.empty((SCATTER, rows, lines)))
-    _native.add_windows(moments, forgetting, weights, place, spectra, powers, used, found)
-    return found

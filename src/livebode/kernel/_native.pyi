@@ -6,17 +6,6 @@ import numpy.typing as npt
 Phase = Literal["window", "fixed"]
 
 def best_instruction_set() -> int: ...
-def add_windows(
-    moments: tuple[Any, ...],
-    forgetting: float,
-    table: npt.NDArray[np.float64],
-    place: int,
-    spectra: npt.NDArray[np.complex128],
-    powers: npt.NDArray[np.float64],
-    usable: npt.NDArray[np.bool_],
-    out: tuple[Any, ...],
-    /,
-) -> None: ...
 def process_lines(
     settings: tuple[Any, ...], moments: tuple[Any, ...], windows: tuple[Any, ...], out: tuple[Any, ...], /
 ) -> float: ...
@@ -54,6 +43,12 @@ def fit_margins(
     out: tuple[Any, ...],
     /,
 ) -> None: ...
+def judge_periods(
+    plan: RepeatingPlan, state: tuple[Any, ...], periods: tuple[Any, ...], out: tuple[Any, ...], /
+) -> tuple[float, float]: ...
+
+class RepeatingPlan:
+    def __init__(self, settings: tuple[Any, ...], /) -> None: ...
 
 class Engine:
     def __init__(

@@ -1,4 +1,4 @@
-"""The NumPy twin of the line stage: the readable definition of what `process_lines` and `add_windows` compute in C.
+"""The NumPy twin of the line stage: the readable definition of what `process_lines` computes in C.
 
 The same operations in the same order for each line, so C must agree with it to the bit (except for the sign and
 payload of NaN). Products of complex numbers are written out, because NumPy's round otherwise in the last elements of an
@@ -8,6 +8,7 @@ array, and a sum over lines does not occur. `distortion`, `noise` and `invalid` 
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,6 @@ from livebode.kernel._lines import (
     LineRows,
     LineSettings,
     LineWindows,
-    MomentRows,
     WeightSums,
 )
 
@@ -34,6 +34,14 @@ _NOISE = 8  # of the means: the power of the noise at detection lines
 _Part = tuple[slice, slice, bool]
 
 
+class MomentRows(NamedTuple):
+    """Windows so far (rows,), means (10, rows, lines) and scatter (4, rows, lines) after each window."""
+
+    windows: Integers
+    means: Floats
+    scatter: Floats
+
+
 def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWindows) -> tuple[LineRows, float]:
     """Results of the windows, which are added to the moments, and the largest power of the reference so far."""
     with np.errstate(all="ignore"):
@@ -43,7 +51,17 @@ def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWin
 def add_windows(
     moments: LineMoments, forgetting: float, weights: Floats, place: int, spectra: Complex, powers: Floats, used: Flags
 ) -> MomentRows:
-    """Add windows at consecutive places, from `place` on, and return the moments after each."""
+    """Add windows at consecutive places, from `place` on, and return the moments after each.
+
+    Parameters
+    ----------
+    moments, forgetting, weights
+        As those of `process_lines`.
+    spectra, powers
+        Numerator, denominator and reference, shape (3, rows, lines), and the four powers, shape (4, rows, lines).
+    used
+        Windows that are added; others change nothing, shape (rows,).
+    """
     with np.errstate(all="ignore"):
         new = _parts_of(spectra, powers)
         _, after, means, scatter = _add(moments, forgetting, weights, place, new, used, own=True)

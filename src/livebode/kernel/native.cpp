@@ -14,6 +14,7 @@
 #include "livebode/sdft.h"
 #include "native_fit.h"
 #include "native_lines.h"
+#include "native_repeating.h"
 
 namespace nb = nanobind;
 
@@ -352,6 +353,7 @@ NB_MODULE(_native, m)
     m.def("best_instruction_set", [] { return static_cast<int>(lb_best_instruction_set()); });
     bind_lines(m);
     bind_fit(m);
+    bind_repeating(m);
     nb::class_<Engine>(m, "Engine")
         .def(nb::init<uint32_t, const std::vector<uint32_t> &, uint32_t, bool, int, double, int>())
         .def_prop_ro("window", &Engine::window)

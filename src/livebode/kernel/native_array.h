@@ -1,12 +1,15 @@
-// Arrays of NumPy as pointers of the kernel, checked.
+// Arrays of Python as pointers of C, for the bindings of the module _native.
 #ifndef LIVEBODE_NATIVE_ARRAY_H
 #define LIVEBODE_NATIVE_ARRAY_H
 
 #include <nanobind/nanobind.h>
 
-#include <cstdint>
 #include <cstring>
 #include <initializer_list>
+
+#include "livebode/lines.h"
+
+namespace native {
 
 namespace nb = nanobind;
 
@@ -58,8 +61,31 @@ class Array {
     }
 };
 
-inline const char *const REAL = "d", *const COMPLEX = "Zd", *const FLAG = "?", *const INTEGER = "l q";
+inline const char *const REAL = "d", *const COMPLEX = "Zd", *const FLAG = "?", *const BYTE = "B",
+                         *const INTEGER = "l q";
 
 inline size_t length_of(nb::handle array, size_t axis) { return nb::cast<size_t>(array.attr("shape")[nb::int_(axis)]); }
+
+inline void expect(lb_status status)
+{
+    if (status != LB_OK) throw nb::value_error("a stage refused its arguments");
+}
+
+// Numbers from which other threads may run meanwhile.
+inline constexpr size_t long_work = 5'000;
+
+template <typename Work> void call(size_t size, Work work)
+{
+    lb_status status = LB_OK;
+    if (size < long_work) {
+        status = work();
+    } else {
+        nb::gil_scoped_release release;
+        status = work();
+    }
+    expect(status);
+}
+
+} // namespace native
 
 #endif

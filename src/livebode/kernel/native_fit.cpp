@@ -10,25 +10,10 @@
 
 namespace {
 
-void expect(lb_status status)
-{
-    if (status != LB_OK) throw nb::value_error("the fit refused its arguments");
-}
+using namespace native;
 
-// Rows × lines from which other threads may run meanwhile.
-constexpr size_t long_work = 64;
-
-template <typename Work> void call(size_t size, Work work)
-{
-    lb_status status = LB_OK;
-    if (size < long_work) {
-        status = work();
-    } else {
-        nb::gil_scoped_release release;
-        status = work();
-    }
-    expect(status);
-}
+// A line of a fit is as much work as so many numbers of the other stages.
+constexpr size_t numbers_of_a_line = 80;
 
 // FitModel: kind, integrators, at_load, lever, arm, ratio, and start, low, high, scale and held of the parameters.
 struct Model {
@@ -76,7 +61,7 @@ void fit(nb::tuple model, nb::handle frequency_hz, double rate_hz, nb::tuple row
     thread_local std::vector<double> work;
     work.resize(lb_fit_work(&grid));
     double *const numbers = work.data();
-    call(count * lines, [&] { return lb_fit(&m.model, &grid, &in, &found, numbers); });
+    call(numbers_of_a_line * count * lines, [&] { return lb_fit(&m.model, &grid, &in, &found, numbers); });
 }
 
 void epsilon_for(nb::handle rest, nb::handle noise, nb::handle size, nb::handle dof, nb::handle out)

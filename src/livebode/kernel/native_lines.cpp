@@ -3,32 +3,13 @@
 
 #include <nanobind/nanobind.h>
 
-#include "livebode/lines.h"
 #include "native_array.h"
 
 namespace nb = nanobind;
 
 namespace {
 
-void expect(lb_status status)
-{
-    if (status != LB_OK) throw nb::value_error("the line stage refused its arguments");
-}
-
-// Rows × lines from which other threads may run meanwhile.
-constexpr size_t long_work = 5'000;
-
-template <typename Work> void call(size_t size, Work work)
-{
-    lb_status status = LB_OK;
-    if (size < long_work) {
-        status = work();
-    } else {
-        nb::gil_scoped_release release;
-        status = work();
-    }
-    expect(status);
-}
+using namespace native;
 
 // LineMoments: windows, means, scatter, moment; and the weights of LineSettings.
 struct Moments {
@@ -46,21 +27,6 @@ struct Moments {
     {
     }
 };
-
-void add(nb::tuple moments, double forgetting, nb::handle table, size_t place, nb::handle spectra, nb::handle powers,
-         nb::handle usable, nb::tuple out)
-{
-    const Moments m(moments, forgetting, table);
-    const size_t rows = length_of(spectra, 1);
-    const Array three(spectra, COMPLEX, {3, rows, m.lines}), four(powers, REAL, {4, rows, m.lines});
-    const Array used(usable, FLAG, {rows}), after(out[0], INTEGER, {rows}, WRITE);
-    const Array means(out[1], REAL, {LB_LINE_MEANS, rows, m.lines}, WRITE);
-    const Array scatter(out[2], REAL, {LB_LINE_SCATTER, rows, m.lines}, WRITE);
-    call(rows * m.lines, [&] {
-        return lb_lines_add(&m.weights, &m.moments, place, rows, three.data<double>(), four, used, after, means,
-                            scatter);
-    });
-}
 
 double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tuple out)
 {
@@ -112,8 +78,4 @@ double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tup
 
 } // namespace
 
-void bind_lines(nb::module_ &m)
-{
-    m.def("add_windows", &add);
-    m.def("process_lines", &process);
-}
+void bind_lines(nb::module_ &m) { m.def("process_lines", &process); }
