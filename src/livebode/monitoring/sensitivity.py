@@ -49,9 +49,10 @@ class Replay:
             pair._replace(damping=pair.damping * more),
             pair._replace(inertia_kg_m2=pair.inertia_kg_m2 * more),
         ]
-        plain, *moved = self._run(pairs, u, position_m, offset)
-        slopes = np.empty((len(DIRECTIONS) + 1, u.size))
-        slopes[:4] = (np.array(moved) - plain) / _STEP
+        velocity = self._run(pairs, u, position_m, offset)
+        plain, slopes = velocity[0], np.empty_like(velocity)
+        np.subtract(velocity[1:], plain, out=slopes[:4])
+        slopes[:4] /= _STEP
         slopes[4] = -np.gradient(plain) * self._rate_hz
         return plain, slopes
 
@@ -72,9 +73,11 @@ class Replay:
 
     def _run(self, pairs: list[Pair], torque_n_m: Floats, position_m: Floats, offset: Offset) -> Floats:
         """Velocities of the motor of each pair, rad/s (pairs, samples), from rest."""
-        stiffness = np.interp(position_m, self._at, self._stiffness * np.exp(offset.stiffness(self._at)))
+        moved = bool(offset.places) or offset.logarithms[0] != 0
+        course = self._stiffness * np.exp(offset.stiffness(self._at)) if moved else self._stiffness
+        stiffness = np.interp(position_m, self._at, course)
         damping = np.interp(position_m, self._at, self._damping)
         velocity, _ = open_belt(
             pairs, torque_n_m, stiffness, damping, rate_hz=self._rate_hz, radius_m=self._radius_m
         )  # fmt: skip
-        return np.array([late(row, self._delay_samples) for row in velocity])
+        return late(velocity, self._delay_samples)

@@ -12,6 +12,7 @@
 
 extern "C" {
 #include "axis.h"
+#include "late.h"
 #include "two_masses.h"
 }
 
@@ -128,6 +129,16 @@ void two_masses(double rate_hz, double radius_m, const Table &pairs, const Line 
                           cart.data());
 }
 
+void late(const Table &rows, double samples, const Out &out)
+{
+    const size_t count = rows.shape(0), ticks = rows.shape(1);
+    if (out.shape(0) != count || out.shape(1) != ticks || ticks == 0)
+        throw nb::value_error("rows and output need the same shape, with a sample or more");
+    nb::gil_scoped_release release;
+    std::vector<double> work((ticks + 2 * LB_LATE_PAD) * LB_LATE_LANES);
+    lb_late(count, ticks, samples, rows.data(), out.data(), work.data());
+}
+
 } // namespace
 
 NB_MODULE(_axis, m)
@@ -139,4 +150,5 @@ NB_MODULE(_axis, m)
         .def("derivative", &Engine::derivative, nb::arg("now"), nb::arg("torque_n_m"), nb::arg("state"));
     m.def("two_masses", &two_masses, nb::arg("rate_hz"), nb::arg("radius_m"), nb::arg("pairs"), nb::arg("stiffness"),
           nb::arg("damping"), nb::arg("torque"), nb::arg("motor"), nb::arg("cart"));
+    m.def("late", &late, nb::arg("rows"), nb::arg("samples"), nb::arg("out"));
 }

@@ -59,8 +59,9 @@ def open_belt(
     motor, cart = np.empty((2, len(pairs), torque.shape[1]))
     two_masses(rate_hz, radius_m, np.array(pairs, dtype=np.float64), stiffness_n_per_m, damping_n_s_per_m, torque,
                motor, cart)  # fmt: skip
-    finite = np.isfinite(motor) & np.isfinite(cart)
-    if not finite.all():
+    # What is not finite remains so until the end.
+    if not (np.isfinite(motor[:, -1:]) & np.isfinite(cart[:, -1:])).all():
+        finite = np.isfinite(motor) & np.isfinite(cart)
         raise SimulationError(
             "diverged",
             "the model diverges under this torque",
