@@ -108,10 +108,11 @@ class RecentWindows(StatefulBase):
 
     def add(self, score: Floats, information: Floats, moment: tuple[float, float, float]) -> None:
         """A window."""
-        for values, value in ((self.score, score), (self.information, information), (self.moment, moment)):
-            values.append(value)
-            if len(values) > 2 * self.rows:  # seldom, since it copies them
-                del values[: -self.rows]
+        self.score.append(score)
+        self.information.append(information)
+        self.moment.append(moment)
+        if len(self.moment) > 2 * self.rows:  # seldom, since it moves them
+            del self.score[: -self.rows], self.information[: -self.rows], self.moment[: -self.rows]
 
     def __len__(self) -> int:
         return min(len(self.moment), self.rows)

@@ -132,7 +132,7 @@ class ModelEvidence:
         return rest, shaft_position(x, y, self._lines.window, self._lines.rate_hz)
 
     def _ripple(self, x: Floats, y: Floats, windows: slice) -> NDArray[np.complex128]:
-        """Spectrum at the lines of the velocity due to each order of 1 N m, without drift, (2·orders, windows, lines)."""
+        """Spectrum at the lines of the velocity by each order of 1 N m, without drift, (2·orders, windows, lines)."""
         window, transform = self._lines.window, wave(self._lines.bins, self._lines.window)
         if not len(self._machine.ripple):
             return np.zeros((0, (windows.stop - windows.start) // window, len(self._lines)), dtype=np.complex128)
