@@ -1,5 +1,7 @@
 #include "late.h"
 
+#include "instruction_sets.h"
+
 #include <math.h>
 
 #define LANES LB_LATE_LANES
@@ -72,7 +74,7 @@ static void interpolate(size_t rows, size_t ticks, double samples, double (*c)[L
     }
 }
 
-void lb_late(size_t rows, size_t ticks, double samples, const double *in, double *out, double *work)
+void LB_FOR_SET(lb_late)(size_t rows, size_t ticks, double samples, const double *in, double *out, double *work)
 {
     double (*c)[LANES] = (double (*)[LANES])work;
     for (size_t first = 0; first < rows; first += LANES) {
