@@ -73,8 +73,8 @@ class Replay:
 
     def _run(self, pairs: list[Pair], torque_n_m: Floats, position_m: Floats, offset: Offset) -> Floats:
         """Velocities of the motor of each pair, rad/s (pairs, samples), from rest."""
-        moved = bool(offset.places) or offset.logarithms[0] != 0
-        course = self._stiffness * np.exp(offset.stiffness(self._at)) if moved else self._stiffness
+        along = offset.stiffness(self._at) if offset.places else offset.logarithms[:1]
+        course = self._stiffness * np.exp(along)
         stiffness = np.interp(position_m, self._at, course)
         damping = np.interp(position_m, self._at, self._damping)
         velocity, _ = open_belt(
