@@ -61,7 +61,7 @@ static void advance(const lb_two_masses_course *course, size_t pairs, const lb_t
         for (size_t i = 0; i < vectors * WIDTH; ++i) now[i] = torque[(i < pairs ? i : 0) * stride + n];
         for (size_t i = 0; i < pairs; ++i) {
             motor[i * course->ticks + n] = x[i / WIDTH].motor[i % WIDTH];
-            cart[i * course->ticks + n] = x[i / WIDTH].cart[i % WIDTH];
+            if (cart) cart[i * course->ticks + n] = x[i / WIDTH].cart[i % WIDTH];
         }
         for (size_t v = 0; v < vectors; ++v) {
             step(&c[v], course->radius_m, seconds, course->stiffness_n_per_m[n], course->damping_n_s_per_m[n],
@@ -75,6 +75,6 @@ void LB_FOR_SET(lb_two_masses_advance)(const lb_two_masses_course *course, size_
 {
     for (size_t first = 0; first < pairs; first += LANES) {
         const size_t here = pairs - first < LANES ? pairs - first : LANES, at = first * course->ticks;
-        advance(course, here, pair + first, torque + first * stride, stride, motor + at, cart + at);
+        advance(course, here, pair + first, torque + first * stride, stride, motor + at, cart ? cart + at : cart);
     }
 }

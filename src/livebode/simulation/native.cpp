@@ -116,7 +116,7 @@ void two_masses(double rate_hz, double radius_m, const Table &pairs, const Line 
     const size_t ticks = stiffness.shape(0), count = pairs.shape(0), torques = torque.shape(0);
     const bool usable = pairs.shape(1) == 4 && damping.shape(0) == ticks && torque.shape(1) == ticks &&
                         (torques == 1 || torques == count) && motor.shape(0) == count && motor.shape(1) == ticks &&
-                        cart.shape(0) == count && cart.shape(1) == ticks;
+                        (cart.shape(0) == count || cart.shape(0) == 0) && cart.shape(1) == ticks;
     if (!usable) throw nb::value_error("shapes of pairs, stiffness, damping, torque and outputs disagree");
     const lb_two_masses_course course{ticks, rate_hz, radius_m, stiffness.data(), damping.data()};
     std::vector<lb_two_masses> pair(count);
@@ -126,7 +126,7 @@ void two_masses(double rate_hz, double radius_m, const Table &pairs, const Line 
     }
     nb::gil_scoped_release release;
     lb_two_masses_advance(&course, count, pair.data(), torque.data(), torques == 1 ? 0 : ticks, motor.data(),
-                          cart.data());
+                          cart.shape(0) ? cart.data() : nullptr);
 }
 
 void late(const Table &rows, double samples, const Out &out)
