@@ -12,6 +12,7 @@ from scipy.ndimage import shift
 from livebode.monitoring.evidence import JUDGED
 from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.model_evidence import ModelEvidence
+from livebode.monitoring.naming import ScoredWindows
 from livebode.monitoring.offset import LocalChange, Offset
 from livebode.monitoring.ripple import Ripple, allowed_for
 from livebode.monitoring.stretches import Stretches, WindowStretch
@@ -108,3 +109,18 @@ def test_a_stretch_has_the_evidence_of_the_definition(
         assert np.array_equal(seen.score, score)
         assert np.array_equal(seen.information, information)
         assert np.array_equal(np.hstack([seen.power, seen.quiet_power]), power)
+
+
+def test_one_active_change_is_allowed_for_as_by_linear_algebra() -> None:
+    machine = ideal()
+    seen = ModelEvidence(machine, LINES).process(stretches()[1], Offset())
+    windows = ScoredWindows(seen.score, seen.information, seen.position_m)
+    for j in range(4):
+        inverse = np.linalg.inv(seen.information[:, [j]][:, :, [j]])
+        gain = seen.information[:, :, [j]] @ inverse
+        score = seen.score - np.einsum("rjk,rk->rj", gain, seen.score[:, [j]])
+        information = seen.information - gain @ seen.information[:, [j]]
+        score[:, j], information[:, j], information[:, :, j] = 0.0, 0.0, 0.0
+        found = windows.without([j])
+        assert np.array_equal(found.score, score)
+        assert np.array_equal(found.information, information)
