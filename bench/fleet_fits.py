@@ -4,8 +4,9 @@
 
 The machine of `bench.axes` (tooth-belt axis in motion, three signals at 4 kHz, 7 lines, 20 responses and two fits a
 second, a baseline with a model of the moving machine) as messages of 500 and 100 ms, taken together every 400 ms as an
-owner does. Processor time of the thread, the least of three rounds; the log is not part of it
-(`python -m bench.fleet_path`).
+owner does. Processor time of the thread, the least of three rounds in which the variants take turns; the log is not
+part of it (`python -m bench.fleet_path`). A fault is found before the measured seconds: an active change is the most
+expensive state of monitoring.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.axes import TARGET_PERCENT, machine
 from livebode.configuration.axis import Axis
@@ -26,6 +28,7 @@ from livebode.fleet.partition import RESULTS_S
 from livebode.fleet.result_message import PendingResults
 from livebode.sources.live import Batch
 
+MONITORING_TARGET_PERCENT = 0.2
 BLOCKS_MS, ROUNDS, SECONDS, WARM_S = (500, 100), 3, 12.0, 9.0
 
 
@@ -84,9 +87,18 @@ def messages_of(every: Block, block_s: float) -> list[bytes]:
     ]
 
 
-def least(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> tuple[float, ...]:
-    """Of several rounds."""
-    return tuple(np.min([owner_cost(axis, messages, block_s, axes) for _ in range(ROUNDS)], axis=0))
+def least(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> dict[str, NDArray[np.float64]]:
+    """Of several rounds: what `owner_cost` returns, of every variant."""
+    rounds = [
+        {name: owner_cost(one, messages, block_s, axes) for name, one in variants(axis).items()} for _ in range(ROUNDS)
+    ]
+    return {name: np.min([one[name] for one in rounds], axis=0) for name in rounds[0]}
+
+
+def verdict(what: str, ms_per_s: float, target_percent: float) -> str:
+    """A share of a core, compared with its target."""
+    met = "met" if ms_per_s / 10 <= target_percent else "missed"
+    return f"  {what}: {ms_per_s / 10:.2f} % of a core an axis, target ≤ {target_percent:g} %: {met}"
 
 
 def main() -> None:
@@ -99,13 +111,15 @@ def main() -> None:
         axis, every = machine(Path(folder))
         for block_ms in BLOCKS_MS:
             messages = messages_of(every, block_ms / 1000)
-            for name, one in variants(axis).items():
-                for axes in sorted({1, asked.axes}):
-                    found = least(one, messages, block_ms / 1000, axes)
-                    print(f"| {block_ms} ms | {axes} | {name} | {found[0]:.2f} | {found[1]:.2f} | {found[2]:.0f} |")
-            percent = (found[0] + found[1]) / 10
-            verdict = "met" if percent <= TARGET_PERCENT else "missed"
-            print(f"{block_ms} ms: {percent:.2f} % of a core an axis, target ≤ {TARGET_PERCENT:g} %: {verdict}")
+            for axes in sorted({1, asked.axes}):
+                found = least(axis, messages, block_ms / 1000, axes)
+                for name, (compute, encode, size) in found.items():
+                    print(f"| {block_ms} ms | {axes} | {name} | {compute:.2f} | {encode:.2f} | {size:.0f} |")
+            tracking, monitored, whole = (compute + encode for compute, encode, _ in found.values())
+            print(f"{block_ms} ms, {asked.axes} axes together")
+            print(f"  tracking: {tracking / 10:.2f} %; fits: {(whole - monitored) / 10:.2f} %")
+            print(verdict("monitoring", monitored - tracking, MONITORING_TARGET_PERCENT))
+            print(verdict("whole", whole, TARGET_PERCENT))
 
 
 if __name__ == "__main__":

@@ -23,8 +23,8 @@ typedef struct {
 } lb_two_masses_course;
 
 /* From rest. torque_n_m: `ticks` values for each pair, one pair after the other, those of the next pair `stride` values
- * further (0: all have the same); motor: rad/s and cart: m/s at the beginning of each tick, `pairs` rows. A pair that
- * diverges has values that are not finite. */
+ * further (0: all have the same); motor: rad/s and cart: m/s at the beginning of each tick, `pairs` rows; cart may be
+ * null. A pair that diverges has values that are not finite. */
 void lb_two_masses_advance(const lb_two_masses_course *course, size_t pairs, const lb_two_masses *pair,
                            const double *torque_n_m, size_t stride, double *motor, double *cart);
 

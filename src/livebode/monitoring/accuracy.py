@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ class ChangeAccuracy:
     scatter: Floats
     smallest: Floats
 
-    @property
+    @cached_property
     def allowed(self) -> Floats:
         """Permitted distance of a healthy machine from the model."""
         return 2 * self.scatter

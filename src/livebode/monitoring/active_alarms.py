@@ -120,7 +120,7 @@ class ActiveAlarms(StatefulBase):
             alarm.score, alarm.information = _MEMORY * alarm.score + s, _MEMORY * alarm.information + i
         ratio = self._size(alarm) * (np.sign(change.amount) * s - self._middle(alarm) * i)
         ratio /= self._machine.held.inflation[j]
-        alarm.height = float(np.clip(alarm.height + ratio, 0.0, self._threshold))
+        alarm.height = min(max(float(alarm.height + ratio), 0.0), self._threshold)
         return alarm.height == 0.0
 
     def _size(self, alarm: Alarm) -> float:

@@ -108,9 +108,14 @@ class RecentWindows(StatefulBase):
 
     def add(self, score: Floats, information: Floats, moment: tuple[float, float, float]) -> None:
         """A window."""
-        self.score = [*self.score[-self.rows + 1 :], score]
-        self.information = [*self.information[-self.rows + 1 :], information]
-        self.moment = [*self.moment[-self.rows + 1 :], moment]
+        self.score.append(score)
+        self.information.append(information)
+        self.moment.append(moment)
+        if len(self.moment) > 2 * self.rows:  # seldom, since it moves them
+            del self.score[: -self.rows], self.information[: -self.rows], self.moment[: -self.rows]
+
+    def __len__(self) -> int:
+        return min(len(self.moment), self.rows)
 
     def segment(self, first: int, offset: Offset) -> ScoredWindows:
         """Windows from position `first` on, which counts from the end, as evidence of changes beyond the offset."""
@@ -119,7 +124,7 @@ class RecentWindows(StatefulBase):
         return ScoredWindows(np.array(self.score[first:]) - information @ offset.logarithms, information, position_m)
 
     def _state(self) -> dict[str, Any]:
-        return {name: np.array(getattr(self, name)) for name in ("score", "information", "moment")}
+        return {name: np.array(getattr(self, name)[-self.rows :]) for name in ("score", "information", "moment")}
 
     def _load(self, state: dict[str, Any]) -> None:
         self.score, self.information = list(state["score"]), list(state["information"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,7 @@ from livebode.core import Stage, StatefulBase
 Floats = NDArray[np.float64]
 
 UP, DOWN = 0, 1
+_NOT_A_NUMBER = "score or information of a judged component is not a number"
 
 
 class Charts(StatefulBase):
@@ -51,18 +54,38 @@ class Charts(StatefulBase):
         self.since = np.full((2, smallest.size), -1)
         """Mark of the step at which each sum last left zero: the beginning of the change, if there is one."""
         self._gain = smallest - allowed
-        self._middle = (smallest + allowed) / 2
+        self._cost = self._gain * ((smallest + allowed) / 2)
 
     def step(self, score: Floats, information: Floats, mark: int, judged: NDArray[np.bool_] | None = None) -> None:
         """Process a step's evidence, shape (components,) each; components that are not `judged` do not change."""
-        ratio = self._gain * np.stack([score, -score]) - self._gain * self._middle * information
+        ratio = np.empty(self.sums.shape)
+        np.multiply(self._gain, score, out=ratio[UP])
+        np.negative(ratio[UP], out=ratio[DOWN])
+        ratio -= self._cost * information
         if judged is not None:
             ratio = np.where(judged, ratio, 0.0)
         if np.isnan(ratio).any():  # NaN would remain in the sums, which would never reach the threshold again
-            raise ValueError("score or information of a judged component is not a number")
-        leaves = (self.sums == 0) & (ratio > 0)
-        self.since[leaves] = mark
-        self.sums = np.clip(self.sums + ratio, 0.0, self.threshold)
+            raise ValueError(_NOT_A_NUMBER)
+        self.since[(self.sums == 0) & (ratio > 0)] = mark
+        sums = self.sums + ratio
+        np.maximum(sums, 0.0, out=sums)
+        self.sums = np.minimum(sums, self.threshold, out=sums)
+
+    def step_one(self, component: int, score: float, information: float, mark: int) -> None:
+        """`step` with the evidence of one component; the others have none."""
+        if not (isfinite(score) and isfinite(information)):
+            raise ValueError(_NOT_A_NUMBER)
+        gained, cost = float(self._gain[component]) * score, float(self._cost[component]) * information
+        for way, ratio in ((UP, gained - cost), (DOWN, -gained - cost)):
+            before = float(self.sums[way, component])
+            if before == 0 and ratio > 0:
+                self.since[way, component] = mark
+            self.sums[way, component] = min(max(before + ratio, 0.0), self.threshold)
+
+    @property
+    def alarmed(self) -> bool:
+        """Whether any has reached the threshold."""
+        return bool(self.sums.max() >= self.threshold)
 
     @property
     def raised(self) -> NDArray[np.bool_]:

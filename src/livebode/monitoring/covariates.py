@@ -73,6 +73,8 @@ def window_means(data: Floats, begin: NDArray[np.int64], window: int) -> Floats:
     >>> window_means(np.array([[1.0, 3.0, np.nan, 5.0, np.nan, np.nan]]), np.array([0, 2, 4]), 2).ravel()
     array([ 2.,  5., nan])
     """
+    if not len(data):
+        return np.zeros((len(begin), 0))
     finite = np.isfinite(data)
     total = np.cumsum(np.pad(np.where(finite, data, 0.0), ((0, 0), (1, 0))), axis=1)
     count = np.cumsum(np.pad(finite, ((0, 0), (1, 0))), axis=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import floor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,8 +66,9 @@ class LearnedMachine:
         return self.model.high_m - self.model.low_m
 
     def cell(self, position_m: float) -> int:
-        """Number of the cell at these positions."""
-        return int(_cell(np.array([position_m]), self.model.low_m, self.model.high_m)[0])
+        """Number of the cell at a position."""
+        share = (position_m - self.model.low_m) / max(self.way_m, _STILL_M)
+        return min(max(floor(share * _CELLS), 0), _CELLS - 1)
 
     def known(self, position_m: Floats) -> NDArray[np.bool_]:
         """Whether enough windows were learned there."""

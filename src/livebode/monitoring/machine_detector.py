@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.core import Event, Stage, StatefulBase
 from livebode.monitoring import evidence as word
@@ -18,6 +19,8 @@ from livebode.monitoring.offset import Offset
 from livebode.monitoring.run_offset import RunOffset
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import changed, cleared, corrected, far_away, offset_unknown, unknown
+
+Floats = NDArray[np.float64]
 
 CHARTS = 2 * len(DIRECTIONS) + 2
 """Charts that take a step with a window: up and down for each direction, and for stiffness in the cart's cell."""
@@ -86,10 +89,10 @@ class MachineDetector(StatefulBase):
     def process(self, seen: Evidence) -> list[Event]:
         """Events of these windows, whose evidence was computed with the present `offset`."""
         events: list[Event] = []
-        for i in range(len(seen)):
-            status = str(seen.status[i])
+        around = seen.score + seen.information @ self.offset.logarithms
+        for i, status in enumerate(seen.status.tolist()):
             if status == word.JUDGED:
-                events += self._window(seen, i)
+                events += self._window(seen, i, around[i])
             elif status not in _STAYS and status not in self._unknown:
                 self._unknown.add(status)
                 events.append(unknown(self._machine, seen, i))
@@ -122,13 +125,14 @@ class MachineDetector(StatefulBase):
         """Whether its amount is relative to the earlier part of this run, not to the baseline."""
         return self._own.within_run(alarm.change.direction)
 
-    def _window(self, seen: Evidence, i: int) -> list[Event]:
+    def _window(self, seen: Evidence, i: int, around: Floats) -> list[Event]:
+        """Events of a judged window; `around` is its score around the baseline."""
         position_m, sample, time_s = float(seen.position_m[i]), int(seen.sample[i]), float(seen.time_s[i])
         self.judged += 1
         known = seen.information[i]
-        around = seen.score[i] + known @ self.offset.logarithms
-        score = around - known @ self._reference.logarithms
-        score, information = (part[0] for part in self._own.judged(score[np.newaxis], known[np.newaxis]))
+        score, information = around - known @ self._reference.logarithms, known
+        if not self._own.known:
+            score, information = (part[0] for part in self._own.judged(score[np.newaxis], known[np.newaxis]))
         gone = self.standing.step(score, information, position_m)
         if gone:
             self._reset()
@@ -146,11 +150,11 @@ class MachineDetector(StatefulBase):
             self._further.step(rest.score[0] / inflation, np.diagonal(rest.information[0]) / inflation, mark)
         else:
             inflation = self._machine.held.inflation
-            score, information = score / inflation, np.diagonal(information) / inflation
+            score, information = score / inflation, information.diagonal() / inflation
             self._first.step(score, information, mark)
-            here = np.arange(len(self._machine.windows)) == self._machine.cell(position_m)
+            here = self._machine.cell(position_m)
             self._passed[here] = mark
-            self._cells.step(here * score[_STIFFNESS], here * information[_STIFFNESS], mark)
+            self._cells.step_one(here, float(score[_STIFFNESS]), float(information[_STIFFNESS]), mark)
         self._look()
         return events
 
@@ -162,8 +166,8 @@ class MachineDetector(StatefulBase):
     def _look(self) -> None:
         """Identify the change that the charts have found, if any."""
         if self._pending < 0:
-            found = [c.since[c.raised] for c in (self._first, self._further, self._cells) if c.raised.any()]
-            if self._own.chart.raised.any():
+            found = [c.since[c.raised] for c in (self._first, self._further, self._cells) if c.alarmed]
+            if self._own.chart.alarmed:
                 self._own.fix()
                 found.append(self._own.chart.since[self._own.chart.raised])
             if not found:
@@ -174,7 +178,7 @@ class MachineDetector(StatefulBase):
             self._name(final=waited >= _LOOK_WINDOWS)
 
     def _name(self, final: bool) -> None:
-        first = max(self._pending - self._taken, -len(self._recent.moment))
+        first = max(self._pending - self._taken, -len(self._recent))
         moments, standing = self._recent.moment[first:], self.standing.directions
         beyond = self._recent.segment(first, self._reference)
         segment = self._own.segment(beyond).without(standing)

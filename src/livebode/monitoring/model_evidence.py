@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ _OWN = len(DIRECTIONS)
 _LEVEL_MEMORY = 0.9  # per window, of the noise's level
 _LEVEL_RISE_MAX = 4.0
 _UNINFORMED = 1e-6  # of the information for a smallest change at one standard deviation: no run is long enough for that
+_STATUS = f"<U{len(word.NO_COVARIATE)}"  # the longest one
 _DISTURBED = 20.0  # the mean of six detection lines exceeds its own level by this factor once in 1e40 windows
 
 
@@ -65,24 +67,24 @@ class ModelEvidence:
         offset, rest_of_shift = self._shifted(offset, covariate)
         velocity, slopes = self._replay(u, x, offset)
         rest = y - without_drift(velocity, y, lines.window)
-        cut = begin[:, np.newaxis] + np.arange(lines.window)
-        unexplained = rest[cut] @ wave((*lines.bins, *lines.quiet), lines.window)
-        slope = slopes[:, cut] @ wave(lines.bins, lines.window)
+        windows = slice(begin[0], begin[-1] + lines.window)
+        unexplained = rest[windows].reshape(-1, lines.window) @ wave((*lines.bins, *lines.quiet), lines.window)
+        slope = slopes[:, windows].reshape(len(slopes), -1, lines.window) @ wave(lines.bins, lines.window)
         power = unexplained.real**2 + unexplained.imag**2
         quiet = power[:, len(lines) :]
         centre, speed, status = self._way(x, begin, stretch, bad, covariate)
         level = self._levels(quiet, status)
         weight = 2 / (machine.noise_power * level[:, np.newaxis])
         e = unexplained[:, : len(lines)]
-        known = np.einsum("jwl,kwl,wl->wjk", slope.conj(), slope, weight).real
-        ripple = self._ripple(x, y)[:, cut] @ wave(lines.bins, lines.window)
+        conjugate = slope.conj()
+        score = np.einsum("jwl,wl,wl->wj", conjugate, e, weight).real
+        information = np.einsum("jwl,kwl,wl->wjk", conjugate, slope, weight).real
+        ripple = self._ripple(x, y, windows)
         ripple_score = np.einsum("owl,wl,wl->wo", ripple.conj(), e, weight).real
         gram = np.einsum("owl,pwl,wl->wop", ripple.conj(), ripple, weight).real
-        cross = np.einsum("jwl,owl,wl->wjo", slope.conj(), ripple, weight).real
-        score, information = allowed_for(
-            np.einsum("jwl,wl,wl->wj", slope.conj(), e, weight).real,
-            known, ripple_score, cross, gram, machine.ripple.spread,
-        )  # fmt: skip
+        if len(ripple):
+            cross = np.einsum("jwl,owl,wl->wjo", conjugate, ripple, weight).real
+            score, information = allowed_for(score, information, ripple_score, cross, gram, machine.ripple.spread)
         score = score - np.einsum("wjk,wk->wj", information[:, :, :_OWN], rest_of_shift)
         in_smallest = np.einsum("wjj->wj", information[:, :_OWN, :_OWN]) * machine.held.smallest**2
         status[(status == word.JUDGED) & (in_smallest.max(axis=1) < _UNINFORMED)] = word.UNEXCITED
@@ -129,14 +131,16 @@ class ModelEvidence:
         rest = y - without_drift(self._replay.plain(u, x, offset), y, self._lines.window)
         return rest, shaft_position(x, y, self._lines.window, self._lines.rate_hz)
 
-    def _ripple(self, x: Floats, y: Floats) -> Floats:
-        """Velocity due to each order of 1 N m, without slow drift, (2·orders, samples)."""
+    def _ripple(self, x: Floats, y: Floats, windows: slice) -> NDArray[np.complex128]:
+        """Spectrum at the lines of the velocity by each order of 1 N m, without drift, (2·orders, windows, lines)."""
+        window, transform = self._lines.window, wave(self._lines.bins, self._lines.window)
         if not len(self._machine.ripple):
-            return np.zeros((0, x.size))
-        shaft_m = shaft_position(x, y, self._lines.window, self._lines.rate_hz)
+            return np.zeros((0, (windows.stop - windows.start) // window, len(self._lines)), dtype=np.complex128)
+        shaft_m = shaft_position(x, y, window, self._lines.rate_hz)
         velocity = self._replay.ripple(self._machine.ripple.cycles_per_m, x, shaft_m)
         still = np.zeros(x.size)
-        return np.array([without_drift(row, still, self._lines.window) for row in velocity])
+        rows = np.array([without_drift(row, still, window) for row in velocity])
+        return np.asarray(rows[:, windows].reshape(len(rows), -1, window) @ transform)
 
     def _way(
         self, x: Floats, begin: NDArray[np.int64], stretch: WindowStretch, bad: NDArray[np.bool_], covariate: Floats
@@ -144,10 +148,10 @@ class ModelEvidence:
         """Position and speed at the windows' centres, and which windows are judged."""
         window, machine = self._lines.window, self._machine
         centre, speed, even = way(x, begin, window, self._lines.rate_hz)
-        count = np.concatenate([[0], np.cumsum(bad)])
-        since = (begin + stretch.start - stretch.settled < 0) | (
-            count[begin + window] > count[(begin - round(LEAD_S * self._lines.rate_hz)).clip(0)]
-        )
+        since = begin + stretch.start - stretch.settled < 0
+        if bad.any():
+            count = np.concatenate([[0], np.cumsum(bad)])
+            since |= count[begin + window] > count[(begin - round(LEAD_S * self._lines.rate_hz)).clip(0)]
         reasons = {
             word.DISTURBED: since,
             word.SLOW: np.abs(speed) < (1 - _SPEED_MARGIN) * machine.slowest_m_per_s,
@@ -157,7 +161,10 @@ class ModelEvidence:
             word.NO_COVARIATE: ~np.isfinite(covariate).all(axis=1),
             word.COVARIATE: ~machine.covariates.known(covariate),
         }
-        return centre, speed, np.select(list(reasons.values()), list(reasons), word.JUDGED)
+        status = np.full(len(begin), word.JUDGED, dtype=_STATUS)
+        for reason, here in reversed(reasons.items()):  # the first that applies remains
+            status[here] = reason
+        return centre, speed, status
 
     def _levels(self, quiet: Floats, status: NDArray[np.str_]) -> Floats:
         """Ratio of the noise to the learned one at each window, at least 1; marks disturbed windows."""
@@ -187,9 +194,12 @@ def held(data: Floats, bad: NDArray[np.bool_]) -> Floats:
     return np.where(last >= 0, data[:, last.clip(0)], 0.0)
 
 
+@lru_cache(maxsize=8)  # every axis of a process has the same few
 def wave(bins: tuple[int, ...], window: int) -> NDArray[np.complex128]:
-    """From a window's samples to its spectrum at these bins, shape (window, bins)."""
-    return np.asarray(np.exp(-2j * np.pi * np.outer(np.arange(window), bins) / window))
+    """From a window's samples to its spectrum at these bins, shape (window, bins); not writable."""
+    found = np.asarray(np.exp(-2j * np.pi * np.outer(np.arange(window), bins) / window))
+    found.flags.writeable = False
+    return found
 
 
 def way(x: Floats, begin: NDArray[np.int64], window: int, rate_hz: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:

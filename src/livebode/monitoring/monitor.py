@@ -107,12 +107,13 @@ class Monitor(StatefulBase):
     def process_responses(self, responses: Responses, parameters: Parameters | None = None) -> list[Event]:
         """Events of these responses and parameters: those of the tables, where there is no model."""
         events: list[Event] = []
-        if "lines" in self._tables and len(responses):
+        if "lines" in self._tables and self._apart["lines"].takes(responses.sample):
             events += self._tables["lines"].process(self._apart["lines"].of_responses(responses))
-        if "parameters" in self._tables and parameters is not None and len(parameters):
-            events += self._tables["parameters"].process(
-                self._apart["parameters"].of_parameters(parameters.only(self.parameters))
-            )
+        if parameters is None or "parameters" not in self._tables:
+            return self._counted(events)
+        if self._apart["parameters"].takes(parameters.sample):
+            rows = self._apart["parameters"].of_parameters(parameters.only(self.parameters))
+            events += self._tables["parameters"].process(rows)
         return self._counted(events)
 
     def finish(self) -> list[Event]:

@@ -62,10 +62,16 @@ class ScoredWindows:
         """The same with changes of any size in these directions allowed for."""
         if not known:
             return self
-        inverse = np.linalg.inv(self.information[:, known][:, :, known])
-        gain = self.information[:, :, known] @ inverse
-        score = self.score - np.einsum("rjk,rk->rj", gain, self.score[:, known])
-        information = self.information - gain @ self.information[:, known]
+        if len(known) == 1:  # the usual case, without small linear algebra
+            (j,) = known
+            own = self.information[:, :, j] * (1 / self.information[:, j, j])[:, np.newaxis]
+            score = self.score - own * self.score[:, j, np.newaxis]
+            information = self.information - own[:, :, np.newaxis] * self.information[:, np.newaxis, j]
+        else:
+            inverse = np.linalg.inv(self.information[:, known][:, :, known])
+            gain = self.information[:, :, known] @ inverse
+            score = self.score - np.einsum("rjk,rk->rj", gain, self.score[:, known])
+            information = self.information - gain @ self.information[:, known]
         for i in known:
             score[:, i], information[:, i], information[:, :, i] = 0.0, 0.0, 0.0
         return ScoredWindows(score, information, self.position_m)

@@ -83,6 +83,10 @@ class NonOverlappingWindows(StatefulBase):
             parameters.sample[use], parameters.ok[use],
         )  # fmt: skip
 
+    def takes(self, sample: NDArray[np.int64]) -> bool:
+        """Whether any of these is a row; most batches of a live run have none."""
+        return bool(((sample + 1) % self._apart == self._place).any())
+
     def _chosen(self, sample: NDArray[np.int64]) -> NDArray[np.intp]:
         return np.flatnonzero((sample + 1) % self._apart == self._place)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,15 +87,21 @@ class ScheduleTable:
         with np.errstate(invalid="ignore", divide="ignore"):
             relative = rows.value / mean - 1
             more = np.maximum(rows.variance / np.abs(mean) ** 2 - learned, 0.0)
-        own = np.einsum("...ii->...i", self.covariance).reshape(cells, -1)[cell]
         if self.what == "lines":
             deviation = np.stack([relative.real, relative.imag], axis=2).reshape(len(rows), 2 * mean.shape[1])
             more = np.repeat(more / 2, 2, axis=1)
         else:
             deviation = relative.real
-        count = self.count.ravel()[cell][:, np.newaxis]
+        own = np.where(np.isfinite(deviation + more), self._weighed[cell], np.inf)
+        return deviation, own, np.nan_to_num(more)
+
+    @cached_property
+    def _weighed(self) -> Floats:
+        """Learned variance of a row in each cell, infinite where its mean is less accurate than the smallest change."""
+        count = self.count.reshape(-1, 1)
+        own = np.einsum("...ii->...i", self.covariance).reshape(count.size, -1)
         unknown = KNOWN**2 * own / np.maximum(count, 1) > self.accuracy.smallest**2
-        return deviation, np.where(unknown | ~np.isfinite(deviation + more), np.inf, own), np.nan_to_num(more)
+        return np.where(unknown, np.inf, own)
 
 
 def cells(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from livebode.core import Event, Stage, StatefulBase
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
+from livebode.monitoring.newest_rows import NewestRows
 from livebode.monitoring.noise_level import NoiseLevel
 from livebode.monitoring.rows import WindowRows
 from livebode.monitoring.table import ScheduleTable
@@ -54,16 +55,17 @@ class TableMonitor(StatefulBase):
         self._seen_in = np.zeros(table.count.size, dtype=bool)
         self._found = -1
         self._newest = np.full(size, np.nan)
-        self._forget()
+        # Since a sum left zero, of every row: score, information, and schedule, sample, time and cell.
+        self._score, self._information = NewestRows(size, _KEPT), NewestRows(size, _KEPT)
+        self._moment = NewestRows(4, _KEPT)
 
     def newest(self, component: int) -> float:
         """Relative deviation of a component in the newest judged row; NaN before the first one."""
         return float(self._newest[component])
 
     def _forget(self) -> None:
-        size = self._table.accuracy.smallest.size
-        self._score, self._information = np.zeros((0, size)), np.zeros((0, size))
-        self._moment = np.zeros((0, 4))
+        for rows in self._rows().values():
+            rows.clear()
 
     @property
     def standing(self) -> bool:
@@ -93,7 +95,7 @@ class TableMonitor(StatefulBase):
 
     def finish(self) -> list[Event]:
         """An alarm that is not reported yet."""
-        if self._found < 0 or not len(self._moment):
+        if self._found < 0 or not len(self._moment.array):
             return []
         return self._changes()
 
@@ -108,22 +110,23 @@ class TableMonitor(StatefulBase):
             self._standing[:] = False
             self._charts.reset()
             return [cleared(self._table, moment[1], moment[2])]
-        if self._found < 0 and not np.any(self._charts.sums > 0):
+        if self._found < 0 and not self._charts.sums.any():
             self._forget()
             return []
-        self._score = np.vstack([self._score, score])[-_KEPT:]
-        self._information = np.vstack([self._information, information])[-_KEPT:]
-        self._moment = np.vstack([self._moment, moment])[-_KEPT:]
-        if self._found < 0 and self._charts.raised.any():
+        self._score.append(score)
+        self._information.append(information)
+        self._moment.append(moment)
+        if self._found < 0 and self._charts.alarmed:
             self._found = self.judged
         return self._changes() if 0 <= self._found <= self.judged - _LOOK_WINDOWS else []
 
     def _changes(self) -> list[Event]:
         raised = self._charts.sums >= self._charts.threshold
-        first = _began(self._score, self._information, np.asarray(raised.any(axis=0)))
+        scores, informations, moments = self._score.array, self._information.array, self._moment.array
+        first = _began(scores, informations, np.asarray(raised.any(axis=0)))
         # The window in which the change occurs contains a part of it; the amount is from the windows after it.
-        whole = min(first + 1, len(self._moment) - 1)
-        score, information = self._score[whole:].sum(axis=0), self._information[whole:].sum(axis=0)
+        whole = min(first + 1, len(moments) - 1)
+        score, information = scores[whole:].sum(axis=0), informations[whole:].sum(axis=0)
         accuracy = self._table.accuracy
         seen = information > 0
         amount = np.where(seen, score / np.where(seen, information, 1.0), 0.0)
@@ -133,7 +136,7 @@ class TableMonitor(StatefulBase):
         if not changed.any():  # the sum that raised it decreased again before the report
             self._forget()
             return []
-        moment = self._moment[first:]
+        moment = moments[first:]
         self._seen_in[:] = False
         self._seen_in[moment[:, 3].astype(int)] = True
         event = differs(self._table, changed, amount, _CONFIDENCE * sigma, moment)
@@ -144,12 +147,15 @@ class TableMonitor(StatefulBase):
         return [event]
 
     def _state(self) -> dict[str, Any]:
-        rows = {"score": self._score, "information": self._information, "moment": self._moment}
-        return super()._state() | rows
+        return super()._state() | {name: rows.array for name, rows in self._rows().items()}
 
     def _load(self, state: dict[str, Any]) -> None:
         super()._load(state)
-        self._score, self._information, self._moment = state["score"], state["information"], state["moment"]
+        for name, rows in self._rows().items():
+            rows.fill(state[name])
+
+    def _rows(self) -> dict[str, NewestRows]:
+        return {"score": self._score, "information": self._information, "moment": self._moment}
 
 
 def _began(score: Floats, information: Floats, raised: NDArray[np.bool_]) -> int:

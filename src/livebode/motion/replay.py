@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import shift
 
 from livebode.core import SimulationError
 from livebode.motion.model import MovingModel
 from livebode.simulation._axis import Engine
+from livebode.simulation._axis import late as _late
 from livebode.simulation.configuration import BeltAxis, engine_settings
 from livebode.simulation.mechanics import Mechanics
 from livebode.simulation.motion import Standstill
@@ -62,10 +62,16 @@ def by_excitation(model: MovingModel, drive: Drive, w: Floats, position_m: Float
 
 
 def late(velocity: Floats, samples: float) -> Floats:
-    """The same by so many samples, whole or not, later: a cubic spline, exact to 1e-5 at a tenth of the rate."""
+    """The same by so many samples, whole or not, later: a cubic spline, exact to 1e-5 at a tenth of the rate.
+
+    Shape (samples,) or (rows, samples), finite, at least one sample; beyond the ends they continue constant. The bits
+    are those of SciPy's `ndimage.shift` with its mode "nearest", and do not depend on the other rows.
+    """
     if samples == 0:
         return velocity
-    return np.asarray(shift(velocity, samples, order=3, mode="nearest"))
+    shifted = np.empty(velocity.shape)
+    _late(np.atleast_2d(velocity), samples, np.atleast_2d(shifted))
+    return shifted
 
 
 def without_drift(model: Floats, measured: Floats, window: int) -> Floats:
@@ -74,11 +80,13 @@ def without_drift(model: Floats, measured: Floats, window: int) -> Floats:
     A boxcar of N samples is zero at every line, and two in series, centred, leave a constant and a ramp unchanged.
     At the ends the last value is repeated.
     """
-    slow = measured - model
+    slow, padded = measured - model, np.empty(model.size + window)
     for early in (window // 2, (window - 1) // 2):
-        padded = np.pad(slow, (early + 1, window - 1 - early), mode="edge")
-        total = np.cumsum(padded - padded.mean())
-        slow = (total[window:] - total[:-window]) / window + padded.mean()
+        padded[: early + 1], padded[early + 1 : early + 1 + model.size] = slow[0], slow
+        padded[early + 1 + model.size :] = slow[-1]
+        mean = padded.mean()
+        total = np.cumsum(padded - mean)
+        slow = (total[window:] - total[:-window]) / window + mean
     return np.asarray(model + slow)
 
 

@@ -110,7 +110,8 @@ class ChangeDetection:
         self._alarms = state["alarms"]
 
     def _listed(self, events: list[Event]) -> list[Event]:
-        self._alarms = [*self._alarms, *(e.message for e in events if e.kind in _ALARMS)][:_ALARMS_MAX]
+        if events:
+            self._alarms = [*self._alarms, *(e.message for e in events if e.kind in _ALARMS)][:_ALARMS_MAX]
         return events
 
 

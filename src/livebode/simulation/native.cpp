@@ -12,6 +12,7 @@
 
 extern "C" {
 #include "axis.h"
+#include "late.h"
 #include "two_masses.h"
 }
 
@@ -117,7 +118,7 @@ void two_masses(double rate_hz, double radius_m, const Table &pairs, const Line 
     const size_t ticks = stiffness.shape(0), count = pairs.shape(0), torques = torque.shape(0);
     const bool usable = pairs.shape(1) == 4 && damping.shape(0) == ticks && torque.shape(1) == ticks &&
                         (torques == 1 || torques == count) && motor.shape(0) == count && motor.shape(1) == ticks &&
-                        cart.shape(0) == count && cart.shape(1) == ticks;
+                        (cart.shape(0) == count || cart.shape(0) == 0) && cart.shape(1) == ticks;
     if (!usable) throw nb::value_error("shapes of pairs, stiffness, damping, torque and outputs disagree");
     const lb_two_masses_course course{ticks, rate_hz, radius_m, stiffness.data(), damping.data()};
     std::vector<lb_two_masses> pair(count);
@@ -127,7 +128,17 @@ void two_masses(double rate_hz, double radius_m, const Table &pairs, const Line 
     }
     nb::gil_scoped_release release;
     lb_two_masses_advance(&course, count, pair.data(), torque.data(), torques == 1 ? 0 : ticks, motor.data(),
-                          cart.data());
+                          cart.shape(0) ? cart.data() : nullptr);
+}
+
+void late(const Table &rows, double samples, const Out &out)
+{
+    const size_t count = rows.shape(0), ticks = rows.shape(1);
+    if (out.shape(0) != count || out.shape(1) != ticks || ticks == 0)
+        throw nb::value_error("rows and output need the same shape, with a sample or more");
+    nb::gil_scoped_release release;
+    std::vector<double> work((ticks + 2 * LB_LATE_PAD) * LB_LATE_LANES);
+    lb_late(count, ticks, samples, rows.data(), out.data(), work.data());
 }
 
 } // namespace
@@ -141,4 +152,5 @@ NB_MODULE(_axis, m)
         .def("derivative", &Engine::derivative, nb::arg("now"), nb::arg("torque_n_m"), nb::arg("state"));
     m.def("two_masses", &two_masses, nb::arg("rate_hz"), nb::arg("radius_m"), nb::arg("pairs"), nb::arg("stiffness"),
           nb::arg("damping"), nb::arg("torque"), nb::arg("motor"), nb::arg("cart"));
+    m.def("late", &late, nb::arg("rows"), nb::arg("samples"), nb::arg("out"));
 }

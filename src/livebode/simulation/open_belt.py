@@ -30,6 +30,7 @@ def open_belt(
     *,
     rate_hz: float,
     radius_m: float,
+    carts: bool = True,
 ) -> tuple[Floats, Floats]:
     """Velocities of motors (rad/s) and carts (m/s), shape (pairs, samples) each, from rest.
 
@@ -42,6 +43,8 @@ def open_belt(
         Shape (samples,) for all pairs, or (pairs, samples).
     stiffness_n_per_m, damping_n_s_per_m
         Of the belt at each sample, shape (samples,).
+    carts
+        Whether the velocities of the carts are returned; if not, they have no rows.
 
     Raises
     ------
@@ -56,11 +59,12 @@ def open_belt(
     array([[0.   , 0.083, 0.166, 0.247]])
     """
     torque = np.atleast_2d(torque_n_m)
-    motor, cart = np.empty((2, len(pairs), torque.shape[1]))
+    motor, cart = (np.empty((rows, torque.shape[1])) for rows in (len(pairs), len(pairs) if carts else 0))
     two_masses(rate_hz, radius_m, np.array(pairs, dtype=np.float64), stiffness_n_per_m, damping_n_s_per_m, torque,
                motor, cart)  # fmt: skip
-    finite = np.isfinite(motor) & np.isfinite(cart)
-    if not finite.all():
+    # What is not finite remains so until the end.
+    if not (np.isfinite(motor[:, -1:]).all() and np.isfinite(cart[:, -1:]).all()):
+        finite = np.isfinite(np.vstack([motor, cart]))
         raise SimulationError(
             "diverged",
             "the model diverges under this torque",
