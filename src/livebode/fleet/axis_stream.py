@@ -14,6 +14,7 @@ from livebode.configuration.axis import Axis
 from livebode.configuration.recipe import recipe_id
 from livebode.core import Block, Event, LivebodeError, Parameters, Responses, SourceError
 from livebode.core.state import Stage, StatefulBase, restore_parts
+from livebode.estimation.spectra_tracker import NewestSpectra, SpectraTracker
 from livebode.fleet.event_limits import EventLimits
 from livebode.fleet.main_quantity import MainQuantity, main_quantity, newest_of
 from livebode.fleet.message import read_message
@@ -24,7 +25,9 @@ from livebode.runtime.fits_together import Fitted, process_together
 from livebode.runtime.pipeline import Pipeline
 from livebode.sources.live import LiveBlock, Sequencer
 from livebode.sources.live.joined import joined
+from livebode.sources.live.next_spectrum import NextSpectrum
 from livebode.sources.live.source_events import SourceEvents
+from livebode.sources.live.spectra_frame import read_rows
 
 RESPONSE_BYTES = 130
 """Of a response at a line, in a message of results."""
@@ -84,6 +87,35 @@ class _Taken(NamedTuple):
     size_bytes: int
 
 
+class PendingSpectrum(NamedTuple):
+    """A message with one whole spectrum that follows the one before it, taken but not read.
+
+    Its place in the log and the log's time, the sender's number of its first sample and ours, and the sample and time
+    after it.
+    """
+
+    message: bytes
+    position: int
+    log_s: float
+    first_sample: int
+    number: int
+    end: tuple[int, float]
+
+
+class UsualSpectra(NamedTuple):
+    """How the usual messages of an axis are recognised, and what tracks them with those of other axes.
+
+    `size_bytes` is the most that one adds to a message of results. Axes with an equal `kind` are tracked together.
+    `results_only`: nothing is fitted to the responses and nothing monitors them.
+    """
+
+    next: NextSpectrum
+    tracker: SpectraTracker
+    size_bytes: int
+    kind: tuple[object, float, bool, bool]
+    results_only: bool
+
+
 class AxisStream(StatefulBase):
     """Turns the messages of an axis into responses, depending on nothing but these messages.
 
@@ -127,6 +159,9 @@ class AxisStream(StatefulBase):
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
         self._pipeline: Pipeline | None = None
         self._taken: list[_Taken] = []
+        self.usual: UsualSpectra | None = None
+        self.spectrum: PendingSpectrum | None = None
+        """The only message taken since the last output, if it is a usual one."""
         self._responses: list[Responses] = []
         self._tracked_events: list[Event] = []
 
@@ -149,21 +184,83 @@ class AxisStream(StatefulBase):
         if self.failure:
             return 0
         before, new = self._events.pending, self._pipeline is None
+        spectrum = self._usual_spectrum(message)
+        if spectrum is not None and self.usual is not None and not (self._taken or self.spectrum):
+            self.spectrum = spectrum
+            return self.usual.size_bytes + _EVENT_BYTES * (self._events.pending - before)
         try:
             if self._refusal is not None:
                 raise self._refusal
-            blocks = self._blocks(message)
+            self._read_spectrum()
+            blocks = self._blocks(message) if spectrum is None else [self._block(spectrum)]
             size = self._output_bytes_max(blocks) if blocks else 0
         except Exception as error:  # a fault of one axis must not stop the others of its partition
             self._track()
             self._fail(error)
             return _EVENT_BYTES
-        if self._taken and self._taken[-1].size_bytes + size <= _OUTPUT_BYTES_MAX:
-            blocks, size = self._taken[-1].blocks + blocks, self._taken.pop().size_bytes + size
-        self._taken.append(_Taken(position, self._events.position, blocks, size))
+        if spectrum is None:
+            self.usual = self._usual_after(message, blocks, size)
+        self._take_blocks(position, self._events.position, blocks, size)
         if new:  # what a follower refuses, it refuses at its first message, without those after it
             self._track()
         return min(size, _OUTPUT_BYTES_MAX) + _EVENT_BYTES * (self._events.pending - before)
+
+    def _take_blocks(self, position: int, end: tuple[int, float], blocks: list[LiveBlock], size_bytes: int) -> None:
+        if self._taken and self._taken[-1].size_bytes + size_bytes <= _OUTPUT_BYTES_MAX:
+            before = self._taken.pop()
+            blocks, size_bytes = before.blocks + blocks, before.size_bytes + size_bytes
+        self._taken.append(_Taken(position, end, blocks, size_bytes))
+
+    def _usual_spectrum(self, message: bytes) -> PendingSpectrum | None:
+        """What is in a usual message, which the sequencer then has; None for another one, and nothing has changed."""
+        if self.usual is None:
+            return None
+        about = self.usual.next
+        found = about.found(message)
+        if found is None:
+            return None
+        first, stamp_s = found
+        number = self._sequencer.passed(first, about.layout.hop, about.rate_hz, stamp_s, self.log_s)
+        if number is None:
+            return None
+        return PendingSpectrum(message, self.position, self.log_s, first, number, self._events.position)
+
+    def _usual_after(self, message: bytes, blocks: list[LiveBlock], size_bytes: int) -> UsualSpectra | None:
+        """How the next messages are recognised, if this one gave the Block, and nothing follows the tracker."""
+        pipeline, spectra = self._pipeline, self._sequencer.schema.spectra
+        if pipeline is None or spectra is None or len(blocks) != 1 or len(blocks[0]) != 1:
+            return None
+        tracker, own = pipeline.follower, blocks[0].origin
+        if not isinstance(tracker, SpectraTracker) or pipeline.readiness is not None or own is None:
+            return None
+        following = NextSpectrum(message, spectra)
+        found, first = following.found(message), blocks[0].start + own.offset
+        if found is None or found.first_sample != first or not self._sequencer.is_idle or tracker.kind is None:
+            return None
+        unused = pipeline.fits is None and (pipeline.detection is None or pipeline.detection.baseline is None)
+        kind = tracker.kind, following.rate_hz, following.double, unused
+        usual = UsualSpectra(following, tracker, size_bytes, kind, results_only=unused)
+        return usual if size_bytes <= _OUTPUT_BYTES_MAX else None
+
+    def _read_spectrum(self) -> None:
+        """Take a usual message as any other: more follow it, or it is not tracked with those of other axes."""
+        spectrum, self.spectrum = self.spectrum, None
+        if spectrum is not None and self.usual is not None:
+            self._take_blocks(spectrum.position, spectrum.end, [self._block(spectrum)], self.usual.size_bytes)
+
+    def _block(self, spectrum: PendingSpectrum) -> LiveBlock:
+        batch = read_message(spectrum.message, spectrum.log_s).with_kinds(self._axis.source.kinds)
+        return batch.block(spectrum.number, spectrum.first_sample, False)
+
+    def tracked_with_others(self, responses: Responses | None) -> UnfittedOutput:
+        """As `tracked`, of the pending spectrum, which is tracked already; `responses` has a row where that is used."""
+        self.spectrum = None
+        number = self.responses
+        self.responses += 1
+        events, self._tracked_events = self._tracked_events, []
+        if self._events.pending:
+            events = events + self._events.take()
+        return UnfittedOutput(number, responses, self._to_fit(responses), events)
 
     def output(self) -> Output:
         """The responses, fits and events of all messages taken since the last call."""
@@ -257,6 +354,7 @@ class AxisStream(StatefulBase):
         return (samples // settings.step + len(blocks) + 1) * len(settings.lines) * RESPONSE_BYTES
 
     def _track(self) -> None:
+        self._read_spectrum()
         taken, self._taken = self._taken, []
         for part in taken:
             found: list[Responses] = []
@@ -304,7 +402,8 @@ class AxisStream(StatefulBase):
         return self.recipe
 
     def _state(self) -> dict[str, Any]:
-        assert not self._taken, "a snapshot between take and output would lack samples"
+        pending = self._taken or self.spectrum
+        assert not pending, "a snapshot between take and output would lack samples"
         parts = {} if self._pipeline is None else {name: part.snapshot() for name, part in self._pipeline.parts.items()}
         own = {"sequencer": self._sequencer.snapshot(), "source_events": self._events.rates, "stages": list(parts)}
         return super()._state() | own | parts
@@ -313,7 +412,7 @@ class AxisStream(StatefulBase):
         super()._load(state)
         self._events.continue_at(state["source_events"])
         self._sequencer.restore(state["sequencer"])
-        self._pipeline, self.main = None, None
+        self._pipeline, self.main, self.usual = None, None, None
         if state["stages"]:
             rate_hz = self._sequencer.schema.rate_hz
             assert rate_hz is not None
@@ -321,9 +420,75 @@ class AxisStream(StatefulBase):
             restore_parts(self._pipeline.parts, {name: state[name] for name in self._pipeline.parts})
 
 
+class StackedRows(NamedTuple):
+    """A response of each of several streams: places among the streams, numbers of the responses, and a row for each."""
+
+    at: list[int]
+    numbers: list[int]
+    responses: Responses
+
+
 def outputs_together(streams: Sequence[AxisStream]) -> list[Output]:
-    """The output of each stream; the fits of all axes are one computation, in which none depends on the others."""
-    tracked = [stream.tracked() for stream in streams]
+    """The output of each stream, of what it took; what they have in common is computed once, and none depends on
+    another."""
+    stacks, outputs = stacked_together(streams)
+    for stack in stacks:
+        for row, (i, number) in enumerate(zip(stack.at, stack.numbers)):
+            events = outputs[i].events if i in outputs else []
+            outputs[i] = Output(number, stack.responses[row : row + 1], _NO_ROWS, (), events)
+    return [outputs[i] for i in range(len(streams))]
+
+
+def stacked_together(streams: Sequence[AxisStream]) -> tuple[list[StackedRows], dict[int, Output]]:
+    """The same: responses of axes that are alike in one piece, and the outputs of all others by their places.
+
+    An axis of the first kind is also among the others if it has events.
+    """
+    stacks: list[StackedRows] = []
+    tracked: dict[int, UnfittedOutput] = {}
+    alike: dict[object, list[int]] = {}
+    for i, stream in enumerate(streams):
+        if stream.spectrum is not None and stream.usual is not None:
+            alike.setdefault(stream.usual.kind, []).append(i)
+    for members in alike.values():
+        responses, taken = _spectra_together([streams[i] for i in members])
+        if responses is None:
+            continue
+        at, numbers = [i for i, one in zip(members, taken) if one], []
+        usual = streams[at[0]].usual
+        results_only = usual is not None and usual.results_only
+        for row, i in enumerate(at):
+            output = streams[i].tracked_with_others(None if results_only else responses[row : row + 1])
+            numbers.append(output.number)
+            if output.events or not results_only:
+                tracked[i] = output
+        if results_only:
+            stacks.append(StackedRows(at, numbers, responses))
+    done = {i for stack in stacks for i in stack.at}
+    tracked |= {i: stream.tracked() for i, stream in enumerate(streams) if i not in done and i not in tracked}
+    return stacks, dict(zip(tracked, _fitted_together([streams[i] for i in tracked], [*tracked.values()])))
+
+
+def _spectra_together(streams: Sequence[AxisStream]) -> tuple[Responses | None, list[bool]]:
+    """Responses of the pending spectra, and which of the streams have one; the others have to be tracked alone."""
+    pending = [(stream.usual, stream.spectrum) for stream in streams if stream.usual and stream.spectrum]
+    about = pending[0][0].next
+    layout, double = about.layout, about.double
+    try:
+        payload = b"".join([spectrum.message[usual.next.payload] for usual, spectrum in pending])
+        sums, values, _ = read_rows(payload, layout, double=double)
+        number = np.array([spectrum.number for _, spectrum in pending], dtype=np.int64)
+        place = (np.array([spectrum.first_sample for _, spectrum in pending]) + layout.hop) % layout.window
+        spectra = NewestSpectra(sums, values, number, place, layout.channels, about.rate_hz)
+        responses, taken = SpectraTracker.process_each([usual.tracker for usual, _ in pending], spectra)
+    except Exception:  # which of them it is shows only alone
+        _logger.exception("internal error while %d axes are tracked together", len(streams))
+        return None, [False] * len(streams)
+    return responses, taken.tolist()
+
+
+def _fitted_together(streams: Sequence[AxisStream], tracked: Sequence[UnfittedOutput]) -> list[Output]:
+    """What these become; the fits of all axes are one computation."""
     at = [i for i, one in enumerate(tracked) if len(one.to_fit)]
     fits, batches = [], []
     for i in at:

@@ -15,8 +15,10 @@ from livebode.kernel._lines import (
     LineRows,
     LineSettings,
     LineWindows,
+    NewestWindows,
     WeightSums,
     add_windows,
+    process_each,
     process_lines,
 )
 from livebode.kernel._sliding import SlidingDFT
@@ -32,10 +34,12 @@ __all__ = [
     "LineRows",
     "LineSettings",
     "LineWindows",
+    "NewestWindows",
     "SlidingDFT",
     "WeightSums",
     "add_windows",
     "instruction_set",
     "instruction_sets",
+    "process_each",
     "process_lines",
 ]

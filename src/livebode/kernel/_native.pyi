@@ -20,6 +20,16 @@ def add_windows(
 def process_lines(
     settings: tuple[Any, ...], moments: tuple[Any, ...], windows: tuple[Any, ...], out: tuple[Any, ...], /
 ) -> float: ...
+def process_each(
+    settings: tuple[Any, ...],
+    moments: list[Any],
+    largest: npt.NDArray[np.float64],
+    place: npt.NDArray[np.int64],
+    spectrum: npt.NDArray[np.complex128],
+    moment: npt.NDArray[np.float64],
+    out: tuple[Any, ...],
+    /,
+) -> None: ...
 
 class Engine:
     def __init__(
