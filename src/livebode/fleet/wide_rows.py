@@ -83,7 +83,7 @@ def response_table(parts: Sequence[AxisRows | AxesRows]) -> pa.Table:
     ends = pa.array(np.concatenate([[0], np.cumsum(lines)]).astype(np.int32))
     words = [axis for part in found for axis in part.axes]
     columns: dict[str, pa.Array[Any]] = {
-        "axis": text(words, np.arange(len(words))),
+        "axis": text(words),
         "run": from_numpy(np.array([run for part in found for run in part.runs], dtype=np.int64)),
         "number": from_numpy(np.array([number for part in found for number in part.numbers], dtype=np.int64)),
         "digest": from_numpy(np.concatenate([digests(one) for one in every])),
