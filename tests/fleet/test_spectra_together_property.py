@@ -207,6 +207,19 @@ def test_trackers_of_other_settings_are_of_another_kind() -> None:
     assert kinds[0] is kinds[1]
 
 
+def test_axes_with_several_spectra_are_stacked_one_spectrum_after_the_other() -> None:
+    streams = _streams([0, 1, 2])
+    for n in (12, 13, 14):
+        _next([0, 1, 2], streams, n)
+    _next([0], streams, 15)
+    stacks, outputs = stacked_together(streams)
+    assert [stack.at for stack in stacks] == [[0, 1], [0, 1], [0, 1], [0]]
+    assert [stack.numbers[0] for stack in stacks] == [12, 13, 14, 15]
+    assert list(outputs) == [2]
+    assert outputs[2].responses is not None
+    assert len(outputs[2].responses) == 3
+
+
 def test_rows_of_one_stack_join_to_the_responses_of_an_axis() -> None:
     streams = _streams([0, 1])
     parts = []

@@ -160,8 +160,8 @@ class AxisStream(StatefulBase):
         self._pipeline: Pipeline | None = None
         self._taken: list[_Taken] = []
         self.usual: UsualSpectra | None = None
-        self.spectrum: PendingSpectrum | None = None
-        """The only message taken since the last output, if it is a usual one."""
+        self.spectra: list[PendingSpectrum] = []
+        """The messages taken since the last output, while they are usual ones."""
         self._responses: list[Responses] = []
         self._tracked_events: list[Event] = []
 
@@ -185,13 +185,13 @@ class AxisStream(StatefulBase):
             return 0
         before, new = self._events.pending, self._pipeline is None
         spectrum = self._usual_spectrum(message)
-        if spectrum is not None and self.usual is not None and not (self._taken or self.spectrum):
-            self.spectrum = spectrum
+        if spectrum is not None and self.usual is not None and not self._taken:
+            self.spectra.append(spectrum)
             return self.usual.size_bytes + _EVENT_BYTES * (self._events.pending - before)
         try:
             if self._refusal is not None:
                 raise self._refusal
-            self._read_spectrum()
+            self._read_spectra()
             blocks = self._blocks(message) if spectrum is None else [self._block(spectrum)]
             size = self._output_bytes_max(blocks) if blocks else 0
         except Exception as error:  # a fault of one axis must not stop the others of its partition
@@ -242,25 +242,27 @@ class AxisStream(StatefulBase):
         usual = UsualSpectra(following, tracker, size_bytes, kind, results_only=unused)
         return usual if size_bytes <= _OUTPUT_BYTES_MAX else None
 
-    def _read_spectrum(self) -> None:
-        """Take a usual message as any other: more follow it, or it is not tracked with those of other axes."""
-        spectrum, self.spectrum = self.spectrum, None
-        if spectrum is not None and self.usual is not None:
-            self._take_blocks(spectrum.position, spectrum.end, [self._block(spectrum)], self.usual.size_bytes)
+    def _read_spectra(self) -> None:
+        """Take usual messages as any others: they are not tracked with those of other axes."""
+        spectra, self.spectra = self.spectra, []
+        for one in spectra:
+            assert self.usual is not None
+            self._take_blocks(one.position, one.end, [self._block(one)], self.usual.size_bytes)
 
     def _block(self, spectrum: PendingSpectrum) -> LiveBlock:
         batch = read_message(spectrum.message, spectrum.log_s).with_kinds(self._axis.source.kinds)
         return batch.block(spectrum.number, spectrum.first_sample, False)
 
-    def tracked_with_others(self, responses: Responses | None) -> UnfittedOutput:
-        """As `tracked`, of the pending spectrum, which is tracked already; `responses` has a row where that is used."""
-        self.spectrum = None
-        number = self.responses
+    def stacked(self) -> int:
+        """The first of the pending spectra was tracked with those of others; returns the number of its response."""
+        del self.spectra[0]
         self.responses += 1
-        events, self._tracked_events = self._tracked_events, []
-        if self._events.pending:
-            events = events + self._events.take()
-        return UnfittedOutput(number, responses, self._to_fit(responses), events)
+        return self.responses - 1
+
+    @property
+    def has_more(self) -> bool:
+        """Whether it has taken messages that are not tracked, or has events."""
+        return bool(self.spectra or self._taken or self._tracked_events or self._events.pending)
 
     def output(self) -> Output:
         """The responses, fits and events of all messages taken since the last call."""
@@ -269,12 +271,15 @@ class AxisStream(StatefulBase):
     def tracked(self) -> UnfittedOutput:
         """The same before the fits; `finished` follows."""
         self._track()
-        first, responses = self.responses, self._responses
-        events = self._tracked_events + self._events.take()
-        self._responses, self._tracked_events = [], []
+        first, responses, self._responses = self.responses, self._responses, []
         self.responses += sum(map(len, responses))
-        joined_responses = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
-        return UnfittedOutput(first, joined_responses, self._to_fit(joined_responses), events)
+        found = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
+        return self.unfitted(first, found)
+
+    def unfitted(self, number: int, responses: Responses | None) -> UnfittedOutput:
+        """These responses, from this number on, with the events until now."""
+        events, self._tracked_events = self._tracked_events, []
+        return UnfittedOutput(number, responses, self._to_fit(responses), events + self._events.take())
 
     @property
     def pipeline(self) -> Pipeline:
@@ -354,7 +359,7 @@ class AxisStream(StatefulBase):
         return (samples // settings.step + len(blocks) + 1) * len(settings.lines) * RESPONSE_BYTES
 
     def _track(self) -> None:
-        self._read_spectrum()
+        self._read_spectra()
         taken, self._taken = self._taken, []
         for part in taken:
             found: list[Responses] = []
@@ -402,7 +407,7 @@ class AxisStream(StatefulBase):
         return self.recipe
 
     def _state(self) -> dict[str, Any]:
-        pending = self._taken or self.spectrum
+        pending = self._taken or self.spectra
         assert not pending, "a snapshot between take and output would lack samples"
         parts = {} if self._pipeline is None else {name: part.snapshot() for name, part in self._pipeline.parts.items()}
         own = {"sequencer": self._sequencer.snapshot(), "source_events": self._events.rates, "stages": list(parts)}
@@ -432,46 +437,52 @@ def outputs_together(streams: Sequence[AxisStream]) -> list[Output]:
     """The output of each stream, of what it took; what they have in common is computed once, and none depends on
     another."""
     stacks, outputs = stacked_together(streams)
+    rows: dict[int, list[tuple[int, Responses]]] = {}
     for stack in stacks:
         for row, (i, number) in enumerate(zip(stack.at, stack.numbers)):
-            events = outputs[i].events if i in outputs else []
-            outputs[i] = Output(number, stack.responses[row : row + 1], _NO_ROWS, (), events)
+            rows.setdefault(i, []).append((number, stack.responses[row : row + 1]))
+    for i, found in rows.items():
+        events, after = [], None
+        if i in outputs:
+            events, after = outputs[i].events, outputs[i].responses
+        every = Responses.join([*(one for _, one in found), *([] if after is None else [after])])
+        outputs[i] = Output(found[0][0], every, _NO_ROWS, (), events)
     return [outputs[i] for i in range(len(streams))]
 
 
 def stacked_together(streams: Sequence[AxisStream]) -> tuple[list[StackedRows], dict[int, Output]]:
     """The same: responses of axes that are alike in one piece, and the outputs of all others by their places.
 
-    An axis of the first kind is also among the others if it has events.
+    An axis of the first kind is also among the others if it has events, or further responses.
     """
     stacks: list[StackedRows] = []
     tracked: dict[int, UnfittedOutput] = {}
     alike: dict[object, list[int]] = {}
     for i, stream in enumerate(streams):
-        if stream.spectrum is not None and stream.usual is not None:
+        if stream.usual is not None and (len(stream.spectra) == 1 or (stream.spectra and stream.usual.results_only)):
             alike.setdefault(stream.usual.kind, []).append(i)
     for members in alike.values():
-        responses, taken = _spectra_together([streams[i] for i in members])
-        if responses is None:
-            continue
-        at, numbers = [i for i, one in zip(members, taken) if one], []
-        usual = streams[at[0]].usual
-        results_only = usual is not None and usual.results_only
-        for row, i in enumerate(at):
-            output = streams[i].tracked_with_others(None if results_only else responses[row : row + 1])
-            numbers.append(output.number)
-            if output.events or not results_only:
-                tracked[i] = output
-        if results_only:
-            stacks.append(StackedRows(at, numbers, responses))
-    done = {i for stack in stacks for i in stack.at}
-    tracked |= {i: stream.tracked() for i, stream in enumerate(streams) if i not in done and i not in tracked}
+        # The first spectrum of each, then the second one: several of a single axis cost less as one Block.
+        while members and (len(members) > 1 or len(streams[members[0]].spectra) == 1):
+            responses, taken = _spectra_together([streams[i] for i in members])
+            if responses is None:
+                break
+            at = [i for i, one in zip(members, taken) if one]
+            stack = StackedRows(at, [streams[i].stacked() for i in at], responses)
+            if (usual := streams[at[0]].usual) is not None and usual.results_only:
+                stacks.append(stack)
+            else:
+                rows = enumerate(zip(at, stack.numbers))
+                tracked |= {i: streams[i].unfitted(number, responses[row : row + 1]) for row, (i, number) in rows}
+            members = [i for i in at if streams[i].spectra]
+    done = {i for stack in stacks for i in stack.at} | tracked.keys()
+    tracked |= {i: one.tracked() for i, one in enumerate(streams) if i not in done or one.has_more}
     return stacks, dict(zip(tracked, _fitted_together([streams[i] for i in tracked], [*tracked.values()])))
 
 
 def _spectra_together(streams: Sequence[AxisStream]) -> tuple[Responses | None, list[bool]]:
-    """Responses of the pending spectra, and which of the streams have one; the others have to be tracked alone."""
-    pending = [(stream.usual, stream.spectrum) for stream in streams if stream.usual and stream.spectrum]
+    """Responses of the first pending spectra, and which streams have one; the others have to be tracked alone."""
+    pending = [(stream.usual, stream.spectra[0]) for stream in streams if stream.usual is not None]
     about = pending[0][0].next
     layout, double = about.layout, about.double
     try:
