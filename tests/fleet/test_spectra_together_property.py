@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,10 +15,24 @@ from hypothesis import strategies as st
 from livebode.configuration.axis import Axis
 from livebode.core import PER_LINE, PER_RESPONSE, Channel, Responses, SpectraLayout
 from livebode.fleet.axis_stream import AxisStream, Output, outputs_together, stacked_together
-from livebode.fleet.message import write_message
+from livebode.fleet.log import FleetLog
+from livebode.fleet.message import message_id, write_message
 from livebode.fleet.result_message import PendingResults
+from livebode.fleet.server import LogServer
+from livebode.fleet.settings import LogSection
+from livebode.fleet.subjects import EDGE
 from livebode.sources.live import SpectraBatch
-from tests.support.fleet_runs import CHANNELS, EPOCH, RATE_HZ, WINDOW, fleet_axes
+from tests.support.fleet_runs import (
+    CHANNELS,
+    EPOCH,
+    PARTITIONS,
+    RATE_HZ,
+    WINDOW,
+    checked,
+    fleet_axes,
+    log_section,
+    owned_until_current,
+)
 
 LINES = (2, 4, 6, 8, 10)
 COUNT, RESTARTED = 24, 9 * EPOCH
@@ -85,8 +102,7 @@ def disturbed(draw: st.DrawFn) -> list[list[bytes]]:
 class _AloneStream(AxisStream):
     """Reads each message and tracks it as one of samples is: no message is a usual one."""
 
-    def _usual_after(self, *_: Any) -> None:
-        return None
+    usual = property(lambda _: None, lambda *_: None)  # type: ignore[assignment]
 
 
 def _bits(outputs: list[Output]) -> Any:
@@ -228,3 +244,26 @@ def test_rows_of_one_stack_join_to_the_responses_of_an_axis() -> None:
         parts.append(outputs_together(streams)[1].responses)
     joined = Responses.join([part for part in parts if part is not None])
     assert np.diff(joined.sample).tolist() == [25, 25]
+
+
+def test_what_owners_of_spectra_store_is_what_one_axis_after_the_other_gives(tmp_path: Path) -> None:
+    axes = fleet_axes(12)
+    with LogServer(tmp_path / "log", PARTITIONS) as server:
+        settings = log_section(server.url)
+        for part in (range(20), range(20, 40)):
+            asyncio.run(_sent(settings, axes, part))
+            owned_until_current(settings, axes)  # the second time others take over
+        found = checked(settings, axes)
+    assert found.exact
+    assert found.total.responses == 40 * len(axes)
+
+
+async def _sent(settings: LogSection, axes: Mapping[str, Axis], numbers: range) -> None:
+    async with FleetLog(settings, "test") as log:
+        await log.create_streams()
+        for number in numbers:
+            for key in axes:
+                message = _message(
+                    0, number, "spike" if number == 30 and key.startswith("ulm._.press%203") else "whole"
+                )
+                await log.append(f"{EDGE}.{key}", message, message_id(key, message))

@@ -14,10 +14,10 @@ from livebode.configuration.axis import Axis
 from livebode.configuration.recipe import recipe_id
 from livebode.core import Block, Event, LivebodeError, Parameters, Responses, SourceError
 from livebode.core.state import Stage, StatefulBase, restore_parts
-from livebode.estimation.spectra_tracker import NewestSpectra, SpectraTracker
 from livebode.fleet.event_limits import EventLimits
 from livebode.fleet.main_quantity import MainQuantity, main_quantity, newest_of
 from livebode.fleet.message import read_message
+from livebode.fleet.usual_spectra import PendingSpectrum, UsualSpectra, spectra_together
 from livebode.monitoring.rows import places
 from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection
@@ -25,9 +25,7 @@ from livebode.runtime.fits_together import Fitted, process_together
 from livebode.runtime.pipeline import Pipeline
 from livebode.sources.live import LiveBlock, Sequencer
 from livebode.sources.live.joined import joined
-from livebode.sources.live.next_spectrum import NextSpectrum
 from livebode.sources.live.source_events import SourceEvents
-from livebode.sources.live.spectra_frame import read_rows
 
 RESPONSE_BYTES = 130
 """Of a response at a line, in a message of results."""
@@ -85,35 +83,6 @@ class _Taken(NamedTuple):
     end: tuple[int, float]
     blocks: list[LiveBlock]
     size_bytes: int
-
-
-class PendingSpectrum(NamedTuple):
-    """A message with one whole spectrum that follows the one before it, taken but not read.
-
-    Its place in the log and the log's time, the sender's number of its first sample and ours, and the sample and time
-    after it.
-    """
-
-    message: bytes
-    position: int
-    log_s: float
-    first_sample: int
-    number: int
-    end: tuple[int, float]
-
-
-class UsualSpectra(NamedTuple):
-    """How the usual messages of an axis are recognised, and what tracks them with those of other axes.
-
-    `size_bytes` is the most that one adds to a message of results. Axes with an equal `kind` are tracked together.
-    `results_only`: nothing is fitted to the responses and nothing monitors them.
-    """
-
-    next: NextSpectrum
-    tracker: SpectraTracker
-    size_bytes: int
-    kind: tuple[object, float, bool, bool]
-    results_only: bool
 
 
 class AxisStream(StatefulBase):
@@ -184,7 +153,7 @@ class AxisStream(StatefulBase):
         if self.failure:
             return 0
         before, new = self._events.pending, self._pipeline is None
-        spectrum = self._usual_spectrum(message)
+        spectrum = self.usual and self.usual.spectrum(message, position, log_s, self._sequencer, self._events)
         if spectrum is not None and self.usual is not None and not self._taken:
             self.spectra.append(spectrum)
             return self.usual.size_bytes + _EVENT_BYTES * (self._events.pending - before)
@@ -199,7 +168,9 @@ class AxisStream(StatefulBase):
             self._fail(error)
             return _EVENT_BYTES
         if spectrum is None:
-            self.usual = self._usual_after(message, blocks, size)
+            self.usual = None
+            if self._pipeline is not None and size <= _OUTPUT_BYTES_MAX:
+                self.usual = UsualSpectra.after(message, blocks, size, self._sequencer, self._pipeline)
         self._take_blocks(position, self._events.position, blocks, size)
         if new:  # what a follower refuses, it refuses at its first message, without those after it
             self._track()
@@ -210,37 +181,6 @@ class AxisStream(StatefulBase):
             before = self._taken.pop()
             blocks, size_bytes = before.blocks + blocks, before.size_bytes + size_bytes
         self._taken.append(_Taken(position, end, blocks, size_bytes))
-
-    def _usual_spectrum(self, message: bytes) -> PendingSpectrum | None:
-        """What is in a usual message, which the sequencer then has; None for another one, and nothing has changed."""
-        if self.usual is None:
-            return None
-        about = self.usual.next
-        found = about.found(message)
-        if found is None:
-            return None
-        first, stamp_s = found
-        number = self._sequencer.passed(first, about.layout.hop, about.rate_hz, stamp_s, self.log_s)
-        if number is None:
-            return None
-        return PendingSpectrum(message, self.position, self.log_s, first, number, self._events.position)
-
-    def _usual_after(self, message: bytes, blocks: list[LiveBlock], size_bytes: int) -> UsualSpectra | None:
-        """How the next messages are recognised, if this one gave the Block, and nothing follows the tracker."""
-        pipeline, spectra = self._pipeline, self._sequencer.schema.spectra
-        if pipeline is None or spectra is None or len(blocks) != 1 or len(blocks[0]) != 1:
-            return None
-        tracker, own = pipeline.follower, blocks[0].origin
-        if not isinstance(tracker, SpectraTracker) or pipeline.readiness is not None or own is None:
-            return None
-        following = NextSpectrum(message, spectra)
-        found, first = following.found(message), blocks[0].start + own.offset
-        if found is None or found.first_sample != first or not self._sequencer.is_idle or tracker.kind is None:
-            return None
-        unused = pipeline.fits is None and (pipeline.detection is None or pipeline.detection.baseline is None)
-        kind = tracker.kind, following.rate_hz, following.double, unused
-        usual = UsualSpectra(following, tracker, size_bytes, kind, results_only=unused)
-        return usual if size_bytes <= _OUTPUT_BYTES_MAX else None
 
     def _read_spectra(self) -> None:
         """Take usual messages as any others: they are not tracked with those of other axes."""
@@ -464,7 +404,12 @@ def stacked_together(streams: Sequence[AxisStream]) -> tuple[list[StackedRows], 
     for members in alike.values():
         # The first spectrum of each, then the second one: several of a single axis cost less as one Block.
         while members and (len(members) > 1 or len(streams[members[0]].spectra) == 1):
-            responses, taken = _spectra_together([streams[i] for i in members])
+            every = [(usual, streams[i].spectra[0]) for i in members if (usual := streams[i].usual) is not None]
+            try:
+                responses, taken = spectra_together(every)
+            except Exception:  # which of them it is shows only alone
+                _logger.exception("internal error while %d axes are tracked together", len(members))
+                break
             if responses is None:
                 break
             at = [i for i, one in zip(members, taken) if one]
@@ -478,24 +423,6 @@ def stacked_together(streams: Sequence[AxisStream]) -> tuple[list[StackedRows], 
     done = {i for stack in stacks for i in stack.at} | tracked.keys()
     tracked |= {i: one.tracked() for i, one in enumerate(streams) if i not in done or one.has_more}
     return stacks, dict(zip(tracked, _fitted_together([streams[i] for i in tracked], [*tracked.values()])))
-
-
-def _spectra_together(streams: Sequence[AxisStream]) -> tuple[Responses | None, list[bool]]:
-    """Responses of the first pending spectra, and which streams have one; the others have to be tracked alone."""
-    pending = [(stream.usual, stream.spectra[0]) for stream in streams if stream.usual is not None]
-    about = pending[0][0].next
-    layout, double = about.layout, about.double
-    try:
-        payload = b"".join([spectrum.message[usual.next.payload] for usual, spectrum in pending])
-        sums, values, _ = read_rows(payload, layout, double=double)
-        number = np.array([spectrum.number for _, spectrum in pending], dtype=np.int64)
-        place = (np.array([spectrum.first_sample for _, spectrum in pending]) + layout.hop) % layout.window
-        spectra = NewestSpectra(sums, values, number, place, layout.channels, about.rate_hz)
-        responses, taken = SpectraTracker.process_each([usual.tracker for usual, _ in pending], spectra)
-    except Exception:  # which of them it is shows only alone
-        _logger.exception("internal error while %d axes are tracked together", len(streams))
-        return None, [False] * len(streams)
-    return responses, taken.tolist()
 
 
 def _fitted_together(streams: Sequence[AxisStream], tracked: Sequence[UnfittedOutput]) -> list[Output]:
