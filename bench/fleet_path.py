@@ -221,14 +221,21 @@ class _Path:
         return self._asked(lambda log: log.extent(RESULT_STREAM)).last
 
     def _current(self, since_s: float) -> bool:
-        """Whether every owner has reported some time after a moment, and nothing waits."""
+        """Whether every owner has reported some time after a moment, and has stored the results of all messages."""
 
-        async def found(log: FleetLog) -> list[dict[str, Any] | None]:
-            return [await status_of(log, number) for number in range(self._partitions)]
+        async def done(log: FleetLog, number: int) -> bool:
+            about = await status_of(log, number)
+            if about is None or about["at_s"] <= since_s + _REPORTED_S or about["waiting"]:
+                return False
+            # What waits is known from the last read, which may be older than the last message.
+            newest = await log.last(LOG_STREAM, f"{LOG}.{number}.>")
+            taken = [one["position"] for one in about["axes"].values()]
+            return newest is None or newest.number <= max(taken, default=0)
 
-        return all(
-            one is not None and one["at_s"] > since_s + _REPORTED_S and not one["waiting"] for one in self._asked(found)
-        )
+        async def all_done(log: FleetLog) -> bool:
+            return all([await done(log, number) for number in range(self._partitions)])
+
+        return self._asked(all_done)
 
     async def _costs(
         self, log: FleetLog, sent: Generated, spent: list[np.ndarray], idle_s: float, killed_s: float

@@ -25,8 +25,8 @@ def from_numpy(values: ArrayLike) -> pa.Array[Any]:
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, pa.py_buffer(data)])
 
 
-def text(words: Sequence[str], at: NDArray[np.integer[Any]]) -> pa.Array[Any]:
-    """The word number `at[i]` in row i, as an Arrow array of strings.
+def text(words: Sequence[str], at: NDArray[np.integer[Any]] | None = None) -> pa.Array[Any]:
+    """The word number `at[i]` in row i, or all words in order, as an Arrow array of strings.
 
     >>> text(["Keff", "mL"], np.array([1, 0, 1])).to_pylist()
     ['mL', 'Keff', 'mL']
@@ -34,7 +34,8 @@ def text(words: Sequence[str], at: NDArray[np.integer[Any]]) -> pa.Array[Any]:
     letters = [word.encode() for word in words]
     ends = np.cumsum([0, *map(len, letters)], dtype=np.int32)
     buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(letters))]
-    return pa.Array.from_buffers(pa.string(), len(letters), buffers).take(from_numpy(at))
+    every = pa.Array.from_buffers(pa.string(), len(letters), buffers)
+    return every if at is None else every.take(from_numpy(at))
 
 
 def to_numpy(array: pa.Array[Any]) -> NDArray[Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,14 +18,15 @@ from tests.support.fleet_runs import CHANNELS, EPOCH, RATE_HZ, SAMPLES, WINDOW, 
 
 ((_, AXIS),) = fleet_axes(1).items()
 COUNT, RESTARTED = 24, 9 * EPOCH
+HOP = 25
 
 
 def _spectrum(number: int, epoch: int = EPOCH) -> bytes:
-    layout = SpectraLayout(CHANNELS, (), window=WINDOW, hop=SAMPLES, lines=(2, 4, 6, 8, 10))
+    layout = SpectraLayout(CHANNELS, (), window=WINDOW, hop=HOP, lines=(2, 4, 6, 8, 10))
     rng = np.random.default_rng([number, epoch])
     sums = (rng.standard_normal((3, 1, 5, 2)) * 0.01 + [1.0, 0.5]) @ [1, 1j]
     state = np.array([number % 7 == 3], np.uint32)
-    return write_message(SpectraBatch(number * SAMPLES, sums, np.zeros((0, 1)), state, layout, RATE_HZ, epoch=epoch))
+    return write_message(SpectraBatch(number * HOP, sums, np.zeros((0, 1)), state, layout, RATE_HZ, epoch=epoch))
 
 
 SAMPLE_MESSAGES = [write_message(batch(0, n * SAMPLES)) for n in range(COUNT)]
@@ -77,6 +79,13 @@ def test_the_cut_of_the_messages_changes_no_bit_of_responses_events_and_state(
     one_by_one = _tracked(AXIS, messages, set(range(1, len(messages) + 1)), set())
     assert _tracked(AXIS, messages, cuts, set()) == one_by_one
     assert _tracked(AXIS, messages, cuts, restored)[0] == one_by_one[0]
+
+
+@pytest.mark.parametrize("kind", list(STREAMS))
+def test_the_messages_are_tracked(kind: str) -> None:
+    rows, _, events = _tracked(AXIS, STREAMS[kind][:COUNT], set(), set())
+    assert len(rows["sample"]) == 8 * COUNT * (SAMPLES // HOP if kind == "samples" else 1)
+    assert not any("failed" in event for event in events)
 
 
 def test_an_axis_that_cannot_be_tracked_fails_with_the_same_event_however_its_messages_are_taken() -> None:

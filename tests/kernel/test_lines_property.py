@@ -17,7 +17,9 @@ from livebode.kernel import (
     LineMoments,
     LineSettings,
     LineWindows,
+    NewestWindows,
     line_twin,
+    process_each,
     process_lines,
 )
 
@@ -164,6 +166,57 @@ def test_any_division_of_the_windows_gives_the_same_bits(case):
     joined = [np.concatenate([getattr(one, name) for one in found], axis=axis[name]) for name in axis]
     assert_same_bits(expected, type(expected)(*joined))
     assert_same_bits(whole, parts)
+
+
+@settings(max_examples=60, deadline=None)
+@given(cases, st.integers(1, 5))
+def test_windows_of_several_machines_have_the_bits_of_each_alone_and_of_the_twin(case, machines):
+    numbers, about = Numbers(case), case.settings._replace(noise=NOISE_SCATTER, noise_dof=np.inf)
+    each, alone, of_twin = ([case.moments() for _ in range(machines)] for _ in range(3))
+    largest = np.zeros(machines)
+    for _ in case.pieces:
+        place = numbers._rng.integers(0, case.places, machines)
+        windows = NewestWindows(largest, place, numbers.complex_(3, machines, case.lines), numbers.reals(machines, 3))
+        found, after = process_each(about, each, windows)
+        expected, expected_after = line_twin.process_each(about, of_twin, windows)
+        assert_same_bits(found, expected)
+        assert after.tobytes() == expected_after.tobytes()
+        yes = np.ones(1, np.bool_)
+        for i in range(machines):
+            spectrum, moment = windows.spectrum[:, [i]].copy(), windows.moment[[i]].T.copy()
+            one = LineWindows(largest[i], place[i], spectrum, None, yes, yes, None, None, None, None, np.inf, moment)
+            rows, _ = process_lines(about, alone[i], one)
+            own = found._replace(moment=found.moment.T)
+            assert_same_bits(rows._replace(moment=rows.moment.T), type(own)(*(part[[i]] for part in own)))
+            assert_same_bits(each[i], of_twin[i])
+            assert_same_bits(each[i], alone[i])
+        largest = after
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"place": np.array([0, 2])},
+        {"place": np.array([0, -1])},
+        {"place": np.array([0])},
+        {"largest": np.zeros(3)},
+        {"spectrum": np.zeros((3, 3, 2), np.complex128)},
+        {"spectrum": np.zeros((1, 2, 2), np.complex128)},
+        {"spectrum": np.zeros((3, 2, 1), np.complex128)},
+        {"moment": np.zeros((3, 2))},
+    ],
+)
+def test_of_several_machines_none_changes_where_an_array_is_refused(wrong):
+    case = Case(2, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, (3,), 0)
+    each, zeros = [case.moments(), case.moments()], np.zeros(2, np.int64)
+    windows = NewestWindows(np.zeros(2), zeros, Numbers(case).complex_(3, 2, 2), np.zeros((2, 3)))
+    with pytest.raises(ValueError, match=r"array|few|place"):
+        process_each(case.settings, each, windows._replace(**wrong))
+    other = [case.moments(), Case(3, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, (3,), 0).moments()]
+    with pytest.raises(ValueError, match="array"):
+        process_each(case.settings, other, windows)
+    for moments in (*each, other[0]):
+        assert_same_bits(moments, case.moments())
 
 
 @pytest.mark.parametrize(

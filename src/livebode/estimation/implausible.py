@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,6 +38,29 @@ class PlausibleRange(StatefulBase):
         if self._at == 0:
             self._end_period()
         return np.concatenate(found) if found else _NONE
+
+    @staticmethod
+    def are_plausible(ranges: Sequence[PlausibleRange], size: Floats) -> tuple[NDArray[np.bool_], Floats]:
+        """Which of the ranges find nothing in their next sample, of sizes (ranges, channels); for `take_each` the
+        largest sizes of the period so far, same shape.
+
+        No range changes.
+        """
+        every = np.maximum(np.array([one._largest for one in ranges]), size)
+        limits = np.array([one._limit for one in ranges])
+        return np.asarray(~(every > limits).any(axis=1)), every
+
+    @staticmethod
+    def take_each(ranges: Sequence[PlausibleRange], every: Floats) -> None:
+        """Continue ranges of one length with a plausible sample each, as `process` would."""
+        for one, largest, limit in zip(ranges, every, _limits(every)):
+            one._at += 1
+            if one._at == one._window:
+                one._at = 0
+                one._largest.fill(0.0)
+                one._limit[:] = limit
+            else:
+                one._largest[:] = largest
 
     def _found(self, size: Floats, starts: NDArray[np.intp]) -> list[NDArray[np.intp]]:
         """The same, in pieces that begin a period, or continue the one that has begun."""

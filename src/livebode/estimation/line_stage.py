@@ -25,8 +25,11 @@ from livebode.kernel import (
     NOISE_LARGER,
     NOISE_MOVING,
     NOISE_SCATTER,
+    LineRows,
     LineSettings,
     LineWindows,
+    NewestWindows,
+    process_each,
     process_lines,
 )
 
@@ -218,23 +221,49 @@ class LineStage(StatefulBase):
             input_ = signals["input"][:, :lines]
             leaks = self._periodicity.process(input_, found.usable, rows.sample, centre[0])
             estimates = estimates.only(estimates.valid & ~_where_not(leaks, moving))
-        return Responses(
-            lines=s.lines,
-            value=estimates.value,
-            sigma=estimates.sigma,
-            dof=found.dof,
-            coherence=estimates.coherence,
-            valid=estimates.valid,
-            first=found.moment[2].astype(np.int64) if s.average else first,
-            sample=rows.sample,
-            time_s=found.moment[0],
-            schedule=found.moment[1],
-            quantity=s.quantity,
-            unit=unit,
-            input_coherence=estimates.input_coherence,
-            weight=estimates.weight,
-            distortion=estimates.distortion,
+        return _as_responses(s, found, estimates, rows.sample, unit)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether a response follows from the spectrum and the moments alone, so that `process_each` supports it."""
+        others = self._hann, self._detection, self._periodicity
+        return not (self._converts or self._settings.ripple or any(others))
+
+    @staticmethod
+    def process_each(
+        stages: Sequence[LineStage],
+        spectrum: Complex,
+        sample: NDArray[np.int64],
+        place: NDArray[np.int64],
+        centre: Floats,
+        channels: Sequence[Channel],
+    ) -> Responses:
+        """One response of each of several stages with equal settings that are `is_plain`: a row for each stage.
+
+        The bits are those of `process` for each stage alone. Where this raises, no stage has changed.
+
+        Parameters
+        ----------
+        stages
+            Different ones.
+        spectrum, sample, place, centre, channels
+            As in `process`, with a row for each stage; every window is whole and clean.
+        """
+        one = stages[0]
+        s = one._settings
+        first = sample - s.lines.window + 1
+        windows = NewestWindows(
+            np.array([stage._largest for stage in stages]),
+            (place // s.step - 1) % one._places,
+            np.ascontiguousarray(spectrum),
+            np.stack([*centre, first], axis=1),
         )
+        unit = one._unit_of(channels)
+        with np.errstate(all="ignore"):
+            found, largest = process_each(one._kernel_settings, [stage._moments.arrays for stage in stages], windows)
+            for stage, power_max in zip(stages, largest.tolist()):
+                stage._largest = power_max
+            return _as_responses(s, found, LineEstimates.of(found), sample, unit)
 
     def _detected(self, signals: dict[Role, Complex]) -> Floats | None:
         """Noise of one window by the detection lines, as a power of numerator·conj(reference); None without them."""
@@ -275,6 +304,28 @@ class LineStage(StatefulBase):
             )
         self._moving += int(np.count_nonzero(moving))
         return moving
+
+
+def _as_responses(
+    settings: Settings, found: LineRows, estimates: LineEstimates, sample: NDArray[np.int64], unit: str
+) -> Responses:
+    return Responses(
+        lines=settings.lines,
+        value=estimates.value,
+        sigma=estimates.sigma,
+        dof=found.dof,
+        coherence=estimates.coherence,
+        valid=estimates.valid,
+        first=found.moment[2].astype(np.int64) if settings.average else sample - settings.lines.window + 1,
+        sample=sample,
+        time_s=found.moment[0],
+        schedule=found.moment[1],
+        quantity=settings.quantity,
+        unit=unit,
+        input_coherence=estimates.input_coherence,
+        weight=estimates.weight,
+        distortion=estimates.distortion,
+    )
 
 
 def _where_not(these: Flags, moving: Flags | None) -> Flags:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from livebode.core import (
     NOT_WHOLE,
     SPIKE,
     Block,
+    Channel,
     Emit,
     Event,
     Responses,
@@ -34,8 +36,32 @@ from livebode.estimation.spectra_watch import DRIVE, SpectraInputStatistics
 from livebode.estimation.stream_estimator import StreamEstimator
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _NONE = np.zeros(0, dtype=np.intp)
+
+
+class NewestSpectra(NamedTuple):
+    """A spectrum of each of several machines with one layout, complete in itself and not marked.
+
+    Attributes
+    ----------
+    sums
+        As those of `Spectra`, shape (signals, machines, bins).
+    values
+        At the window's centres, shape (values, machines).
+    start, place
+        As those of `Spectra`, shape (machines,).
+    channels, rate_hz
+        Of all of them.
+    """
+
+    sums: NDArray[np.complex128]
+    values: Floats
+    start: NDArray[np.int64]
+    place: NDArray[np.int64]
+    channels: tuple[Channel, ...]
+    rate_hz: float
 
 
 class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
@@ -139,8 +165,67 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
         return responses
 
     @property
+    def kind(self) -> object:
+        """The same object for trackers that `process_each` computes together; None for one that it does not support."""
+        plain = self._lines.is_plain and self._speed is None and bool(np.all(self._after == 1))
+        return _kind(self._identity) if plain else None
+
+    @staticmethod
+    def process_each(trackers: Sequence[SpectraTracker], spectra: NewestSpectra) -> tuple[Responses | None, Flags]:
+        """The next response of each of several trackers of one `kind`, whose next spectra are neither lost nor marked.
+
+        The bits of a response do not depend on the other trackers: they are those of `process`.
+
+        Parameters
+        ----------
+        trackers
+            Different ones.
+        spectra
+            A spectrum for each.
+
+        Returns
+        -------
+        responses, taken
+            A row for each tracker that took its spectrum, None without one, and which these are, (trackers,). The
+            others, whose spectrum is not finite, implausible or not the next one, have not changed: they need
+            `process`.
+        """
+        one = trackers[0]
+        layout, settings = one._layout, one.settings
+        sums = spectra.sums.take(one._signals, axis=0).take(one._columns, axis=2)
+        with np.errstate(over="ignore", invalid="ignore"):
+            spectrum = sums * one._after
+            size = np.abs(spectrum).max(axis=2).T
+        plausible, every = PlausibleRange.are_plausible([tracker._range for tracker in trackers], size)
+        follows = [tracker._watch.continues_at(n) for tracker, n in zip(trackers, spectra.start.tolist())]
+        taken = plausible & np.isfinite(size).all(axis=1) & np.array(follows)
+        at = np.flatnonzero(taken)
+        usual = [trackers[i] for i in at.tolist()]
+        if not usual:
+            return None, taken
+        sample, window = spectra.start[at] - 1 + layout.hop, layout.window
+        time_s = 0.0 + (sample - (window - 1) / 2) / spectra.rate_hz
+        schedule = np.full(len(at), np.nan)
+        if settings.schedule:
+            names = [channel.name for channel in layout.values]
+            schedule = spectra.values[names.index(settings.schedule), at]
+        stages = [tracker._lines for tracker in usual]
+        centre, place = np.stack([time_s, schedule]), spectra.place[at]
+        responses = LineStage.process_each(stages, spectrum[:, at], sample, place, centre, spectra.channels)
+        PlausibleRange.take_each([tracker._range for tracker in usual], every[at])
+        for tracker in usual:
+            tracker._watch.take_whole(layout.hop)
+            tracker._ends_with(responses)
+        return responses, taken
+
+    @property
     def _identity(self) -> str:
         return f"{self.settings.identity} {self._layout}"
+
+
+@lru_cache(maxsize=256)
+def _kind(identity: str) -> object:  # noqa: ARG001 - the key
+    return object()
 
 
 def _check(settings: Settings, layout: SpectraLayout) -> None:

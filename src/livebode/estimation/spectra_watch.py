@@ -61,6 +61,16 @@ class SpectraInputStatistics(StreamCounters):
         for number, kind in sorted(begins):
             self._report(kind, block, number, f"{self._sentences[kind]}; its response is not valid")
 
+    def continues_at(self, start: int) -> bool:
+        """Whether this is the sample after the previous spectra."""
+        return self._next == start
+
+    def take_whole(self, hop: int) -> None:
+        """Count a spectrum that is whole and follows the previous one, as `take` would."""
+        self._next += hop
+        self.counts["samples"] += min(hop, self._window)
+        self.counts["spectra"] += 1
+
     def _count(self, block: Spectra, not_whole: NDArray[np.bool_], new: int) -> None:
         """Samples of these windows that previous ones did not contain; `new` since the previous window."""
         if self._next < 0 and not not_whole[0]:

@@ -17,6 +17,7 @@ from livebode.core.state import Stage, StatefulBase, restore_parts
 from livebode.fleet.event_limits import EventLimits
 from livebode.fleet.main_quantity import MainQuantity, main_quantity, newest_of
 from livebode.fleet.message import read_message
+from livebode.fleet.usual_spectra import PendingSpectrum, UsualSpectra, spectra_together
 from livebode.monitoring.rows import places
 from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection
@@ -127,6 +128,9 @@ class AxisStream(StatefulBase):
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
         self._pipeline: Pipeline | None = None
         self._taken: list[_Taken] = []
+        self.usual: UsualSpectra | None = None
+        self.spectra: list[PendingSpectrum] = []
+        """The messages taken since the last output, while they are usual ones."""
         self._responses: list[Responses] = []
         self._tracked_events: list[Event] = []
 
@@ -149,21 +153,56 @@ class AxisStream(StatefulBase):
         if self.failure:
             return 0
         before, new = self._events.pending, self._pipeline is None
+        spectrum = self.usual and self.usual.spectrum(message, position, log_s, self._sequencer, self._events)
+        if spectrum is not None and self.usual is not None and not self._taken:
+            self.spectra.append(spectrum)
+            return self.usual.size_bytes + _EVENT_BYTES * (self._events.pending - before)
         try:
             if self._refusal is not None:
                 raise self._refusal
-            blocks = self._blocks(message)
+            self._read_spectra()
+            blocks = self._blocks(message) if spectrum is None else [self._block(spectrum)]
             size = self._output_bytes_max(blocks) if blocks else 0
         except Exception as error:  # a fault of one axis must not stop the others of its partition
             self._track()
             self._fail(error)
             return _EVENT_BYTES
-        if self._taken and self._taken[-1].size_bytes + size <= _OUTPUT_BYTES_MAX:
-            blocks, size = self._taken[-1].blocks + blocks, self._taken.pop().size_bytes + size
-        self._taken.append(_Taken(position, self._events.position, blocks, size))
+        if spectrum is None:
+            self.usual = None
+            if self._pipeline is not None and size <= _OUTPUT_BYTES_MAX:
+                self.usual = UsualSpectra.after(message, blocks, size, self._sequencer, self._pipeline)
+        self._take_blocks(position, self._events.position, blocks, size)
         if new:  # what a follower refuses, it refuses at its first message, without those after it
             self._track()
         return min(size, _OUTPUT_BYTES_MAX) + _EVENT_BYTES * (self._events.pending - before)
+
+    def _take_blocks(self, position: int, end: tuple[int, float], blocks: list[LiveBlock], size_bytes: int) -> None:
+        if self._taken and self._taken[-1].size_bytes + size_bytes <= _OUTPUT_BYTES_MAX:
+            before = self._taken.pop()
+            blocks, size_bytes = before.blocks + blocks, before.size_bytes + size_bytes
+        self._taken.append(_Taken(position, end, blocks, size_bytes))
+
+    def _read_spectra(self) -> None:
+        """Take usual messages as any others: they are not tracked with those of other axes."""
+        spectra, self.spectra = self.spectra, []
+        for one in spectra:
+            assert self.usual is not None
+            self._take_blocks(one.position, one.end, [self._block(one)], self.usual.size_bytes)
+
+    def _block(self, spectrum: PendingSpectrum) -> LiveBlock:
+        batch = read_message(spectrum.message, spectrum.log_s).with_kinds(self._axis.source.kinds)
+        return batch.block(spectrum.number, spectrum.first_sample, False)
+
+    def stacked(self) -> int:
+        """The first of the pending spectra was tracked with those of others; returns the number of its response."""
+        del self.spectra[0]
+        self.responses += 1
+        return self.responses - 1
+
+    @property
+    def has_more(self) -> bool:
+        """Whether it has taken messages that are not tracked, or has events."""
+        return bool(self.spectra or self._taken or self._tracked_events or self._events.pending)
 
     def output(self) -> Output:
         """The responses, fits and events of all messages taken since the last call."""
@@ -172,12 +211,15 @@ class AxisStream(StatefulBase):
     def tracked(self) -> UnfittedOutput:
         """The same before the fits; `finished` follows."""
         self._track()
-        first, responses = self.responses, self._responses
-        events = self._tracked_events + self._events.take()
-        self._responses, self._tracked_events = [], []
+        first, responses, self._responses = self.responses, self._responses, []
         self.responses += sum(map(len, responses))
-        joined_responses = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
-        return UnfittedOutput(first, joined_responses, self._to_fit(joined_responses), events)
+        found = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
+        return self.unfitted(first, found)
+
+    def unfitted(self, number: int, responses: Responses | None) -> UnfittedOutput:
+        """These responses, from this number on, with the events until now."""
+        events, self._tracked_events = self._tracked_events, []
+        return UnfittedOutput(number, responses, self._to_fit(responses), events + self._events.take())
 
     @property
     def pipeline(self) -> Pipeline:
@@ -257,6 +299,7 @@ class AxisStream(StatefulBase):
         return (samples // settings.step + len(blocks) + 1) * len(settings.lines) * RESPONSE_BYTES
 
     def _track(self) -> None:
+        self._read_spectra()
         taken, self._taken = self._taken, []
         for part in taken:
             found: list[Responses] = []
@@ -304,7 +347,8 @@ class AxisStream(StatefulBase):
         return self.recipe
 
     def _state(self) -> dict[str, Any]:
-        assert not self._taken, "a snapshot between take and output would lack samples"
+        pending = self._taken or self.spectra
+        assert not pending, "a snapshot between take and output would lack samples"
         parts = {} if self._pipeline is None else {name: part.snapshot() for name, part in self._pipeline.parts.items()}
         own = {"sequencer": self._sequencer.snapshot(), "source_events": self._events.rates, "stages": list(parts)}
         return super()._state() | own | parts
@@ -313,7 +357,7 @@ class AxisStream(StatefulBase):
         super()._load(state)
         self._events.continue_at(state["source_events"])
         self._sequencer.restore(state["sequencer"])
-        self._pipeline, self.main = None, None
+        self._pipeline, self.main, self.usual = None, None, None
         if state["stages"]:
             rate_hz = self._sequencer.schema.rate_hz
             assert rate_hz is not None
@@ -321,9 +365,68 @@ class AxisStream(StatefulBase):
             restore_parts(self._pipeline.parts, {name: state[name] for name in self._pipeline.parts})
 
 
+class StackedRows(NamedTuple):
+    """A response of each of several streams: places among the streams, numbers of the responses, and a row for each."""
+
+    at: list[int]
+    numbers: list[int]
+    responses: Responses
+
+
 def outputs_together(streams: Sequence[AxisStream]) -> list[Output]:
-    """The output of each stream; the fits of all axes are one computation, in which none depends on the others."""
-    tracked = [stream.tracked() for stream in streams]
+    """The output of each stream, of what it took; what they have in common is computed once, and none depends on
+    another."""
+    stacks, outputs = stacked_together(streams)
+    rows: dict[int, list[tuple[int, Responses]]] = {}
+    for stack in stacks:
+        for row, (i, number) in enumerate(zip(stack.at, stack.numbers)):
+            rows.setdefault(i, []).append((number, stack.responses[row : row + 1]))
+    for i, found in rows.items():
+        events, after = [], None
+        if i in outputs:
+            events, after = outputs[i].events, outputs[i].responses
+        every = Responses.join([*(one for _, one in found), *([] if after is None else [after])])
+        outputs[i] = Output(found[0][0], every, _NO_ROWS, (), events)
+    return [outputs[i] for i in range(len(streams))]
+
+
+def stacked_together(streams: Sequence[AxisStream]) -> tuple[list[StackedRows], dict[int, Output]]:
+    """The same: responses of axes that are alike in one piece, and the outputs of all others by their places.
+
+    An axis of the first kind is also among the others if it has events, or further responses.
+    """
+    stacks: list[StackedRows] = []
+    tracked: dict[int, UnfittedOutput] = {}
+    alike: dict[object, list[int]] = {}
+    for i, stream in enumerate(streams):
+        if stream.usual is not None and (len(stream.spectra) == 1 or (stream.spectra and stream.usual.results_only)):
+            alike.setdefault(stream.usual.kind, []).append(i)
+    for members in alike.values():
+        # The first spectrum of each, then the second one: several of a single axis cost less as one Block.
+        while members and (len(members) > 1 or len(streams[members[0]].spectra) == 1):
+            every = [(usual, streams[i].spectra[0]) for i in members if (usual := streams[i].usual) is not None]
+            try:
+                responses, taken = spectra_together(every)
+            except Exception:  # which of them it is shows only alone
+                _logger.exception("internal error while %d axes are tracked together", len(members))
+                break
+            if responses is None:
+                break
+            at = [i for i, one in zip(members, taken) if one]
+            stack = StackedRows(at, [streams[i].stacked() for i in at], responses)
+            if (usual := streams[at[0]].usual) is not None and usual.results_only:
+                stacks.append(stack)
+            else:
+                rows = enumerate(zip(at, stack.numbers))
+                tracked |= {i: streams[i].unfitted(number, responses[row : row + 1]) for row, (i, number) in rows}
+            members = [i for i in at if streams[i].spectra]
+    done = {i for stack in stacks for i in stack.at} | tracked.keys()
+    tracked |= {i: one.tracked() for i, one in enumerate(streams) if i not in done or one.has_more}
+    return stacks, dict(zip(tracked, _fitted_together([streams[i] for i in tracked], [*tracked.values()])))
+
+
+def _fitted_together(streams: Sequence[AxisStream], tracked: Sequence[UnfittedOutput]) -> list[Output]:
+    """What these become; the fits of all axes are one computation."""
     at = [i for i, one in enumerate(tracked) if len(one.to_fit)]
     fits, batches = [], []
     for i in at:

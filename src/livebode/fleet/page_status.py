@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
@@ -33,8 +34,9 @@ KINDS = ("", "loss", "change", "failure")
 
 @dataclass
 class _Losses:
-    """Gaps of an axis since this process owns it, and when the newest alarm of it was raised."""
+    """Name of an axis, its gaps since this process owns it, and when the newest alarm of it was raised."""
 
+    name: AxisName
     lost: int
     gaps: int = 0
     raised: int = 0
@@ -64,8 +66,13 @@ class PageStatus:
     ) -> list[tuple[str, bytes]]:
         """Subjects and messages of this moment, seconds since 1970; `waiting` of the log's messages are `lag_s` old."""
         found = []
-        self._known |= {key: _Losses(one.lost) for key, one in streams.items() if key not in self._known}
-        names = tuple(_named(key, streams[key].main) for key in self._known)
+        for key, stream in streams.items():
+            if key not in self._known:
+                self._known[key] = _Losses(AxisName(axis_path(key)), stream.lost)
+            if stream.main is not None:
+                losses = self._known[key]
+                losses.name = _named(losses.name, stream.main)
+        names = tuple(losses.name for losses in self._known.values())
         if names != self._named:
             self._named = names
             about = PartitionNames(self._partition, self._worker, names, KINDS)
@@ -74,20 +81,20 @@ class PageStatus:
         if self._names and now_s - self._named_s >= NAMES_EVERY_S:
             self._named_s = now_s
             found.append((f"{NAMES}.{self._partition}", self._names))
-        rows = np.zeros(len(self._known), AXIS_STATUS)
-        rows["axis"] = np.arange(len(rows))
-        rows["value"] = rows["bound"] = rows["change_percent"] = np.nan
-        for row, (key, losses) in zip(rows, self._known.items()):
-            _fill(row, streams[key], losses, now_s, waiting > 0, lag_s)
-        status = encode_status(self._partition, self._table, rows, now_s, waiting, lag_s)
+        each = enumerate(self._known.items())
+        rows = [_row(i, streams[key], losses, now_s, waiting > 0, lag_s) for i, (key, losses) in each]
+        status = encode_status(self._partition, self._table, np.array(rows, AXIS_STATUS), now_s, waiting, lag_s)
         return [*found, (f"{VIEW}.{self._partition}", status)] if self._names else found
 
 
-def _named(key: str, main: MainQuantity | None) -> AxisName:
-    return AxisName(axis_path(key)) if main is None else AxisName(axis_path(key), main.name, main.unit)
+def _named(name: AxisName, main: MainQuantity) -> AxisName:
+    return name if (name.parameter, name.unit) == (main.name, main.unit) else AxisName(name.path, main.name, main.unit)
 
 
-def _fill(row: np.void, stream: AxisStream, losses: _Losses, now_s: float, waits: bool, lag_s: float) -> None:
+def _row(
+    number: int, stream: AxisStream, losses: _Losses, now_s: float, waits: bool, lag_s: float
+) -> tuple[float, ...]:
+    """An axis as `AXIS_STATUS`: one tuple, since each field of an array that is set alone costs as much."""
     if stream.lost > losses.lost:
         losses.lost, losses.gaps = stream.lost, losses.gaps + 1
         losses.raised, losses.raised_s = losses.raised + 1, now_s
@@ -97,22 +104,26 @@ def _fill(row: np.void, stream: AxisStream, losses: _Losses, now_s: float, waits
             losses.raised, losses.raised_s = losses.raised + 1, now_s
     detection = None if stream.failure else stream.detection
     changed = detection is not None and detection.active
-    row["lost"], row["gaps"] = stream.lost, losses.gaps
-    row["raised"] = losses.raised + stream.changes  # the changes are in the state: a takeover raises none again
-    row["raised_s"] = int(max(losses.raised_s, stream.changed_s))
-    row["effective_s"], row["lag_s"] = stream.log_s, max(0.0, now_s - stream.log_s)
-    row["flags"] = GAPS * (stream.lost > 0) | BEHIND * (waits and lag_s > BEHIND_S)
-    row["flags"] |= ACTIVE * (bool(stream.failure) or changed)
-    if not waits and row["lag_s"] > SILENT_S:
-        row["flags"] |= SILENT
+    raised = losses.raised + stream.changes  # the changes are in the state: a takeover raises none again
+    age_s = max(0.0, now_s - stream.log_s)
+    flags = GAPS * (stream.lost > 0) | BEHIND * (waits and lag_s > BEHIND_S)
+    flags |= ACTIVE * (bool(stream.failure) or changed)
+    if not waits and age_s > SILENT_S:
+        flags |= SILENT
+    state = priority = kind = 0
     if detection is not None and detection.judges:
-        row["state"] = STATES.index("alarm" if changed else "ok")
+        state = STATES.index("alarm" if changed else "ok")
+    if raised:
+        about, urgent = _alarm(stream, losses, changed)
+        kind, priority = KINDS.index(about), PRIORITIES.index(urgent)
+    value = bound = change_percent = nan
     if stream.main is not None:
-        row["value"], row["bound"] = stream.main.value, stream.main.bound
-        row["change_percent"] = stream.main.change_percent
-    if row["raised"]:
-        kind, priority = _alarm(stream, losses, changed)
-        row["kind"], row["priority"] = KINDS.index(kind), PRIORITIES.index(priority)
+        value, bound, change_percent = stream.main.value, stream.main.bound, stream.main.change_percent
+    raised_s = int(max(losses.raised_s, stream.changed_s))
+    return (
+        number, state, priority, flags, kind, stream.log_s, stream.lost, age_s, value, bound, change_percent,
+        raised, raised_s, losses.gaps,
+    )  # fmt: skip
 
 
 def _alarm(stream: AxisStream, losses: _Losses, changed: bool) -> tuple[str, str]:

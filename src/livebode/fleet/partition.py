@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from livebode.configuration.axis import Axis
-from livebode.fleet.axis_stream import AxisStream, outputs_together
+from livebode.fleet.axis_stream import AxisStream, stacked_together
 from livebode.fleet.log import ClaimLostError, FleetLog, StoredMessage
 from livebode.fleet.page_status import PageStatus
 from livebode.fleet.reader import Reader
@@ -158,35 +158,38 @@ class PartitionOwner:
     def _process(self, messages: Sequence[StoredMessage]) -> Sequence[StoredMessage]:
         """Process messages until their results are enough for a message of results; returns the others."""
         stored = bisect_right(messages, self._through, key=lambda message: message.number)
-        streams, taken = self._take(messages[:stored] or messages)
         began_s = time.thread_time()
-        outputs = outputs_together([*streams.values()])
-        each_s = (time.thread_time() - began_s) / max(1, len(streams))
-        for (key, stream), output in zip(streams.items(), outputs):
-            self._stored.took(key, 0, each_s)
-            if not stored:
-                self._pending.add(key, stream, output)
+        sizes, taken = self._take(messages[:stored] or messages)
+        keys, streams = list(sizes), [self._streams[key] for key in sizes]
+        stacks, outputs = stacked_together(streams)
+        a_byte_s = (time.thread_time() - began_s) / max(1, sum(sizes.values()))
+        for key, size in sizes.items():
+            self._stored.took(key, size, size * a_byte_s)
+        if not stored:
+            for stack in stacks:
+                self._pending.add_rows([keys[i] for i in stack.at], [streams[i] for i in stack.at], stack)
+            for i, output in outputs.items():
+                self._pending.add(keys[i], streams[i], output)
         return messages[taken:]
 
-    def _take(self, messages: Sequence[StoredMessage]) -> tuple[dict[str, AxisStream], int]:
-        """Hand messages to their axes until the results may be enough; returns these axes, and how many it took.
+    def _take(self, messages: Sequence[StoredMessage]) -> tuple[dict[str, int], int]:
+        """Hand messages to their axes until the results may be enough; returns their bytes by axis, and how many it
+        took.
 
-        Messages that arrived together are tracked together, axis by axis.
+        Messages that arrived together are tracked together.
         """
-        streams: dict[str, AxisStream] = {}
+        sizes: dict[str, int] = {}
         size = self._pending.nbytes
         for index, message in enumerate(messages):
             if size > _PENDING_BYTES_MAX:
-                return streams, index
+                return sizes, index
             self._newest_s = message.stored_s
             key = key_of(message.subject)
             stream = self._stream(key, message.number)
             if stream is not None and message.number > stream.position:
-                began_s = time.thread_time()
                 size += stream.take(message.data, message.number, message.stored_s)
-                self._stored.took(key, len(message.data), time.thread_time() - began_s)
-                streams[key] = stream
-        return streams, len(messages)
+                sizes[key] = sizes.get(key, 0) + len(message.data)
+        return sizes, len(messages)
 
     def _stream(self, key: str, number: int) -> AxisStream | None:
         found = self._streams.get(key)

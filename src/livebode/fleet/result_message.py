@@ -11,8 +11,17 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.core.errors import FleetError
-from livebode.fleet.axis_stream import RESPONSE_BYTES, AxisStream, Output
-from livebode.fleet.wide_rows import PARAMETERS, ROWS, AxisFits, AxisRows, grid_of, parameter_table, response_table
+from livebode.fleet.axis_stream import RESPONSE_BYTES, AxisStream, Output, StackedRows
+from livebode.fleet.wide_rows import (
+    PARAMETERS,
+    ROWS,
+    AxesRows,
+    AxisFits,
+    AxisRows,
+    grid_of,
+    parameter_table,
+    response_table,
+)
 
 _EVENT_BYTES = 500
 """Of an event without its sentence."""
@@ -103,7 +112,7 @@ class PendingResults:
     """Outputs that are not stored yet."""
 
     def __init__(self) -> None:
-        self._responses: list[AxisRows] = []
+        self._responses: list[AxisRows | AxesRows] = []
         self._parameters: list[AxisFits] = []
         self._events: list[dict[str, Any]] = []
         self._recipes: dict[str, str] = {}
@@ -126,6 +135,14 @@ class PendingResults:
         if output.responses is not None or output.events:
             self._recipes[key], self._logged_s[key] = stream.recipe, stream.log_s
 
+    def add_rows(self, keys: Sequence[str], streams: Sequence[AxisStream], stack: StackedRows) -> None:
+        """Append the responses of several axes."""
+        runs = [stream.run for stream in streams]
+        self._responses.append(AxesRows(keys, runs, stack.numbers, stack.responses))
+        self.nbytes += stack.responses.value.size * RESPONSE_BYTES
+        for key, stream in zip(keys, streams):
+            self._recipes[key], self._logged_s[key] = stream.recipe, stream.log_s
+
     def add_event(self, key: str, event: Mapping[str, Any]) -> None:
         """Append an event that no message of the log causes."""
         self._events.append({"axis": key, **event})
@@ -139,6 +156,13 @@ class PendingResults:
             parameters=parameter_table(self._parameters),
             events=self._events,
             recipes=self._recipes,
-            grids={part.axis: grid_of(part.responses) for part in self._responses},
+            grids=self._grids(),
             logged_s=self._logged_s,
         )
+
+    def _grids(self) -> dict[str, Mapping[str, Any]]:
+        found: dict[str, Mapping[str, Any]] = {}
+        for part in self._responses:
+            grid = grid_of(part.responses)
+            found |= dict.fromkeys([part.axis] if isinstance(part, AxisRows) else part.axes, grid)
+        return found

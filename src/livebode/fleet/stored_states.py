@@ -23,6 +23,9 @@ class _Axis:
     since_s: float = 0.0
     stored_s: float = float("-inf")
 
+    def rested(self, now_s: float) -> bool:
+        return self.since_bytes > 0 and now_s - self.stored_s >= STATE_S_MIN
+
 
 class StoredStates:
     """Decides by two rules. A takeover computes again what came since the last state of each axis.
@@ -49,7 +52,9 @@ class StoredStates:
 
     def took(self, key: str, size_bytes: int, computed_s: float) -> None:
         """A message of an axis was processed."""
-        axis = self._axes.setdefault(key, _Axis())
+        axis = self._axes.get(key)
+        if axis is None:
+            axis = self._axes[key] = _Axis()
         axis.since_bytes += size_bytes
         axis.since_s += computed_s
 
@@ -63,7 +68,8 @@ class StoredStates:
 
     def due(self) -> list[str]:
         """The axes whose state is to be stored now."""
-        rested = {key: axis for key, axis in self._axes.items() if self._rested(axis)}
+        now_s = self._clock()
+        rested = {key: axis for key, axis in self._axes.items() if axis.rested(now_s)}
         found = [key for key, axis in rested.items() if STATE_SHARE * axis.since_bytes >= axis.size_bytes]
         return found + list(self._too_long(rested, set(found)))
 
@@ -74,6 +80,3 @@ class StoredStates:
                 return
             left_s -= rested[key].since_s
             yield key
-
-    def _rested(self, axis: _Axis) -> bool:
-        return axis.since_bytes > 0 and self._clock() - axis.stored_s >= STATE_S_MIN

@@ -48,6 +48,22 @@ class AxisRows(NamedTuple):
     responses: Responses
 
 
+class AxesRows(NamedTuple):
+    """A response of each of several axes: key, run and number of each row."""
+
+    axes: Sequence[str]
+    runs: Sequence[int]
+    numbers: Sequence[int]
+    responses: Responses
+
+    @classmethod
+    def of(cls, part: AxisRows) -> AxesRows:
+        """The rows of one axis."""
+        count = len(part.responses)
+        numbers = range(part.number, part.number + count)
+        return cls([part.axis] * count, [part.run] * count, numbers, part.responses)
+
+
 class AxisFits(NamedTuple):
     """Parameters of the responses with these numbers, (rows,), of a run of an axis."""
 
@@ -57,19 +73,19 @@ class AxisFits(NamedTuple):
     parameters: Parameters
 
 
-def response_table(parts: Sequence[AxisRows]) -> pa.Table:
-    """Rows of `ROWS`, axis by axis. All axes are converted at once: each conversion costs as much as many rows."""
+def response_table(parts: Sequence[AxisRows | AxesRows]) -> pa.Table:
+    """Rows of `ROWS`, part by part. All axes are converted at once: each conversion costs as much as many rows."""
     if not parts:
         return ROWS.empty_table()
-    every = [part.responses for part in parts]
-    counts = [len(one) for one in every]
-    lines = np.repeat([len(one.lines) for one in every], counts)
+    found = [AxesRows.of(part) if isinstance(part, AxisRows) else part for part in parts]
+    every = [part.responses for part in found]
+    lines = np.repeat([len(one.lines) for one in every], [len(one) for one in every])
     ends = pa.array(np.concatenate([[0], np.cumsum(lines)]).astype(np.int32))
-    numbers = [np.arange(part.number, part.number + count) for part, count in zip(parts, counts)]
+    words = [axis for part in found for axis in part.axes]
     columns: dict[str, pa.Array[Any]] = {
-        "axis": text([part.axis for part in parts], np.repeat(np.arange(len(parts)), counts)),
-        "run": from_numpy(np.repeat([part.run for part in parts], counts)),
-        "number": from_numpy(np.concatenate(numbers)),
+        "axis": text(words),
+        "run": from_numpy(np.array([run for part in found for run in part.runs], dtype=np.int64)),
+        "number": from_numpy(np.array([number for part in found for number in part.numbers], dtype=np.int64)),
         "digest": from_numpy(np.concatenate([digests(one) for one in every])),
     }
     with np.errstate(over="ignore", under="ignore"):

@@ -29,7 +29,9 @@ from livebode.kernel._lines import (
     LineRows,
     LineSettings,
     LineWindows,
+    NewestWindows,
     WeightSums,
+    process_each,
     process_lines,
 )
 from livebode.kernel._repeating import (
@@ -75,6 +77,7 @@ __all__ = [
     "LineWindows",
     "MarginGrid",
     "MarginRows",
+    "NewestWindows",
     "PeriodSpectra",
     "PeriodState",
     "PeriodVerdicts",
@@ -91,5 +94,6 @@ __all__ = [
     "instruction_set",
     "instruction_sets",
     "judge_periods",
+    "process_each",
     "process_lines",
 ]

@@ -157,6 +157,25 @@ class LineWindows(NamedTuple):
     moment: Floats
 
 
+class NewestWindows(NamedTuple):
+    """A window of each of several machines, whole and clean, without noise from detection lines or known errors.
+
+    Attributes
+    ----------
+    largest, place
+        As in `LineWindows`, of each machine, shape (machines,).
+    spectrum
+        Shape (signals, machines, lines).
+    moment
+        Time, schedule and oldest sample, shape (machines, 3).
+    """
+
+    largest: Floats
+    place: Integers
+    spectrum: Complex
+    moment: Floats
+
+
 class LineRows(NamedTuple):
     """Results: shape (rows, lines), of `dof` and `usable` (rows,), of `moment` (3, rows); NaN where not known.
 
@@ -178,9 +197,26 @@ class LineRows(NamedTuple):
 
 def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWindows) -> tuple[LineRows, float]:
     """Results of the windows, which are added to the moments, and the largest power of the reference so far."""
-    rows, lines = len(windows.whole), moments.means.shape[2]
+    rows = len(windows.whole)
+    found = _rows(rows, moments.means.shape[2], (3, rows))
+    return found, _native.process_lines(settings, moments, windows, found)
+
+
+def process_each(settings: LineSettings, moments: list[LineMoments], windows: NewestWindows) -> tuple[LineRows, Floats]:
+    """One window of each of several machines with the same settings, where noise is NOISE_SCATTER.
+
+    Returns the same bits as `process_lines` for each machine alone: rows, and largest powers, shape (machines,). Where
+    an argument is refused, no moments have changed.
+    """
+    machines, largest = len(moments), windows.largest.copy()
+    found = _rows(machines, windows.spectrum.shape[2], (machines, 3))
+    _native.process_each(settings, moments, largest, windows.place, windows.spectrum, windows.moment, found)
+    return found._replace(moment=found.moment.T), largest
+
+
+def _rows(rows: int, lines: int, moment: tuple[int, int]) -> LineRows:
     shape = rows, lines
-    found = LineRows(
+    return LineRows(
         np.empty(shape, np.complex128),
         np.empty(shape),
         np.empty(shape),
@@ -189,7 +225,6 @@ def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWin
         np.empty(shape),
         np.empty(shape, np.bool_),
         np.empty(rows),
-        np.empty((3, rows)),
+        np.empty(moment),
         np.empty(rows, np.bool_),
     )
-    return found, _native.process_lines(settings, moments, windows, found)

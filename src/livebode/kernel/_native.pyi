@@ -50,6 +50,17 @@ def judge_periods(
 class RepeatingPlan:
     def __init__(self, settings: tuple[Any, ...], /) -> None: ...
 
+def process_each(
+    settings: tuple[Any, ...],
+    moments: list[Any],
+    largest: npt.NDArray[np.float64],
+    place: npt.NDArray[np.int64],
+    spectrum: npt.NDArray[np.complex128],
+    moment: npt.NDArray[np.float64],
+    out: tuple[Any, ...],
+    /,
+) -> None: ...
+
 class Engine:
     def __init__(
         self,

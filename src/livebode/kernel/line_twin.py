@@ -21,6 +21,7 @@ from livebode.kernel._lines import (
     LineRows,
     LineSettings,
     LineWindows,
+    NewestWindows,
     WeightSums,
 )
 
@@ -46,6 +47,19 @@ def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWin
     """Results of the windows, which are added to the moments, and the largest power of the reference so far."""
     with np.errstate(all="ignore"):
         return _process(settings, moments, windows)
+
+
+def process_each(settings: LineSettings, moments: list[LineMoments], windows: NewestWindows) -> tuple[LineRows, Floats]:
+    """One window of each of several machines with the same settings."""
+    yes, found = np.ones(1, dtype=np.bool_), []
+    for i, own in enumerate(moments):
+        spectrum, moment = windows.spectrum[:, i : i + 1], windows.moment[i : i + 1].T
+        begin = float(windows.largest[i]), int(windows.place[i]), np.ascontiguousarray(spectrum)
+        one = LineWindows(*begin, None, yes, yes, None, None, None, None, np.inf, np.ascontiguousarray(moment))
+        found.append(process_lines(settings, own, one))
+    rows = [one._replace(moment=one.moment.T) for one, _ in found]
+    joined = LineRows(*map(np.concatenate, zip(*rows)))
+    return joined._replace(moment=joined.moment.T), np.array([largest for _, largest in found])
 
 
 def add_windows(

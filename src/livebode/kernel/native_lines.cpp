@@ -3,6 +3,8 @@
 
 #include <nanobind/nanobind.h>
 
+#include <deque>
+
 #include "native_array.h"
 
 namespace nb = nanobind;
@@ -76,6 +78,84 @@ double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tup
     return largest;
 }
 
+// LineMoments of one of several stages with the same settings, places and lines.
+struct StageMoments {
+    Array count, means, scatter, moment;
+
+    StageMoments(nb::tuple of, size_t places, size_t lines)
+        : count(of[0], INTEGER, {places}, WRITE), means(of[1], REAL, {LB_LINE_MEANS, places, lines}, WRITE),
+          scatter(of[2], REAL, {LB_LINE_SCATTER, places, lines}, WRITE), moment(of[3], REAL, {3, places}, WRITE)
+    {
+    }
+};
+
+// Everything is checked before the first moments change.
+void process_each(nb::tuple settings, nb::list each, nb::handle largest_so_far, nb::handle place, nb::handle spectrum,
+                  nb::handle windows, nb::tuple out)
+{
+    const size_t stages = each.size();
+    if (!stages) return;
+    const nb::tuple first = nb::cast<nb::tuple>(each[0]);
+    const size_t places = length_of(first[1], 1), lines = length_of(first[1], 2);
+    const size_t signals = length_of(spectrum, 0), bins = length_of(spectrum, 2);
+    const size_t denominator = nb::cast<size_t>(settings[3]), reference = nb::cast<size_t>(settings[4]);
+    if (denominator >= signals || reference >= signals || bins < lines)
+        throw nb::value_error("the spectra have too few signals or lines");
+    const Array table(settings[1], REAL, {3, length_of(settings[1], 1)});
+    const lb_line_weights weights = {nb::cast<double>(settings[0]), table, length_of(settings[1], 1)};
+    const lb_line_settings set = {nb::cast<bool>(settings[2]), denominator == reference, LB_NOISE_SCATTER, 0.0, 0.0};
+    std::deque<StageMoments> moments;
+    for (const nb::handle one : each) moments.emplace_back(nb::cast<nb::tuple>(one), places, lines);
+
+    const Array largest(largest_so_far, REAL, {stages}, WRITE), at(place, INTEGER, {stages});
+    const Array spectra(spectrum, COMPLEX, {signals, stages, bins}), moment(windows, REAL, {stages, 3});
+    const int64_t *place_of = at;
+    for (size_t i = 0; i < stages; ++i)
+        if (place_of[i] < 0 || static_cast<size_t>(place_of[i]) >= places)
+            throw nb::value_error("the period does not have this place");
+    const Array value(out[0], COMPLEX, {stages, lines}, WRITE), variance(out[1], REAL, {stages, lines}, WRITE);
+    const Array coherence(out[2], REAL, {stages, lines}, WRITE), of_input(out[3], REAL, {stages, lines}, WRITE);
+    const Array weight(out[4], COMPLEX, {stages, lines}, WRITE), errors(out[5], REAL, {stages, lines}, WRITE);
+    const Array valid(out[6], FLAG, {stages, lines}, WRITE), dof(out[7], REAL, {stages}, WRITE);
+    const Array centre(out[8], REAL, {stages, 3}, WRITE), usable(out[9], FLAG, {stages}, WRITE);
+    const uint8_t yes = 1;
+    const double *found = spectra.data<double>();
+    call(stages * lines, [&] {
+        lb_status status = LB_OK;
+        for (size_t i = 0; i < stages && status == LB_OK; ++i) {
+            const StageMoments &of = moments[i];
+            const lb_line_moments m = {places, lines, of.count, of.means, of.scatter, of.moment};
+            const double *row = found + 2 * i * bins;
+            const size_t signal = 2 * stages * bins, to = i * lines;
+            const lb_line_windows in = {static_cast<size_t>(place_of[i]),
+                                        1,
+                                        bins,
+                                        row,
+                                        row + denominator * signal,
+                                        row + reference * signal,
+                                        nullptr,
+                                        &yes,
+                                        &yes,
+                                        nullptr,
+                                        nullptr,
+                                        nullptr,
+                                        nullptr,
+                                        moment.data<double>() + 3 * i};
+            const lb_line_rows rows = {value.data<double>() + 2 * to,  variance.data<double>() + to,
+                                       coherence.data<double>() + to,  of_input.data<double>() + to,
+                                       weight.data<double>() + 2 * to, errors.data<double>() + to,
+                                       valid.data<uint8_t>() + to,     dof.data<double>() + i,
+                                       centre.data<double>() + 3 * i,  usable.data<uint8_t>() + i};
+            status = lb_lines_process(&weights, &m, largest.data<double>() + i, &set, &in, &rows);
+        }
+        return status;
+    });
+}
+
 } // namespace
 
-void bind_lines(nb::module_ &m) { m.def("process_lines", &process); }
+void bind_lines(nb::module_ &m)
+{
+    m.def("process_lines", &process);
+    m.def("process_each", &process_each);
+}

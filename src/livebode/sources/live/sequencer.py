@@ -120,6 +120,25 @@ class Sequencer(StatefulBase):
             return self._insert(aligned)
         return self._doubt(aligned)
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing waits or is in doubt, so that `passed` takes the next batch."""
+        open_ = self._waiting or self._unconfirmed.pending or self._resumed is not None
+        return self._next is not None and not (self._gap or open_)
+
+    def passed(self, first: int, samples: int, rate_hz: float, stamp_s: float | None, arrived_s: float) -> int | None:
+        """Take a batch of the stream that begins with the due sample, as `push` would, without making a Block of it.
+
+        Only while it is idle, for a batch that would not change its schema or epoch. Returns the number of the Block;
+        None, and nothing has changed, if the batch begins with another sample.
+        """
+        if first != self._next:
+            return None
+        self._highest = max(self._highest, first)
+        number = self._number
+        self._continue(first, samples, number, rate_hz, stamp_s, arrived_s)
+        return number
+
     def poll(self, now_s: float) -> list[LiveBlock]:
         """Blocks that waited long enough for missing samples before them; `now_s` as in `arrived_s`."""
         if not self._waiting:
@@ -191,14 +210,20 @@ class Sequencer(StatefulBase):
 
     def _emit(self, batch: AnyBatch, start: int) -> LiveBlock:
         block = batch.block(self._number, start, self._gap)
-        if batch.stamp_s is not None:
-            self.clock = self.clock or ClockMonitor(self._events, batch.rate_hz)
-            self.clock.take(start, batch.stamp_s + (start - batch.first_sample) / batch.rate_hz, self._number)
+        stamp_s = None if batch.stamp_s is None else batch.stamp_s + (start - batch.first_sample) / batch.rate_hz
         self._gap, self._resumed = False, None
-        self._next, self._number = batch.stop, block.stop
-        self._progress_s = batch.arrived_s
-        self._events.position = (self._number, self._number / batch.rate_hz)
+        self._continue(start, batch.stop - start, self._number, batch.rate_hz, stamp_s, batch.arrived_s)
         return block
+
+    def _continue(
+        self, start: int, samples: int, number: int, rate_hz: float, stamp_s: float | None, arrived_s: float
+    ) -> None:
+        """Count the sender's samples from `start` on, which get numbers from `number` on."""
+        if stamp_s is not None:
+            self.clock = self.clock or ClockMonitor(self._events, rate_hz)
+            self.clock.take(start, stamp_s, number)
+        self._next, self._number, self._progress_s = start + samples, number + samples, arrived_s
+        self._events.position = (self._number, self._number / rate_hz)
 
     def _lose(self, first: int) -> None:
         assert self._next is not None

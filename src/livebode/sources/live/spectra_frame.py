@@ -120,7 +120,7 @@ def encode_spectra_layout(layout: SpectraLayout, rate_hz: float, *, epoch: int =
 def encode_spectra(batch: SpectraBatch, *, sequence: int = 0, double: bool = False) -> bytes:
     """A frame with the spectra of a batch, as float32, or as float64 with `double`."""
     layout = batch.layout
-    dtype = _payload(layout, double)
+    dtype = payload_type(layout, double=double)
     rows = np.zeros(len(batch.state), dtype)
     rows["state"], rows["values"] = batch.state, batch.values.T
     sums = batch.sums.transpose(1, 0, 2)
@@ -134,7 +134,7 @@ def encode_spectra(batch: SpectraBatch, *, sequence: int = 0, double: bool = Fal
     )  # fmt: skip
 
 
-def _payload(layout: SpectraLayout, double: bool) -> np.dtype[Any]:
+def payload_type(layout: SpectraLayout, *, double: bool) -> np.dtype[Any]:
     """One spectrum in the payload."""
     real = "<f8" if double else "<f4"
     sums = (len(layout.signals), len(layout.bins), 2)
@@ -148,16 +148,16 @@ def read_spectra(header: Header, payload: bytes | memoryview, layout: SpectraLay
         raise inconsistent_frame(
             f"a frame of spectra has {header.channels} channels, its layout {count}", channels=[header.channels, count]
         )
-    dtype = _payload(layout, bool(header.flags & FLOAT64))
+    dtype = payload_type(layout, double=bool(header.flags & FLOAT64))
     if not header.samples or len(payload) != header.samples * dtype.itemsize:
         raise inconsistent_frame(
             f"a frame of {header.samples} spectra of {dtype.itemsize} bytes each has {len(payload)} bytes of them",
             spectra=header.samples,
             bytes=len(payload),
         )
-    rows = np.frombuffer(payload, dtype)
-    if np.any(rows["state"] > _STATES):
-        state = int(rows["state"].max())
+    sums, values, states = read_rows(payload, layout, double=bool(header.flags & FLOAT64))
+    if np.any(states > _STATES):
+        state = int(states.max())
         raise SourceError(
             "value-invalid",
             f"a spectrum has the state {state}, not 0 to {_STATES}",
@@ -165,22 +165,26 @@ def read_spectra(header: Header, payload: bytes | memoryview, layout: SpectraLay
             key="state",
             value=state,
         )
+    return SpectraBatch(
+        header.sample + 1 - layout.hop, sums, values, states, layout, header.rate_hz, header.epoch,
+        stamp_of(header.stamp_ns, layout.hop, header.rate_hz), arrived_s,
+    )  # fmt: skip
+
+
+def read_rows(
+    payload: bytes | memoryview, layout: SpectraLayout, *, double: bool
+) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.uint32]]:
+    """Sums, values and states of consecutive spectra in a payload, as those of a SpectraBatch."""
+    rows = np.frombuffer(payload, payload_type(layout, double=double))
     with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
         sums = rows["sums"].astype(np.float64)
         values = rows["values"].T.astype(np.float64, order="C")
-    # The stamp is that of the newest sample, a batch's that of its first.
-    late_s = (layout.hop - 1) / header.rate_hz if header.rate_hz else 0.0
-    return SpectraBatch(
-        header.sample + 1 - layout.hop,
-        complex_of(sums),
-        values,
-        np.array(rows["state"]),
-        layout,
-        header.rate_hz,
-        header.epoch,
-        header.stamp_ns / 1e9 - late_s if header.stamp_ns else None,
-        arrived_s,
-    )
+    return complex_of(sums), values, np.array(rows["state"])
+
+
+def stamp_of(stamp_ns: int, hop: int, rate_hz: float) -> float | None:
+    """The sender's clock at the first sample of a spectrum: the stamp of its frame is that of the newest."""
+    return stamp_ns / 1e9 - ((hop - 1) / rate_hz if rate_hz else 0.0) if stamp_ns else None
 
 
 def complex_of(pairs: NDArray[np.float64]) -> NDArray[np.complex128]:

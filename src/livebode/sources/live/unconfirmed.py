@@ -37,6 +37,11 @@ class UnconfirmedBatches(StatefulBase):
         self._confirmed_again = max(CONFIRMED, reorder + 1)
         self._batches: list[AnyBatch] = []
 
+    @property
+    def pending(self) -> bool:
+        """Whether there are any."""
+        return bool(self._batches)
+
     def another_epoch(self, batch: AnyBatch, epoch: int | None, due: int | None, *, replaced: bool) -> list[AnyBatch]:
         """Take a batch of another epoch; returns what is accepted now, if anything."""
         follows = bool(self._batches) and self._batches[-1].epoch == batch.epoch
