@@ -6,6 +6,8 @@ import numpy as np
 import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
+from livebode.excitation.medians import medians
+
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -20,8 +22,8 @@ def cut(x: Floats, period: int) -> Floats:
     """
     count = x.size // period
     blocks = x[: count * period].reshape(count, period)
-    typical = np.median(blocks, axis=0)
-    level = np.median(blocks - typical, axis=1)
+    typical = medians(blocks, axis=0)
+    level = medians(blocks - typical, axis=1)
     slope = np.diff(level, append=level[-1]) if count > 1 else np.zeros(1)
     if count > 1:
         slope[-1] = slope[-2]

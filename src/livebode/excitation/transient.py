@@ -6,6 +6,8 @@ import numpy as np
 import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
+from livebode.excitation.medians import medians
+
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
@@ -45,22 +47,20 @@ def unlike(blocks: Floats, spectra: Complex, excited: Flags) -> Flags:
         return np.zeros(count, dtype=np.bool_)
     if not excited.any():
         return np.zeros(count, dtype=np.bool_)
-    away = np.abs(_from_median(spectra[:, excited])) ** 2
-    usual = np.median(away, axis=0) + (_ROUNDING * np.abs(np.median(spectra[:, excited].real, axis=0))) ** 2
+    lines = spectra[:, excited]
+    real = medians(lines.real, axis=0)
+    away = np.abs(lines - real - 1j * medians(lines.imag, axis=0)) ** 2
+    usual = medians(away, axis=0) + (_ROUNDING * np.abs(real)) ** 2
     usual += np.finfo(np.float64).tiny
     at_lines = np.sqrt(np.mean(away / usual, axis=1))
     size = np.max(np.abs(blocks), axis=1)
-    at_samples = np.max(np.abs(blocks - np.median(blocks, axis=0)), axis=1)
+    at_samples = np.max(np.abs(blocks - medians(blocks, axis=0)), axis=1)
     return _far(at_lines, np.zeros(count)) | _far(at_samples, _ROUNDING * np.median(size))
 
 
 def leading(flags: Flags) -> int:
     """Number of consecutive marked periods from the start."""
     return int(np.argmin(flags)) if not flags.all() else 0
-
-
-def _from_median(spectra: Complex) -> Complex:
-    return np.asarray(spectra - np.median(spectra.real, axis=0) - 1j * np.median(spectra.imag, axis=0))
 
 
 def _far(distance: Floats, rounding: float | Floats) -> Flags:
