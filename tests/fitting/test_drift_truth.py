@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -116,3 +117,16 @@ def test_a_response_that_may_depend_on_the_position_is_no_drift(way_m: float, fo
     test = DriftTest(LINES)
     test.add(Responses(**{**vars(responses), "schedule": 0.8 + way_m * np.linspace(0, 1, 60)}))
     assert test.result().found == found
+
+
+def test_windows_in_parts_give_the_bits_of_windows_one_by_one() -> None:
+    rng = np.random.default_rng(3)
+    found, _ = record(rng, 700, 0.1)
+    valid = rng.random(found.value.shape) < 0.9
+    found = replace(found, valid=valid, first=np.arange(700) * 130, sample=np.arange(700) * 130 + 399)
+    one_by_one, in_parts = DriftTest(LINES), DriftTest(LINES)
+    for at in range(700):
+        one_by_one.add(found[at : at + 1])
+    for at in range(0, 700, 90):
+        in_parts.add(found[at : at + 90])
+    assert in_parts.snapshot() == one_by_one.snapshot()
