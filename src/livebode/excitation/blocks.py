@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
 from livebode.excitation.medians import medians
@@ -36,7 +35,7 @@ def cut(x: Floats, period: int) -> Floats:
 def spectra(blocks: Floats) -> Complex:
     """Spectra of the periods, shape (periods, bins 0 … below N/2), scaled so that |X_k| is a line's amplitude."""
     period = blocks.shape[1]
-    return np.asarray(scipy.fft.rfft(blocks, axis=1)[:, : (period + 1) // 2] * (2 / period))
+    return np.asarray(np.fft.rfft(blocks, axis=1)[:, : (period + 1) // 2] * (2 / period))
 
 
 def grouped(periods: Complex, most: int = 16) -> Complex:
