@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from livebode.records.piece import ParquetPart, sha256_of_next
 
-_GROUP_ROWS = 1 << 18
+_GROUP_ROWS = 1 << 17  # two groups at a time are in memory: one fills, one is written
 
 
 @dataclass(frozen=True)
