@@ -15,7 +15,6 @@ from __future__ import annotations
 import json
 import os
 import resource
-import subprocess
 import sys
 import tempfile
 import time
@@ -28,6 +27,7 @@ import pyarrow.parquet as pq
 import scipy.fft
 from scipy.signal import ShortTimeFFT
 
+from bench.processes import Processes
 from livebode.core import Block, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
@@ -108,20 +108,6 @@ def processor_s(work: Callable[[], object]) -> float:
     return time.process_time() - begun
 
 
-class Processes:
-    """Runs programs with bytecode, which an installed package has; their processor and wall time, and their output."""
-
-    def __init__(self, folder: Path) -> None:
-        self._environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-        self._environment["PYTHONPYCACHEPREFIX"] = str(folder / "bytecode")
-
-    def run(self, *command: str) -> tuple[float, float, str]:
-        before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        done = subprocess.run(command, env=self._environment, check=True, capture_output=True, text=True)
-        wall_s, after = time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
-        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, wall_s, done.stdout
-
-
 def run_livebode(processes: Processes, log: Path, out: Path) -> dict[str, float]:
     """Processor and wall time of the whole command, and the wall time of all but start and pictures; peak memory."""
     options = f"--excitation w --input u --output y --lines 20:220:10 --window {WINDOW} --hop {HOP} --force --json"
@@ -136,7 +122,7 @@ def measure(rounds: int = ROUNDS) -> dict[str, float]:
     found: list[dict[str, float]] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        log, out, processes = folder / "log.parquet", folder / "run", Processes(folder)
+        log, out, processes = folder / "log.parquet", folder / "run", Processes(folder / "bytecode")
         write_log(log)  # in a function, so that the forked children do not begin with the memory of the samples
         itself = (sys.executable, "-m", "bench.job")
         processes.run(LIVEBODE, "run", "--help")  # writes the bytecode
