@@ -8,7 +8,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from livebode.records.piece import ParquetPart, sha256_of_next
+from livebode.records.parquet_part import ParquetPart, sha256_of_next
 
 
 def parts_of(path: Path) -> list[dict[str, Any]]:

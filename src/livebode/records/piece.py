@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -14,19 +12,10 @@ import pyarrow.parquet as pq
 
 from livebode.core import Event, RecordError
 from livebode.records.inside import open_read
+from livebode.records.parquet_part import ParquetPart, sha256_of_next
 from livebode.records.segments.damage import KIND
 
-_BLOCK = 1 << 20
 _verified: dict[tuple[object, ...], list[bool]] = {}
-
-
-@dataclass(frozen=True)
-class ParquetPart:
-    """Consecutive bytes of a Parquet file: a row group, or, with no rows, the bytes after the last one."""
-
-    rows: int
-    size_bytes: int
-    sha256: str
 
 
 class StoredTable:
@@ -96,12 +85,3 @@ class StoredTable:
         self._report(
             Event(KIND, 0, 0.0, f"{self._name} is damaged: {what}", {"file": self._name, "rows": {table: rows}})
         )
-
-
-def sha256_of_next(file: BinaryIO, size: int) -> str:
-    """The checksum of the next `size` bytes, in hexadecimal form."""
-    found = hashlib.sha256()
-    while size > 0 and (block := file.read(min(size, _BLOCK))):
-        found.update(block)
-        size -= len(block)
-    return found.hexdigest()

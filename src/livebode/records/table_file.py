@@ -12,7 +12,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.records.piece import ParquetPart, sha256_of_next
+from livebode.records.parquet_part import ParquetPart, sha256_of_next
 
 _GROUP_ROWS = 1 << 17  # two groups at a time are in memory: one fills, one is written
 
