@@ -11,9 +11,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.records.piece import parts_of
 from livebode.records.segments.json_lines import to_line
 from livebode.records.summary_file import COPY, RUN, read_summary, to_document
+from tools.parquet_parts import parts_of
 
 
 def copy_run(

@@ -137,3 +137,17 @@ def test_two_leaps_are_undone_on_the_grid_of_the_first_period() -> None:
     assert np.array_equal(
         back, [0, 1, 2, 3, 4, np.nan, np.nan, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18, 19], equal_nan=True
     )
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.01, 0.3]), st.integers(0, 4))
+@settings(max_examples=15)
+def test_periods_examined_together_give_the_slips_of_periods_one_by_one(seed: int, noise: float, leaps: int) -> None:
+    rng = np.random.default_rng(seed)
+    x = np.resize(PLAYED, 400 * int(rng.integers(20, 200)))
+    x = x + noise * rng.standard_normal(x.size)
+    for at in rng.integers(1, x.size - 500, leaps):
+        x = np.delete(x, np.arange(at, at + rng.integers(1, 9)))
+    together = find_slips(x, WINDOW)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("livebode.excitation.slips._TOGETHER", 1)
+        assert find_slips(x, WINDOW) == together

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.special
 
 from livebode.core import Lines, Responses
 from livebode.fitting import mean_response
-from livebode.fitting.drift import FALSE_ALARM, DriftTest
+from livebode.fitting.drift import FALSE_ALARM, DriftTest, _chance_of_sum
 
 LINES = Lines.parse("20:140:10", 4000, 400)
 NOISE = 0.02  # of the response, in a window
@@ -116,3 +118,22 @@ def test_a_response_that_may_depend_on_the_position_is_no_drift(way_m: float, fo
     test = DriftTest(LINES)
     test.add(Responses(**{**vars(responses), "schedule": 0.8 + way_m * np.linspace(0, 1, 60)}))
     assert test.result().found == found
+
+
+def test_windows_in_parts_give_the_bits_of_windows_one_by_one() -> None:
+    rng = np.random.default_rng(3)
+    found, _ = record(rng, 700, 0.1)
+    valid = rng.random(found.value.shape) < 0.9
+    found = replace(found, valid=valid, first=np.arange(700) * 130, sample=np.arange(700) * 130 + 399)
+    one_by_one, in_parts = DriftTest(LINES), DriftTest(LINES)
+    for at in range(700):
+        one_by_one.add(found[at : at + 1])
+    for at in range(0, 700, 90):
+        in_parts.add(found[at : at + 90])
+    assert in_parts.snapshot() == one_by_one.snapshot()
+
+
+@pytest.mark.parametrize("total", [0.0, 1e-9, 0.3, 5.0, 21.0, 300.0, np.inf])
+@pytest.mark.parametrize("lines", [1, 7, 21, 401])
+def test_the_chance_of_all_lines_together_is_that_of_scipy(lines: int, total: float) -> None:
+    assert _chance_of_sum(lines, total) == pytest.approx(scipy.special.gammaincc(lines, total), rel=1e-11, abs=1e-300)

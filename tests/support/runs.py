@@ -12,7 +12,6 @@ from livebode.configuration import Axis
 from livebode.configuration.record_section import RecordSection
 from livebode.estimation.stream_estimator import Follower
 from livebode.records import RunRecord
-from livebode.records.piece import parts_of
 from livebode.records.summary_file import RUN, to_document
 from livebode.runtime import Destination, Outcome, RunLoop, Subscriber, run
 from livebode.runtime.change_detection import ChangeDetection
@@ -20,6 +19,7 @@ from livebode.runtime.fits import Fits
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.run_loop import Source
 from tests.support.command import write_parquet
+from tools.parquet_parts import parts_of
 
 
 def small_run(folder: Path, columns: Mapping[str, np.ndarray], **sections: dict[str, object]) -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+from importlib import import_module
 from math import isnan
 from pathlib import Path
 from shutil import get_terminal_size
@@ -37,6 +38,16 @@ def drawing(title: str, names: tuple[str, str]) -> Draw:
             save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
 
     return draw
+
+
+def load_beside() -> None:
+    """Load Matplotlib in a thread: a second processor has time while a recording is examined and tracked."""
+    threading.Thread(target=_load_matplotlib, name="matplotlib").start()
+
+
+def _load_matplotlib() -> None:
+    for module in ("matplotlib.backends.backend_agg", "matplotlib.figure"):
+        import_module(module)
 
 
 def show(outcome: Outcome) -> None:

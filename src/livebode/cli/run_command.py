@@ -15,7 +15,7 @@ from livebode.cli.band import Band, parsed_band
 from livebode.cli.notices import NoticePrinter
 from livebode.cli.options import Dbc, Excitation, From, Json, Outputs, Port, Rate, Serve, SkipPeriods, Time, To
 from livebode.cli.output_only import draw_modes, show_modes
-from livebode.cli.pictures import drawing, show, tracked_amount
+from livebode.cli.pictures import drawing, load_beside, show, tracked_amount
 from livebode.cli.remote import recorded_at
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
@@ -306,7 +306,8 @@ def _window(text: str | None) -> int | str | None:
 def _run(axis: Axis, directory: Path, force: bool, quiet: bool, subscribers: tuple[Subscriber, ...]) -> Outcome:
     """Track one recording."""
     return _with_progress(
-        lambda own: run(axis, Destination(directory, _drawing(axis), force, (*subscribers, *own))), quiet
+        lambda own: run(axis, Destination(directory, _drawing(axis), force, (*subscribers, *own), prepare=load_beside)),
+        quiet,
     )
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
+
+from livebode.excitation.medians import medians
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -20,8 +21,8 @@ def cut(x: Floats, period: int) -> Floats:
     """
     count = x.size // period
     blocks = x[: count * period].reshape(count, period)
-    typical = np.median(blocks, axis=0)
-    level = np.median(blocks - typical, axis=1)
+    typical = medians(blocks, axis=0)
+    level = medians(blocks - typical, axis=1)
     slope = np.diff(level, append=level[-1]) if count > 1 else np.zeros(1)
     if count > 1:
         slope[-1] = slope[-2]
@@ -34,7 +35,7 @@ def cut(x: Floats, period: int) -> Floats:
 def spectra(blocks: Floats) -> Complex:
     """Spectra of the periods, shape (periods, bins 0 … below N/2), scaled so that |X_k| is a line's amplitude."""
     period = blocks.shape[1]
-    return np.asarray(scipy.fft.rfft(blocks, axis=1)[:, : (period + 1) // 2] * (2 / period))
+    return np.asarray(np.fft.rfft(blocks, axis=1)[:, : (period + 1) // 2] * (2 / period))
 
 
 def grouped(periods: Complex, most: int = 16) -> Complex:

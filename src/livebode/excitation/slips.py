@@ -12,6 +12,7 @@ Floats = NDArray[np.float64]
 
 _PERIODS_MIN = 6
 _REMEMBERED = 16  # periods in the expected one: a drifting clock is followed and does not count as jumps
+_TOGETHER = 128  # periods that are examined in one computation, as long as nothing is found
 # Energy by which a jump changes a period, over the noise of a sample: exceeded by chance once in 1e4 periods.
 _CLEAR = 16.0**2
 _CONFIRMED = 2  # consecutive periods with the same jump
@@ -70,8 +71,13 @@ class _Search:
 
     def slips(self) -> list[Slip]:
         found: list[Slip] = []
-        shift, strange, recent = 0, 0, [self._blocks[0]]
-        for at in range(1, len(self._blocks)):
+        at, shift, strange, recent = 0, 0, 0, [self._blocks[0]]
+        while (at := at + 1) < len(self._blocks):
+            if not strange and len(recent) >= _REMEMBERED:
+                calm = self._calm(at, np.array(recent[-_REMEMBERED:]), shift)
+                recent, at = [*recent[-_REMEMBERED:], *calm], at + len(calm)
+                if at == len(self._blocks):
+                    break
             expected = np.mean(recent[-_REMEMBERED:], axis=0)
             leap = self._leap(at, expected, shift)
             if leap:
@@ -85,6 +91,20 @@ class _Search:
                 recent.append(here)
                 strange = 0
         return found
+
+    def _calm(self, at: int, recent: Floats, shift: int) -> Floats:
+        """The next periods, shifted, that have no jump and are not strange: the loop in `slips` for many at a time."""
+        here = np.roll(self._blocks[at : at + _TOGETHER], shift, axis=1)
+        known, expected = np.concatenate([recent, here[:-1]]), np.zeros_like(here)
+        for behind in range(_REMEMBERED):  # in the order of a mean over the rows: the same bits
+            expected += known[behind : behind + len(here)]
+        expected /= _REMEMBERED
+        spectra = self._spectra[at : at + _TOGETHER]
+        agreement = np.fft.irfft(np.fft.rfft(expected, axis=1) * spectra.conj(), self._period, axis=1)
+        usual = _STRANGE * self._noise + _ROUNDING * self._energy[at : at + _TOGETHER]
+        jumps = np.argmax(agreement, axis=1) != shift % self._period
+        found = jumps | (np.sum((here - expected) ** 2, axis=1) > usual)
+        return here[: int(np.argmax(found))] if found.any() else here
 
     def _leap(self, at: int, expected: Floats, shift: int) -> int:
         """Phase jump in samples in this period or the previous one; 0 without a jump."""

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from statistics import NormalDist
+
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
+
+from livebode.excitation.medians import medians
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
+
+_normal = NormalDist().inv_cdf  # scipy.special takes as long to load as a recording of minutes to track
 
 FALSE_ALARM = 1e-3  # probability that any period of a recording is marked by chance
 # With fewer periods there is no majority of steady ones.
@@ -45,12 +50,14 @@ def unlike(blocks: Floats, spectra: Complex, excited: Flags) -> Flags:
         return np.zeros(count, dtype=np.bool_)
     if not excited.any():
         return np.zeros(count, dtype=np.bool_)
-    away = np.abs(_from_median(spectra[:, excited])) ** 2
-    usual = np.median(away, axis=0) + (_ROUNDING * np.abs(np.median(spectra[:, excited].real, axis=0))) ** 2
+    lines = spectra[:, excited]
+    real = medians(lines.real, axis=0)
+    away = np.abs(lines - real - 1j * medians(lines.imag, axis=0)) ** 2
+    usual = medians(away, axis=0) + (_ROUNDING * np.abs(real)) ** 2
     usual += np.finfo(np.float64).tiny
     at_lines = np.sqrt(np.mean(away / usual, axis=1))
     size = np.max(np.abs(blocks), axis=1)
-    at_samples = np.max(np.abs(blocks - np.median(blocks, axis=0)), axis=1)
+    at_samples = np.max(np.abs(blocks - medians(blocks, axis=0)), axis=1)
     return _far(at_lines, np.zeros(count)) | _far(at_samples, _ROUNDING * np.median(size))
 
 
@@ -59,14 +66,10 @@ def leading(flags: Flags) -> int:
     return int(np.argmin(flags)) if not flags.all() else 0
 
 
-def _from_median(spectra: Complex) -> Complex:
-    return np.asarray(spectra - np.median(spectra.real, axis=0) - 1j * np.median(spectra.imag, axis=0))
-
-
 def _far(distance: Floats, rounding: float | Floats) -> Flags:
     # Equal periods have the distance 0; adding the rounding keeps the logarithm.
     log = np.log(distance + rounding + np.finfo(np.float64).tiny)
     middle = np.median(log)
-    spread = np.median(np.abs(log - middle)) / scipy.special.ndtri(0.75)
-    sigmas = -scipy.special.ndtri(FALSE_ALARM / len(log))
+    spread = np.median(np.abs(log - middle)) / _normal(0.75)
+    sigmas = -_normal(FALSE_ALARM / len(log))
     return np.asarray(log > middle + max(sigmas * spread, np.log(_FACTOR_MIN)))

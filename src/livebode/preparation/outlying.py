@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from livebode.core import Event, counted
 from livebode.estimation import Settings
 from livebode.excitation.blocks import cut
+from livebode.excitation.medians import medians
 from livebode.excitation.prepare import filled
 from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.roles import ROLES
@@ -96,7 +97,7 @@ def _silent(x: Floats, window: int) -> Flags:
     if np.count_nonzero(np.isfinite(x)) < window:
         return np.zeros(x.size // window, dtype=np.bool_)
     blocks = cut(filled(x), window)
-    typical = np.median(blocks, axis=0)
+    typical = medians(blocks, axis=0)
     return np.asarray(blocks @ typical < _SILENT * typical @ typical)
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -14,32 +12,10 @@ import pyarrow.parquet as pq
 
 from livebode.core import Event, RecordError
 from livebode.records.inside import open_read
+from livebode.records.parquet_part import ParquetPart, sha256_of_next
 from livebode.records.segments.damage import KIND
 
-_BLOCK = 1 << 20
 _verified: dict[tuple[object, ...], list[bool]] = {}
-
-
-@dataclass(frozen=True)
-class ParquetPart:
-    """Consecutive bytes of a Parquet file: a row group, or, with no rows, the bytes after the last one."""
-
-    rows: int
-    size_bytes: int
-    sha256: str
-
-
-def parts_of(path: Path) -> list[dict[str, Any]]:
-    """The parts of a newly written file, for run.json."""
-    with path.open("rb") as file:
-        about = pq.read_metadata(file)
-        groups = [about.row_group(number) for number in range(about.num_row_groups)]
-        ends = [max(_end(group.column(k)) for k in range(group.num_columns)) for group in groups]
-        rows = [group.num_rows for group in groups]
-        file.seek(0)
-        size = os.fstat(file.fileno()).st_size
-        sizes = [end - begin for begin, end in zip([0, *ends], [*ends, size])]
-        return [asdict(ParquetPart(n, size, _sha256(file, size))) for n, size in zip([*rows, 0], sizes)]
 
 
 class StoredTable:
@@ -99,7 +75,7 @@ class StoredTable:
         status = os.fstat(file.fileno())
         key = (tuple(parts), status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
         if key not in _verified:
-            sound = [_sha256(file, part.size_bytes) == part.sha256 for part in parts]
+            sound = [sha256_of_next(file, part.size_bytes) == part.sha256 for part in parts]
             sound[-1] &= status.st_size == sum(part.size_bytes for part in parts)
             _verified[key] = sound
         return _verified[key]
@@ -109,18 +85,3 @@ class StoredTable:
         self._report(
             Event(KIND, 0, 0.0, f"{self._name} is damaged: {what}", {"file": self._name, "rows": {table: rows}})
         )
-
-
-def _end(column: Any) -> int:
-    begin = column.data_page_offset
-    if column.has_dictionary_page:
-        begin = min(begin, column.dictionary_page_offset)
-    return int(begin + column.total_compressed_size)
-
-
-def _sha256(file: BinaryIO, size: int) -> str:
-    found = hashlib.sha256()
-    while size > 0 and (block := file.read(min(size, _BLOCK))):
-        found.update(block)
-        size -= len(block)
-    return found.hexdigest()

@@ -15,7 +15,6 @@ from livebode.core import Event, Parameters, RecordError, Responses
 from livebode.core.files import whole_directory
 from livebode.core.writing import writing
 from livebode.records.parameter_table import PARAMETERS, parameter_rows
-from livebode.records.piece import parts_of
 from livebode.records.removal import check_removable, remove
 from livebode.records.response_table import RESPONSES, as_batch
 from livebode.records.segments.json_lines import to_line
@@ -100,19 +99,18 @@ class RunDirectory:
             self._events.write(to_line(asdict(event)))
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
-        """Close the tables, write run.json with their checksums, and let `draw` add pictures to the directory."""
+        """Let `draw` add pictures to the directory, close the tables, and write run.json with their checksums."""
         with writing(self.path, RecordError):
-            self._close()
-            files = {path.name: parts_of(path) for path in sorted(self.partial.glob("*.parquet"))}
-            data = to_document(summary | {"files": files})
+            draw(self.partial)  # while the last rows are written
+            data = to_document(summary | {"files": self._close()})
             for name in (RUN, COPY):
                 (self.partial / name).write_bytes(data)
-            draw(self.partial)
 
-    def _close(self) -> None:
-        for file in (self._responses, self._parameters, self._events):
-            if file is not None:
-                file.close()
+    def _close(self) -> dict[str, Any]:
+        """Close the files; the parts of the tables, for run.json."""
+        self._events.close()
+        tables = {"parameters.parquet": self._parameters, "responses.parquet": self._responses}
+        return {name: table.close() for name, table in tables.items() if table is not None}
 
     def _check_free(self) -> None:
         if not self.path.exists() and not self.path.is_symlink():

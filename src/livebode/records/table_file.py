@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+import os
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-_GROUP_ROWS = 1 << 18
+from livebode.records.parquet_part import ParquetPart, sha256_of_next
+
+_GROUP_ROWS = 1 << 17  # two groups at a time are in memory: one fills, one is written
 
 
 @dataclass(frozen=True)
@@ -24,13 +30,32 @@ class ColumnTable:
 
 
 class TableFile:
-    """Appends rows of a Table to a Parquet file, by row groups of bounded size."""
+    """Appends rows of a Table to a Parquet file, by row groups of bounded size, with the checksum of each.
+
+    A thread encodes, writes and reads back a group while the next one fills; the error of a group is raised by the next
+    call.
+
+    Parameters
+    ----------
+    path
+        The file; it must not exist.
+    table
+        Its columns.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
 
     def __init__(self, path: Path, table: ColumnTable) -> None:
-        self._schema = table.schema
+        self._path, self._schema = path, table.schema
         self._file = pq.ParquetWriter(path, table.schema, use_dictionary=list(table.repeating), compression="lz4")
         self._waiting: list[pa.RecordBatch] = []
         self._rows = 0
+        self._parts: list[ParquetPart] = []
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="table")
+        self._group: Future[None] | None = None
 
     def write(self, rows: pa.RecordBatch) -> None:
         if not rows.num_rows:
@@ -40,13 +65,37 @@ class TableFile:
         if self._rows >= _GROUP_ROWS:
             self._flush()
 
-    def close(self) -> None:
-        self._flush()
-        self._file.close()
+    def close(self) -> list[dict[str, Any]]:
+        """Complete the file, and return its parts, for run.json; again: the same."""
+        with contextlib.ExitStack() as ends:
+            ends.callback(self._thread.shutdown)
+            ends.callback(self._file.close)
+            self._flush()
+            self._await_group()
+        if sum(part.size_bytes for part in self._parts) < self._path.stat().st_size:
+            self._add_part(0)
+        return [asdict(part) for part in self._parts]
 
     def _flush(self) -> None:
         waiting, rows = self._waiting, self._rows
         self._waiting, self._rows = [], 0  # first, so that `close` does not write rows again after a disk error
         if waiting:
-            # One group, so that it ends with a complete response: a damaged one is skipped without cutting the next.
-            self._file.write_table(pa.Table.from_batches(waiting, self._schema), row_group_size=rows)
+            self._await_group()
+            self._group = self._thread.submit(self._write, waiting, rows)
+
+    def _await_group(self) -> None:
+        group, self._group = self._group, None
+        if group is not None:
+            group.result()
+
+    def _write(self, waiting: list[pa.RecordBatch], rows: int) -> None:
+        # One group, so that it ends with a complete response: a damaged one is skipped without cutting the next.
+        self._file.write_table(pa.Table.from_batches(waiting, self._schema), row_group_size=rows)
+        self._add_part(rows)
+
+    def _add_part(self, rows: int) -> None:
+        """The bytes since the last part; what Arrow has written is in the file at once."""
+        with self._path.open("rb") as file:
+            file.seek(sum(part.size_bytes for part in self._parts))
+            size = os.fstat(file.fileno()).st_size - file.tell()
+            self._parts.append(ParquetPart(rows, size, sha256_of_next(file, size)))

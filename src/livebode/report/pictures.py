@@ -13,6 +13,9 @@ from livebode.report.style import Style, drawing, quiet_about_letters, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_COMPRESSION = 3
+"""Of zlib: two thirds of the time of the default, and a tenth to a sixth more bytes."""
+
 
 def save_pictures(
     responses: Responses,
@@ -47,5 +50,5 @@ def save_pictures(
 def save(figure: Figure, path: Path, look: Style) -> Path:
     """Write a figure; the same figure gives the same bytes. OSError, and nothing has changed, if it is not written."""
     with whole_file(path) as partial, drawing(look), quiet_about_letters():
-        figure.savefig(partial, format="png", metadata={"Software": None})
+        figure.savefig(partial, format="png", metadata={"Software": None}, pil_kwargs={"compress_level": _COMPRESSION})
     return path

@@ -13,6 +13,10 @@ from livebode.runtime.recorder import Recorder
 Draw = Callable[[Responses, Path, str, Model | None], None]
 
 
+def nothing() -> None:
+    """No preparation."""
+
+
 @dataclass(frozen=True)
 class Destination:
     """Directory and subscribers of a run.
@@ -31,6 +35,8 @@ class Destination:
         Each receives every document that the run publishes.
     record
         Record of a recording's run in place of a run directory. `draw` and `force` then have no effect.
+    prepare
+        Called once when a recording has been opened: loads, beside the run, what `draw` needs.
     """
 
     directory: Path
@@ -38,3 +44,4 @@ class Destination:
     force: bool = False
     subscribers: tuple[Subscriber, ...] = ()
     record: Recorder | None = None
+    prepare: Callable[[], None] = nothing

@@ -40,6 +40,7 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     log = log.naming([name for name in axis.signals.model_dump().values() if name])
     pipeline = Pipeline.of(axis, follower, log.channels)
     log = log.naming(pipeline.channels)  # with the covariates of a baseline
+    to.prepare()
     of = examined(axis, log, pipeline.follower)
     settings = pipeline.follower.settings
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": of.found}

@@ -153,7 +153,7 @@ class SourceSettings(BaseModel):
         Time between reads of the ring, in seconds (ADS).
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
 
     log: LocatedFile | Annotated[list[LocatedFile], Field(min_length=1, max_length=RECORDINGS_MAX)] | None = None
     time: str | None = None

@@ -1,0 +1,53 @@
+"""The checksums that a table file notes while a thread writes are those of its row groups."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from livebode.records import table_file
+from livebode.records.table_file import ColumnTable, TableFile
+from tools.parquet_parts import parts_of
+
+TABLE = ColumnTable(pa.schema([("sample", pa.int64()), ("time_s", pa.float64()), ("re", pa.float64())]), ("time_s",))
+
+
+def rows(first: int, count: int) -> pa.RecordBatch:
+    sample = np.arange(first, first + count)
+    columns = [pa.array(sample), pa.array(sample // 7 / 100), pa.array(np.sin(sample))]
+    return pa.record_batch(columns, schema=TABLE.schema)
+
+
+@given(st.lists(st.integers(0, 60), max_size=30), st.integers(1, 100))
+@settings(max_examples=25)
+def test_the_parts_are_those_of_the_written_file(
+    tmp_path_factory: pytest.TempPathFactory, counts: list[int], group: int
+) -> None:
+    path = tmp_path_factory.mktemp("table") / "rows.parquet"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(table_file, "_GROUP_ROWS", group)
+        file = TableFile(path, TABLE)
+        for number, count in enumerate(counts):
+            file.write(rows(sum(counts[:number]), count))
+        parts = file.close()
+    assert json.loads(json.dumps(parts)) == parts_of(path)
+    assert sum(part["size_bytes"] for part in parts) == path.stat().st_size
+    assert pq.read_table(path)["sample"].to_pylist() == list(range(sum(counts)))
+    assert file.close() == parts
+
+
+def test_the_error_of_a_group_is_raised_by_the_next_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table_file, "_GROUP_ROWS", 10)
+    other = pa.record_batch([pa.array(["a"] * 10)], names=["sample"])
+    file = TableFile(tmp_path / "rows.parquet", TABLE)
+    file.write(other)
+    with pytest.raises(pa.ArrowInvalid):
+        file.write(rows(0, 10))
+    file.close()
