@@ -9,9 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bench import native_build, numba_versions
-from bench.work import ROWS, Array, side_by_side, signal
-from livebode.kernel import SlidingDFT
+from bench import dense_rows, native_build
+from bench.work import ROWS, Array, signal
 
 CELLS = [(window, count) for window in (100, 200, 1000) for count in (7, 21)]
 
@@ -27,16 +26,7 @@ def traffic(window: int, count: int, out: Array) -> Callable[[], object]:
 def measure(window: int, count: int, seconds: float) -> dict[str, float]:
     """Nanoseconds of a row."""
     bins, x, out = list(range(1, count + 1)), signal(window + ROWS - 1), np.empty((ROWS, count), complex)
-    tasks: dict[str, Callable[[], object]] = {
-        "numba complex": numba_versions.by_numba_complex(x, window, bins, 1),
-        "numba planar": numba_versions.by_numba_planar(x, window, bins, 1),
-        "memory": traffic(window, count, out),
-    }
-    for phase in ("window", "fixed"):
-        dft = SlidingDFT(window, bins)
-        tasks[phase] = lambda dft=dft, phase=phase: dft.process(x[:ROWS], 1, out, phase)  # type: ignore[misc]
-    best = {name: 1e9 * time / ROWS for name, time in side_by_side(tasks, seconds).items()}
-    return {"numba": min(best.pop("numba complex"), best.pop("numba planar")), **best}
+    return dense_rows.nanoseconds(x, window, bins, out, seconds, memory=traffic(window, count, out))
 
 
 def main() -> None:

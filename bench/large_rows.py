@@ -4,13 +4,11 @@ Numba's version is the plain recursion, the faster of its two layouts (bench/num
 """
 
 import argparse
-from collections.abc import Callable
 
 import numpy as np
 
-from bench import numba_versions
-from bench.work import side_by_side, signal
-from livebode.kernel import SlidingDFT
+from bench import dense_rows
+from bench.work import signal
 
 WINDOW = 1000
 COUNTS = (7, 21, 51, 101, 201, 401)
@@ -22,15 +20,7 @@ def measure(count: int, megabytes: float, seconds: float) -> dict[str, float]:
     bins, rows = list(range(1, count + 1)), int(megabytes * 1e6 / 16 / count)
     x = signal(WINDOW + rows - 1)
     out = np.empty((rows, count), complex)
-    tasks: dict[str, Callable[[], object]] = {
-        "numba complex": numba_versions.by_numba_complex(x, WINDOW, bins, 1),
-        "numba planar": numba_versions.by_numba_planar(x, WINDOW, bins, 1),
-    }
-    for phase in ("window", "fixed"):
-        dft = SlidingDFT(WINDOW, bins)
-        tasks[phase] = lambda dft=dft, phase=phase: dft.process(x[:rows], 1, out, phase)  # type: ignore[misc]
-    best = {name: 1e9 * time / rows for name, time in side_by_side(tasks, seconds).items()}
-    return {"numba": min(best.pop("numba complex"), best.pop("numba planar")), **best}
+    return dense_rows.nanoseconds(x, WINDOW, bins, out, seconds)
 
 
 def main() -> None:

@@ -6,29 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "arrays.h"
 #include "livebode/lines.h"
 
 #define ROWS 11u
 #define WEIGHTS 6u
-
-static void demand(int holds, const char *what)
-{
-    if (!holds) {
-        fprintf(stderr, "failed: %s\n", what);
-        exit(1);
-    }
-}
-#define DEMAND(x) demand((x), #x)
-
-static void *claim(size_t count, size_t size)
-{
-    void *memory = calloc(count ? count : 1, size);
-    DEMAND(memory != NULL);
-    return memory;
-}
-
-static double *reals(size_t count) { return (double *)claim(count, sizeof(double)); }
-static uint8_t *flags(size_t count) { return (uint8_t *)claim(count, 1); }
 
 /* From integers alone, |x| < 4, and now and then not finite. */
 static double noise(uint32_t *state)

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "arrays.h"
 #include "livebode/repeating.h"
 
 #define LINES 3u
@@ -15,25 +16,6 @@
 #define SPECTRUM (WINDOW / 2u + 1u)
 #define MAINS_BINS 5u
 #define PERIODS 60u
-
-static void demand(int holds, const char *what)
-{
-    if (!holds) {
-        fprintf(stderr, "failed: %s\n", what);
-        exit(1);
-    }
-}
-#define DEMAND(x) demand((x), #x)
-
-static void *claim(size_t count, size_t size)
-{
-    void *memory = calloc(count, size);
-    DEMAND(memory != NULL);
-    return memory;
-}
-
-static double *reals(size_t count) { return (double *)claim(count, sizeof(double)); }
-static uint8_t *flags(size_t count) { return (uint8_t *)claim(count, 1); }
 
 /* From integers alone, |x| < 4, and rarely not finite. */
 static double noise(uint32_t *state)

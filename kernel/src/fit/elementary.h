@@ -44,6 +44,16 @@ static inline double lb_scaled(double x, int exponent)
     return x * one * two;
 }
 
+/* By Horner's rule, from the highest power. */
+static inline double lb_polynomial(const double *c, size_t count, double x)
+{
+    double p = c[0];
+    for (size_t i = 1; i < count; ++i) {
+        p = p * x + c[i];
+    }
+    return p;
+}
+
 static inline double lb_exp(double x)
 {
     static const double c[] = {1.0 / 6227020800.0,
@@ -65,11 +75,7 @@ static inline double lb_exp(double x)
     }
     const double k = floor(x * 1.4426950408889634 + 0.5);
     const double r = (x - k * 6.93147180369123816490e-01) - k * 1.90821492927058770002e-10;
-    double p = c[0];
-    for (size_t i = 1; i < sizeof c / sizeof *c; ++i) {
-        p = p * r + c[i];
-    }
-    return lb_scaled(p, (int)k);
+    return lb_scaled(lb_polynomial(c, sizeof c / sizeof *c, r), (int)k);
 }
 
 static inline double lb_expm1(double x)
@@ -92,11 +98,7 @@ static inline double lb_expm1(double x)
     if (!(x > -0.5 && x < 0.5)) {
         return lb_exp(x) - 1.0;
     }
-    double p = c[0];
-    for (size_t i = 1; i < sizeof c / sizeof *c; ++i) {
-        p = p * x + c[i];
-    }
-    return p * x;
+    return lb_polynomial(c, sizeof c / sizeof *c, x) * x;
 }
 
 /* Of a positive number that is not subnormal; NaN or infinite otherwise. */
