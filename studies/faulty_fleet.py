@@ -35,6 +35,8 @@ LATE_MAX = round(_SWAPPED * BLOCK_S * RATE_HZ)
 """Samples of an axis that a reordering can make late: after a gap a message is not waited for any more."""
 _FROZEN_S = (1.0, 9.0)
 _BROKER_S = 0.3
+_REPORTED_S = 1.0
+"""From the end of the messages to the report that counts."""
 _STEP_S, _RECOVERY_S_MAX, _WORKER_S_MAX = 0.2, 600.0, 120.0
 _COMMAND = "from livebode.cli import main; main()"
 _WORKER = "spawn_main"
@@ -115,11 +117,22 @@ class FaultyFleet:
             if not status["log"]["waiting"] and self._stored(self._sent()):
                 break
             time.sleep(_STEP_S)
-        time.sleep(2.0)  # the last messages give no response, but the owners report what they know
+        self._reported_since(time.time() + _REPORTED_S)  # the last messages give no response, but the owners know them
         status = self.asked(lambda log: fleet_status(log, self._axes))
         lost = sum(axis["lost"] for axis in status["axes"])
         dropped = round(self._machines.dropped * BLOCK_S * RATE_HZ) - self.asked(_before_the_log)
         return self.asked(lambda log: check_results(log, self._axes)), dropped, lost
+
+    def _reported_since(self, since_s: float) -> None:
+        """Wait until the owner of each partition has reported after a moment, seconds since 1970."""
+
+        async def reported(log: FleetLog) -> bool:
+            found = [await status_of(log, number) for number in range(PARTITIONS)]
+            return all(about is not None and about["at_s"] > since_s for about in found)
+
+        while not self.asked(reported):
+            self._restart_if_ended()
+            time.sleep(_STEP_S)
 
     def asked(self, question: Callable[[FleetLog], Any]) -> Any:
         """The answer of the log to a question."""
