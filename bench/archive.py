@@ -55,7 +55,7 @@ WORKERS, RATE_HZ, WINDOW = 2, 4000.0, 400
 POOL_RATIO_MAX, LOOP_RATIO_MIN, KNOWN_S_MAX, MEMORY_MB_MAX = 1.05, 1.9, 5.0, 300
 KNOWN = 10_000
 PROGRAM = str(Path(sys.executable).with_name("livebode"))
-LENGTHS = ((2.0, 40), (10.0, 12), (40.0, 6))
+LENGTHS = ((2.0, 160), (10.0, 60), (40.0, 30))
 """Seconds of a recording, and the number of recordings."""
 MEMORY_S = (60.0, 600.0, 1800.0)
 CONFIGURATION = {
