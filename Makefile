@@ -150,7 +150,7 @@ soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth
 	$(BIN)/python -m studies.soak
 
 FLEET_FAULTS ?= 1000
-fleet-faults: $(BUILT) ## kill, freeze and disturb a fleet 1,000 times, and compare every response bit for bit (1 h; continues after an interruption)
+fleet-faults: $(BUILT) ## kill, freeze and disturb a fleet 1,000 times, and compare every response bit for bit (20 min; continues after an interruption)
 	$(BIN)/python -m studies.fleet_faults $(FLEET_FAULTS)
 
 fleet-scale: $(BUILT) ## costs of an axis of a fleet on this computer, and what 100,000 axes need (docs/explanation/fleet-scale.md; 5 min)
