@@ -147,12 +147,18 @@ class NatsFeed:
         await asyncio.Event().wait()
 
     async def _ask_for_acts(self, hear_act: Hear) -> None:
-        """The same with the key of a viewer, which has no consumer: ask for the next one, again and again."""
+        """The same with the key of a viewer, which has no consumer: ask for the next one, again and again.
+
+        nats-server 2.9.10 can end at the request for the next message of a stream that is being created: ask whether there
+        is one.
+        """
         from nats.js.errors import NotFoundError
 
         js, number, reported = self._connection.jetstream(prefix=VIEW_API), 1, ""
         while True:
             try:
+                if (await js.stream_info(ACTS_STREAM)).state.last_seq < number:
+                    raise NotFoundError
                 found = await js.get_msg(ACTS_STREAM, number, subject=f"{ACTS}.>", next=True)
                 hear_act(found.data or b"")
                 number, pause_s = found.seq + 1, 0.0
