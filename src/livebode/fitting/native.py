@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from livebode.fitting.chains import Chain, Rigid, TwoMass
 from livebode.fitting.physical import EvaluationGrid, PhysicalModel
 from livebode.fitting.unknown_gain import TwoMassGain
-from livebode.kernel import FitModel
-from livebode.kernel._fit import RIGID, TWO_MASS, TWO_MASS_GAIN
+from livebode.kernel import RIGID, TWO_MASS, TWO_MASS_GAIN, FitModel
 
 _KINDS: dict[type[PhysicalModel], int] = {Rigid: RIGID, TwoMass: TWO_MASS, TwoMassGain: TWO_MASS_GAIN}
 

@@ -5,6 +5,9 @@ The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.est
 """
 
 from livebode.kernel._fit import (
+    RIGID,
+    TWO_MASS,
+    TWO_MASS_GAIN,
     FeedbackSeries,
     FitFound,
     FitModel,
@@ -65,7 +68,10 @@ __all__ = [
     "NOISE_MOVING",
     "NOISE_SCATTER",
     "REASONS",
+    "RIGID",
     "SCATTER",
+    "TWO_MASS",
+    "TWO_MASS_GAIN",
     "FeedbackSeries",
     "FitFound",
     "FitModel",

@@ -56,7 +56,7 @@ def fit(model: FitModel, frequency_hz: Floats, rate_hz: float, rows: FitRows) ->
     count, lines = rows.value.shape
     found = FitFound.empty(count, lines, model.table.shape[1])
     with np.errstate(all="ignore"):
-        places = Places(frequency_hz, rate_hz)
+        places = LinePlaces(frequency_hz, rate_hz)
         for i in range(count):
             row = _Row(rows.value[i], rows.sigma[i], rows.use[i])
             start = None if rows.start is None else rows.start[i]
@@ -70,7 +70,7 @@ def fit_response(model: FitModel, rate_hz: float, values: Floats, frequency_hz: 
     """As `livebode.kernel.fit_response`."""
     with np.errstate(all="ignore"):
         every = np.broadcast_to(frequency_hz, (len(values), frequency_hz.shape[-1]))
-        curves = [respond(Places(f, rate_hz), model, v) for f, v in zip(every, values)]
+        curves = [respond(LinePlaces(f, rate_hz), model, v) for f, v in zip(every, values)]
     found = np.empty(every.shape, np.complex128)
     for row, curve in zip(found, curves):
         row.real, row.imag = curve
@@ -97,7 +97,7 @@ def product(square: Floats, a: Curve, b: Curve) -> np.float64:
     return total(square * (a[0] * b[0] + a[1] * b[1]))
 
 
-class Places:
+class LinePlaces:
     """Tables of the lines: z = e^(jθ), w = z − 1."""
 
     def __init__(self, frequency_hz: Floats, rate_hz: float) -> None:
@@ -120,7 +120,7 @@ def times(a: Any, b: Any) -> Any:
     return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
 
 
-class Transfer(NamedTuple):
+class ModelTransfer(NamedTuple):
     """Numerator and denominator in s by powers, over s^integrators, and over s − slow if that is not None."""
 
     n0: Any
@@ -133,12 +133,12 @@ class Transfer(NamedTuple):
     slow: Any = None
 
 
-def transfer_of(m: FitModel, v: Floats) -> Transfer:
+def transfer_of(m: FitModel, v: Floats) -> ModelTransfer:
     """Of a model at its parameters."""
     if m.kind == RIGID:
         if v[1] != 0:
-            return Transfer(m.lever / v[0], 0.0, 0.0, 1.0, 0.0, 0.0, m.integrators - 1, -v[1] / v[0])
-        return Transfer(m.lever / v[0], 0.0, 0.0, 1.0, 0.0, 0.0, m.integrators)
+            return ModelTransfer(m.lever / v[0], 0.0, 0.0, 1.0, 0.0, 0.0, m.integrators - 1, -v[1] / v[0])
+        return ModelTransfer(m.lever / v[0], 0.0, 0.0, 1.0, 0.0, 0.0, m.integrators)
     if m.kind == TWO_MASS:
         motor, load = v[0], v[0] * m.ratio if m.ratio > 0 else v[1] * m.arm
         spring, damper = (x * m.arm for x in v[1 if m.ratio > 0 else 2 :][:2])
@@ -149,11 +149,11 @@ def transfer_of(m: FitModel, v: Floats) -> Transfer:
             d3, d2 = motor * load, motor * (damper + load_drag) + load * (damper + drag)
             d1, d0 = both * spring + drag * load_drag + damper * drags, spring * drags
             slow = _slow_root(d3, d2, d1, d0)
-            return Transfer(n0, n1, n2, -d0 / slow, d2 + d3 * slow, d3, m.integrators - 1, slow)
-        return Transfer(n0, n1, n2, both * spring, both * damper, motor * load, m.integrators)
+            return ModelTransfer(n0, n1, n2, -d0 / slow, d2 + d3 * slow, d3, m.integrators - 1, slow)
+        return ModelTransfer(n0, n1, n2, both * spring, both * damper, motor * load, m.integrators)
     low, high = 2.0 * np.pi * v[1], 2.0 * np.pi * v[2]
     n1, n2 = 2.0 * v[0] * v[3] / low, v[0] / (low * low)
-    return Transfer(v[0], n1, n2, 1.0, 2.0 * v[4] / high, 1.0 / (high * high), m.integrators)
+    return ModelTransfer(v[0], n1, n2, 1.0, 2.0 * v[4] / high, 1.0 / (high * high), m.integrators)
 
 
 def _slow_root(d3: Any, d2: Any, d1: Any, d0: Any) -> Any:
@@ -174,7 +174,7 @@ def _slow_root(d3: Any, d2: Any, d1: Any, d0: Any) -> Any:
 
 
 @dataclass
-class Sampled:
+class SampledPoles:
     """Behind the hold: once·a + once_late·b + twice·c + twice_late·d, and a section of second order in w."""
 
     ticks: Any
@@ -187,10 +187,10 @@ class Sampled:
     """Of first order: (slow + late/z)/(w − end)."""
 
 
-def sampled_of(t: Transfer, tick: float, delay_s: Any) -> Sampled:
+def sampled_of(t: ModelTransfer, tick: float, delay_s: Any) -> SampledPoles:
     """Exactly behind a zero-order hold and a delay, pole by pole."""
     ticks = np.float64(delay_s) / tick
-    s = Sampled(np.floor(ticks), bool(ticks != 0), t.integrators == 2)
+    s = SampledPoles(np.floor(ticks), bool(ticks != 0), t.integrators == 2)
     late = ticks - s.ticks
     soon = (1.0 - late) * tick if s.is_late else np.float64(tick)
     rest = tick - soon
@@ -217,7 +217,7 @@ def sampled_of(t: Transfer, tick: float, delay_s: Any) -> Sampled:
     return s
 
 
-def _section(t: Transfer, tick: float, late: Any, *, is_late: bool) -> tuple[Any, ...]:
+def _section(t: ModelTransfer, tick: float, late: Any, *, is_late: bool) -> tuple[Any, ...]:
     half, product_ = np.float64(-t.d1) / t.d2 / 2.0, np.float64(t.d0) / t.d2
     under = half * half - product_
     turn = np.sqrt(np.abs(under))
@@ -230,7 +230,7 @@ def _section(t: Transfer, tick: float, late: Any, *, is_late: bool) -> tuple[Any
     return _real_pair(t, product_ / large, large, tick, late, is_late=is_late)
 
 
-def _share(t: Transfer, p: Any, other: Any) -> Any:
+def _share(t: ModelTransfer, p: Any, other: Any) -> Any:
     """Residue over the pole, N(p)/(d2·(p − other)·p^integrators)/p."""
     value = times((t.n2 * p[0] + t.n1, t.n2 * p[1]), p)
     value = value[0] + t.n0, value[1]
@@ -246,7 +246,7 @@ def _share(t: Transfer, p: Any, other: Any) -> Any:
     )
 
 
-def _complex_pair(t: Transfer, re: Any, im: Any, tick: float, late: Any, *, is_late: bool) -> tuple[Any, ...]:
+def _complex_pair(t: ModelTransfer, re: Any, im: Any, tick: float, late: Any, *, is_late: bool) -> tuple[Any, ...]:
     q, end = _share(t, (re, im), (re, -im)), expm1_of(re * tick, im * tick)
     soon = expm1_of(re * tick * (1.0 - late), im * tick * (1.0 - late)) if is_late else end
     first, second = times(q, soon), times(q, (end[0] - soon[0], end[1] - soon[1]))
@@ -260,7 +260,7 @@ def _complex_pair(t: Transfer, re: Any, im: Any, tick: float, late: Any, *, is_l
     )
 
 
-def _real_pair(t: Transfer, one: Any, two: Any, tick: float, late: Any, *, is_late: bool) -> tuple[Any, ...]:
+def _real_pair(t: ModelTransfer, one: Any, two: Any, tick: float, late: Any, *, is_late: bool) -> tuple[Any, ...]:
     end, first, second = [], [], []
     for p, other in ((one, two), (two, one)):
         q = _share(t, (p, 0.0), (other, 0.0))[0]
@@ -278,7 +278,7 @@ def _real_pair(t: Transfer, one: Any, two: Any, tick: float, late: Any, *, is_la
     )
 
 
-def evaluate(p: Places, s: Sampled) -> Curve:
+def evaluate(p: LinePlaces, s: SampledPoles) -> Curve:
     """Response at the lines."""
     a, b, c, d = s.rest
     re, im = a * p.once[0], a * p.once[1]
@@ -309,7 +309,7 @@ def evaluate(p: Places, s: Sampled) -> Curve:
     return re, im
 
 
-def respond(p: Places, m: FitModel, values: Floats) -> Curve:
+def respond(p: LinePlaces, m: FitModel, values: Floats) -> Curve:
     """Response of a model at the lines."""
     return evaluate(p, sampled_of(transfer_of(m, values), p.tick, values[-1]))
 
@@ -407,7 +407,7 @@ class _Point:
 class _Problem:
     """One row's search."""
 
-    def __init__(self, model: FitModel, places: Places, row: _Row, last: int | None = None) -> None:
+    def __init__(self, model: FitModel, places: LinePlaces, row: _Row, last: int | None = None) -> None:
         self.model, self.places, self.row = model, places, row
         self.begin, self.low, self.high, self.scale, self.held = model.table
         self.at: list[int] = sorted(np.flatnonzero(np.isnan(self.held)).tolist(), key=lambda at: at == last)
@@ -494,7 +494,7 @@ class _Problem:
     def _starts(self) -> list[tuple[tuple[Any, Any, Any], Any]]:
         """Weights of rigid body and mode and their cost at the best resonances, and those."""
         m, p = self.model, self.places
-        rigid = evaluate(p, sampled_of(Transfer(1.0, 0.0, 0.0, 1.0, 0.0, 0.0, m.integrators), p.tick, 0.0))
+        rigid = evaluate(p, sampled_of(ModelTransfer(1.0, 0.0, 0.0, 1.0, 0.0, 0.0, m.integrators), p.tick, 0.0))
         if m.kind == RIGID:
             (weight,), cost = self._weights([rigid])
             return [((weight, 0.0, cost), np.float64(0.0))]
@@ -513,7 +513,7 @@ class _Problem:
     def _share_at(self, rigid: Curve, omega: Any) -> tuple[Any, Any, Any]:
         m = self.model
         n0, n1 = (1.0, 0.0) if m.integrators == 2 else (0.0, 1.0)  # s/(s² + ωs/Q + ω²), over s for a position
-        mode = Transfer(n0, n1, 0.0, omega * omega, omega / _QUALITY, 1.0, 0)
+        mode = ModelTransfer(n0, n1, 0.0, omega * omega, omega / _QUALITY, 1.0, 0)
         shape = evaluate(self.places, sampled_of(mode, self.places.tick, 0.0))
         ratio = -1.0 if m.at_load else m.ratio if m.kind == TWO_MASS else 0.0
         if ratio == 0:

@@ -99,12 +99,12 @@ class RunDirectory:
             self._events.write(to_line(asdict(event)))
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
-        """Let `draw` add pictures to the directory, close the tables, and write run.json with their checksums."""
+        """Close the tables, write run.json with their checksums, and let `draw` add pictures to the directory."""
         with writing(self.path, RecordError):
-            draw(self.partial)  # while the last rows are written
             data = to_document(summary | {"files": self._close()})
             for name in (RUN, COPY):
                 (self.partial / name).write_bytes(data)
+            draw(self.partial)
 
     def _close(self) -> dict[str, Any]:
         """Close the files; the parts of the tables, for run.json."""
