@@ -52,7 +52,7 @@ def _tracked_alone(job: Job, recording: ArchivedRecording, scratch: Path | None 
             return _once_alone(job, recording, scratch)
         except ArchiveError as error:
             left -= 1
-            if not left or error.facts.get("signal") != signal.SIGKILL:
+            if not left or error.facts.get("signal") != "SIGKILL":
                 return [failed(recording.place, error, recording.content, *recording.recipes)]
 
 
@@ -107,12 +107,13 @@ def _exceeded(job: Job) -> ArchiveError:
 
 
 def _ended(code: int) -> ArchiveError:
-    how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended itself with exit code {code}"
+    ended_by = signal.Signals(-code).name if code < 0 else ""
+    how = f"was ended by {ended_by}" if ended_by else f"ended itself with exit code {code}"
     return ArchiveError(
         "process-ended",
         f"the process that tracked the recording {how}",
         "please report it with the recording",
-        **({"signal": -code} if code < 0 else {"exit_code": code}),
+        **({"signal": ended_by} if ended_by else {"exit_code": code}),
     )
 
 
