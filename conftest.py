@@ -56,6 +56,11 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+def pytest_sessionfinish() -> None:
+    if (browsers := sys.modules.get("tests.support.browser")) is not None:
+        browsers.end_chromium()
+
+
 @pytest.fixture(autouse=True)
 def _no_open_figure() -> Iterator[None]:
     """A figure of pyplot that an example leaves open would be the current one of the next test."""
@@ -66,7 +71,7 @@ def _no_open_figure() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator["Browser"]:
-    """Chromium for the tests of a file; not for a session, since Playwright keeps an event loop in its thread."""
+    """Chromium for the tests of a file: one of the process, whose event loop is the thread's only meanwhile."""
     from tests.support.browser import chromium
 
     with chromium() as found:
