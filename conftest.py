@@ -19,10 +19,12 @@ import os
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from _pytest.doctest import DoctestModule
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -59,6 +61,16 @@ def pytest_collection_finish() -> None:
 def pytest_sessionfinish() -> None:
     if (browsers := sys.modules.get("tests.support.browser")) is not None:
         browsers.end_chromium()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(
+    file_path: Path, parent: pytest.Collector
+) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """Examples are in src alone: a test's file is not searched for them."""
+    found = yield
+    own = parent.config.rootpath / "tests"
+    return [one for one in found if not (isinstance(one, DoctestModule) and file_path.is_relative_to(own))]
 
 
 @pytest.fixture(autouse=True)

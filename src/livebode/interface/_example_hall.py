@@ -128,7 +128,7 @@ def _values(
 
 
 def _own(path: str, content: str, recorded: datetime) -> dict[str, Any]:
-    names = dict(zip(LEVELS, path.split("/")))
+    names: dict[str, str] = dict(zip(LEVELS, path.split("/")))
     key = {"content": sha256(content.encode()).hexdigest(), "recipe": _RECIPE}
     return {**key, **names, "recorded_from": recorded}
 
