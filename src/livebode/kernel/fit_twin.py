@@ -26,10 +26,10 @@ from livebode.kernel._fit import (
     FitModel,
     FitRows,
 )
-from livebode.kernel.fit_arithmetic_twin import Complex, Floats, SingularError, total
-from livebode.kernel.fit_model_twin import LinePlaces, respond
-from livebode.kernel.fit_search_twin import ROUNDS, FitSearch, SearchPoint
-from livebode.kernel.fit_weighing_twin import WeighedRow, model_error
+from livebode.kernel._fit_arithmetic_twin import Complex, Floats, SingularError, total
+from livebode.kernel._fit_model_twin import LinePlaces, respond
+from livebode.kernel._fit_search_twin import ROUNDS, FitSearch, SearchPoint
+from livebode.kernel._fit_weighing_twin import WeighedRow, model_error
 
 _FIRST_EPSILON, _SAME, _EPSILON_MAX, _LACKING = 0.1, 0.01, 0.5, 0.03
 _UNCERTAIN, _SUSPICIOUS = 0.5, 4.0

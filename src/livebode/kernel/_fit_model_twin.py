@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from livebode.kernel._fit import RIGID, TWO_MASS, FitModel
+from livebode.kernel._fit_arithmetic_twin import Curve, Floats, times
 from livebode.kernel.elementary_twin import expm1, expm1_of, turned
-from livebode.kernel.fit_arithmetic_twin import Curve, Floats, times
 
 _APART = 1e-5
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from livebode.kernel._fit import RIGID, TWO_MASS, FitModel
+from livebode.kernel._fit_arithmetic_twin import Curve, Floats, matrix_product, product, solve
+from livebode.kernel._fit_model_twin import LinePlaces, ModelTransfer, evaluate, respond, sampled_of
+from livebode.kernel._fit_weighing_twin import WeighedRow
 from livebode.kernel.elementary_twin import exp, log
-from livebode.kernel.fit_arithmetic_twin import Curve, Floats, matrix_product, product, solve
-from livebode.kernel.fit_model_twin import LinePlaces, ModelTransfer, evaluate, respond, sampled_of
-from livebode.kernel.fit_weighing_twin import WeighedRow
 
 _STEP, _TOLERANCE, _RISE, _FALL, _ENOUGH, _LARGEST = 1e-7, 1e-10, 10.0, 0.2, 1e-4, 0.7
 _SCANNED, _TRIED, _QUALITY, _LEAST = 48, 4, 10.0, 1e-3

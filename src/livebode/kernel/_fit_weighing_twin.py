@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from livebode.kernel.fit_arithmetic_twin import Complex, Curve, Floats, total
+from livebode.kernel._fit_arithmetic_twin import Complex, Curve, Floats, total
 
 _EPSILON_STEPS, _CLOSE = 30, 1e-6
 
