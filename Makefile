@@ -129,7 +129,7 @@ healthy: $(BUILT) ## false alarms in 1,000 healthy runs with ripple, eccentricit
 	$(BIN)/python -m studies.healthy --runs $(HEALTHY_RUNS) --processes 2
 
 fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources, the configuration and the dashboard
-	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/sources/test_readers_fault.py
+	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/sources/test_readers_damage_fault.py
 	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/configuration/test_axes_fault.py
 	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/sources/test_live_parsers_fault.py tests/sources/test_live_variants_fault.py
 	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/structured_text/test_settings_property.py

@@ -19,10 +19,12 @@ import os
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from _pytest.doctest import DoctestModule
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -56,6 +58,21 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+def pytest_sessionfinish() -> None:
+    if (browsers := sys.modules.get("tests.support.browser")) is not None:
+        browsers.end_chromium()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(
+    file_path: Path, parent: pytest.Collector
+) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """Examples are in src alone: a test's file is not searched for them."""
+    found = yield
+    own = parent.config.rootpath / "tests"
+    return [one for one in found if not (isinstance(one, DoctestModule) and file_path.is_relative_to(own))]
+
+
 @pytest.fixture(autouse=True)
 def _no_open_figure() -> Iterator[None]:
     """A figure of pyplot that an example leaves open would be the current one of the next test."""
@@ -66,7 +83,7 @@ def _no_open_figure() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator["Browser"]:
-    """Chromium for the tests of a file; not for a session, since Playwright keeps an event loop in its thread."""
+    """Chromium for the tests of a file: one of the process, whose event loop is the thread's only meanwhile."""
     from tests.support.browser import chromium
 
     with chromium() as found:

@@ -16,12 +16,13 @@ import pyarrow as pa
 import pytest
 from playwright.sync_api import Browser
 
+from livebode.core.machine_levels import LEVELS
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.fleet_demo import DemoFeed, DemoFleet
 from livebode.dashboard.fleet_trend import POINTS_MAX
 from livebode.dashboard.fleet_view import FleetView
 from livebode.fleet.status_message import encode_names
-from livebode.lake import LEVELS, TABLES, Lake
+from livebode.lake import TABLES, Lake
 from tests.support.axe import violations, with_axe
 from tests.support.browser import Tab
 from tests.support.fleet_pages import fleet_page

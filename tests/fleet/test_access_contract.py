@@ -30,21 +30,15 @@ from livebode.fleet.status import fleet_status
 from livebode.fleet.subjects import ACTS, EDGE, LOG, LOG_STREAM, RESULTS, STATUS, STATUS_STREAM, axis_path
 from tests.support.command import livebode
 from tests.support.fleet_runs import PARTITIONS, batch
-from tests.support.secure_fleet import SecureFleet, secure_fleet
+from tests.support.secure_fleet import SecureFleet, secure_fleet_with_streams
 
 SILENCE_S = 0.3
 
 
 @pytest.fixture
 def fleet(tmp_path: Path) -> Iterator[SecureFleet]:
-    with secure_fleet(tmp_path) as one:
-        asyncio.run(_create(one))
+    with secure_fleet_with_streams(tmp_path) as one:
         yield one
-
-
-async def _create(fleet: SecureFleet) -> None:
-    async with FleetLog(fleet.log("fleet"), "test") as log:
-        await log.create_streams()
 
 
 def _as(settings: LogSection, action: Callable[[FleetLog], Awaitable[object]]) -> None:

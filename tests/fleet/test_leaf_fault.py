@@ -24,19 +24,13 @@ from livebode.fleet.settings import FleetSettings, LogSection
 from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM
 from tests.support.command import livebode
 from tests.support.fleet_runs import batch, checked, owned_until_current
-from tests.support.secure_fleet import LEAF, SecureFleet, secure_fleet
+from tests.support.secure_fleet import LEAF, SecureFleet, secure_fleet_with_streams
 
 
 @pytest.fixture
 def fleet(tmp_path: Path) -> Iterator[SecureFleet]:
-    with secure_fleet(tmp_path) as one:
-        asyncio.run(_create(one))
+    with secure_fleet_with_streams(tmp_path) as one:
         yield one
-
-
-async def _create(fleet: SecureFleet) -> None:
-    async with FleetLog(fleet.log("fleet"), "test") as log:
-        await log.create_streams()
 
 
 def _settings(fleet: SecureFleet, name: str) -> FleetSettings:

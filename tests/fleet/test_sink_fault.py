@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pytest
 
+from livebode.core.machine_levels import LEVELS
 from livebode.fleet import sink_means, sink_tables
 from livebode.fleet.log import FleetLog
 from livebode.fleet.reader import stored_messages
@@ -24,7 +25,7 @@ from livebode.fleet.settings import LogSection, SinkSection
 from livebode.fleet.sink import Sink
 from livebode.fleet.status import fleet_status
 from livebode.fleet.subjects import RESULT_STREAM, RESULTS, axis_path
-from livebode.lake import LEVELS, Lake, stream_table
+from livebode.lake import Lake, stream_table
 from tests.support.command import livebode
 from tests.support.fitted_fleet import fitted_axes, fitted_sent
 from tests.support.fleet_runs import (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import shutil
 import threading
@@ -13,24 +14,53 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_playwright
 
 DESK = {"width": 1440, "height": 900}
 TABLET = {"width": 768, "height": 1024}
 
 
+_started: list[tuple[Playwright, Browser, asyncio.AbstractEventLoop]] = []
+
+
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """A browser; without Chromium the test is skipped on a laptop and fails in CI."""
+    """The browser of this process; without Chromium the test is skipped on a laptop and fails in CI.
+
+    It starts with the first test that needs it and remains until `end_chromium`: a start costs a second of the
+    processor. Between the tests that use it, Playwright's event loop is not the running one of the thread, so that
+    another test may have one.
+    """
     path = shutil.which("chromium")
     if path is None:
         message = "chromium is not installed: `make system-packages` installs it"
         pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
-    with sync_playwright() as playwright:
+    before = asyncio._get_running_loop()
+    if not _started:
+        playwright = sync_playwright().start()
         # Its sandbox does not start for root.
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"] * (os.geteuid() == 0))
+        _started.append((playwright, browser, asyncio.get_running_loop()))
+    _, browser, loop = _started[0]
+    asyncio._set_running_loop(loop)
+    of_others = list(browser.contexts)
+    try:
         yield browser
+        for context in browser.contexts:
+            if context not in of_others:
+                context.close()
+    finally:
+        asyncio._set_running_loop(before)
+
+
+def end_chromium() -> None:
+    """End the browser of this process, if a test has started it."""
+    while _started:
+        playwright, browser, loop = _started.pop()
+        asyncio._set_running_loop(loop)
         browser.close()
+        playwright.stop()
+        asyncio._set_running_loop(None)
 
 
 class Tab:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import trustme
 
 from livebode.configuration.axis import Axis
 from livebode.fleet.credentials import write_credentials
+from livebode.fleet.log import FleetLog
 from livebode.fleet.server import LogServer, free_port
 from livebode.fleet.server_access import ServerAccess
 from livebode.fleet.settings import LogSection, ServerSection, UsersSection
@@ -72,3 +74,16 @@ def secure_fleet(folder: Path) -> Iterator[SecureFleet]:
     )
     with LogServer(folder / "log", PARTITIONS, access=access) as server:
         yield SecureFleet(folder, server, axes, access)
+
+
+@contextmanager
+def secure_fleet_with_streams(folder: Path) -> Iterator[SecureFleet]:
+    """The fleet with a running server, whose log has its streams."""
+    with secure_fleet(folder) as fleet:
+        asyncio.run(_create_streams(fleet))
+        yield fleet
+
+
+async def _create_streams(fleet: SecureFleet) -> None:
+    async with FleetLog(fleet.log("fleet"), "test") as log:
+        await log.create_streams()

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import pyarrow.compute as pc
 
 from livebode.archive.contents import path_of
+from livebode.core.machine_levels import LEVELS
 from livebode.lake import Lake, LakeRun
 from livebode.reporting.hall_report import RunAlarm
 from livebode.trending import Selection
@@ -23,7 +24,7 @@ def alarms_of(lake: Lake, of: Selection) -> tuple[int, list[RunAlarm]]:
     ArchiveError
         If the lake cannot be read.
     """
-    columns = ["content", "recipe", "site", "line", "machine", "axis", "recorded_from", "alarms"]
+    columns = ["content", "recipe", *LEVELS, "recorded_from", "alarms"]
     rows = lake.read("runs", columns, where_of(of)).filter(pc.field("alarms") > 0)
     newest = rows.sort_by([("recorded_from", "descending"), ("content", "ascending")]).to_pylist()
     newest = [row for row in newest if of.includes(path_of(row) or UNNAMED)]

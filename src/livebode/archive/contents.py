@@ -9,7 +9,7 @@ from typing import Any
 
 from packaging.version import Version
 
-from livebode.configuration.machine_section import LEVELS
+from livebode.core.machine_levels import LEVELS
 from livebode.lake import Lake
 
 _COLUMNS = ["content", "recipe", *LEVELS, "recorded_from", "alarms", "baseline"]

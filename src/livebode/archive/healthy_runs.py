@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from livebode.archive.contents import path_of
 from livebode.core import ArchiveError, counted, nearest_name
+from livebode.core.machine_levels import LEVELS
 from livebode.lake import Lake, LakeRun
 from livebode.reporting.trend_words import sentence
 from livebode.trending import LIMIT_PERCENT, RUNS_MIN, Selection, assess, histories
@@ -42,7 +43,7 @@ class HealthyRuns:
     @property
     def levels(self) -> dict[str, str | None]:
         """Its site, line, machine and axis."""
-        return {level: self.runs[0].row[level] for level in ("site", "line", "machine", "axis")}
+        return {level: self.runs[0].row[level] for level in LEVELS}
 
     def check(self) -> None:
         """ArchiveError if there is a doubt."""

@@ -9,8 +9,8 @@ from pathlib import Path
 import pyarrow as pa
 
 from livebode.archive.template import Template
-from livebode.configuration.machine_section import LEVELS
 from livebode.core import ArchiveError
+from livebode.core.machine_levels import LEVELS
 from livebode.lake import FILES, Key, Lake
 from livebode.locations import Location, find, location
 

@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from livebode.configuration.machine_section import LEVELS
 from livebode.core import ConfigError
+from livebode.core.machine_levels import LEVELS
 
 _PARTS = re.compile(r"\*\*/|\*|\?|\{(\w*)\}")
 _WILD = {"**/": "(?:.*/)?", "*": "[^/]*", "?": "[^/]"}

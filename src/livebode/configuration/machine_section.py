@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-LEVELS = ("site", "line", "machine", "axis")
+from livebode.core.machine_levels import LEVELS
+
 _LETTERS_MAX = 80
 _PATTERN = r"^([^/\s\x00-\x1f\x7f]([^/\x00-\x1f\x7f]*[^/\s\x00-\x1f\x7f])?)?$"
 

@@ -18,6 +18,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from livebode.core import ServerError
+from livebode.core.machine_levels import LEVELS
 
 if TYPE_CHECKING:
     from livebode.lake import Lake
@@ -240,8 +241,6 @@ def _dated(rows: pa.Table, column: str) -> pa.Table:
 
 def _rows_of(axis: str) -> pc.Expression:
     """The rows of the axis with this path, in which levels without a name are left out."""
-    from livebode.lake import LEVELS
-
     names = axis.split("/")
     found = [dict(zip(some, names)) for some in combinations(LEVELS, len(names))]
     return reduce(or_, (reduce(and_, (_named(level, one.get(level)) for level in LEVELS)) for one in found), _NONE)

@@ -13,9 +13,9 @@ from typing import Any, Literal
 
 import pyarrow.parquet as pq
 
-from livebode.configuration.machine_section import LEVELS
 from livebode.core import LivebodeError
 from livebode.core.clock import RunClock
+from livebode.core.machine_levels import LEVELS
 from livebode.records.inside import open_read
 from livebode.records.notes import read_notes
 from livebode.records.segments.manifest import Manifest

@@ -19,11 +19,12 @@ import pyarrow.parquet as pq
 from livebode.analysis.run_trend import ALARMS
 from livebode.arrow import from_numpy
 from livebode.core import SourceError
+from livebode.core.machine_levels import LEVELS
 from livebode.fleet.log import FleetLog, StoredMessage
 from livebode.fleet.message import read_message
 from livebode.fleet.reader import stored_messages
 from livebode.fleet.subjects import LOG, LOG_STREAM, axis_names, axis_path, axis_token
-from livebode.lake import FLEET_SAMPLES, LEVELS, TABLES, Lake, StreamTable
+from livebode.lake import FLEET_SAMPLES, TABLES, Lake, StreamTable
 from livebode.locations import location, write_whole
 from livebode.records.sample_table import samples_of
 from livebode.records.wide_responses import wide_options

@@ -14,10 +14,11 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from livebode.arrow import from_numpy, to_numpy
+from livebode.core.machine_levels import LEVELS
 from livebode.fleet.log import StoredMessage
 from livebode.fleet.result_message import ResultMessage
 from livebode.fleet.subjects import axis_names
-from livebode.lake import FLEET_EVENTS, FLEET_PARAMETERS, FLEET_RESPONSES, FLEET_RUNS, LEVELS
+from livebode.lake import FLEET_EVENTS, FLEET_PARAMETERS, FLEET_RESPONSES, FLEET_RUNS
 
 US = 1_000_000
 DELETED = "results-deleted"

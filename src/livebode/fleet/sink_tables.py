@@ -12,12 +12,13 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.core import counted
+from livebode.core.machine_levels import LEVELS
 from livebode.fleet.log import StoredMessage
 from livebode.fleet.settings import SinkSection
 from livebode.fleet.sink_means import HOUR_S, MINUTE_S, MeanTier
 from livebode.fleet.sink_rows import DELETED, US, RunKey, SinkRows, event_rows, run_rows, sink_rows
 from livebode.fleet.subjects import RESULT_STREAM, axis_names
-from livebode.lake import FLEET_SCHEMAS, LEVELS, Lake, StreamTable
+from livebode.lake import FLEET_SCHEMAS, Lake, StreamTable
 
 _WAITING_BYTES_MAX = 64 << 20
 _BY_MESSAGE = ("fleet_runs", "fleet_events", "fleet_parameters", "fleet_responses")

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from livebode.core.machine_levels import LEVELS
 from livebode.version import __version__
 
 _BEGIN = datetime(2025, 1, 2, 6, tzinfo=UTC)
@@ -127,7 +128,7 @@ def _values(
 
 
 def _own(path: str, content: str, recorded: datetime) -> dict[str, Any]:
-    names = dict(zip(("site", "line", "machine", "axis"), path.split("/")))
+    names: dict[str, str] = dict(zip(LEVELS, path.split("/")))
     key = {"content": sha256(content.encode()).hexdigest(), "recipe": _RECIPE}
     return {**key, **names, "recorded_from": recorded}
 

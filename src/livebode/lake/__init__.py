@@ -1,6 +1,5 @@
 """The results of many runs as Delta tables below one URL, which DuckDB, Spark and Polars read as well."""
 
-from livebode.lake.columns import LEVELS
 from livebode.lake.compaction import Compacted, compact
 from livebode.lake.data_file import DataFile, Key
 from livebode.lake.fleet_schemas import (
@@ -27,7 +26,6 @@ __all__ = [
     "FLEET_RUNS",
     "FLEET_SAMPLES",
     "FLEET_SCHEMAS",
-    "LEVELS",
     "PARAMETERS",
     "PARAMETER_MEANS",
     "QUANTITIES",

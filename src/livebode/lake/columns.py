@@ -6,8 +6,9 @@ from typing import Final
 
 import pyarrow as pa
 
+from livebode.core.machine_levels import LEVELS
+
 TIME: Final = pa.timestamp("us", tz="UTC")
-LEVELS: Final = ("site", "line", "machine", "axis")
 MACHINE: Final = [(level, pa.string()) for level in LEVELS]
 
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import pyarrow as pa
 
-from livebode.lake.columns import LEVELS, MACHINE, TIME, in_delta, list_of
+from livebode.core.machine_levels import LEVELS
+from livebode.lake.columns import MACHINE, TIME, in_delta, list_of
 from livebode.lake.fleet_schemas import FLEET_SAMPLES, FLEET_SCHEMAS
 from livebode.records import parameter_table
 from livebode.records.wide_responses import wide_schema

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from deltalake import DeltaTable
 from deltalake.transaction import AddAction, RemoveAction
 
+from livebode.core.machine_levels import LEVELS
 from livebode.lake.data_file import parquet_writer
 from livebode.lake.lake import Lake
 from livebode.lake.schemas import TABLES
@@ -27,7 +28,7 @@ _GROUP_ROWS = 1 << 16
 """Who reads one axis of a joined file decodes as many rows at least."""
 _READERS_HOURS = 24
 """A file that is not in the table any more remains so long for those who read an older version."""
-_ORDER = ("site", "line", "machine", "axis", "log", "run", "model", "name", "logged", "logged_from", "number")
+_ORDER = (*LEVELS, "log", "run", "model", "name", "logged", "logged_from", "number")
 
 
 class _File(NamedTuple):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Literal, get_args
 
 import numpy as np
 import pyarrow as pa
@@ -13,13 +12,12 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from livebode.core import ArchiveError, nearest_name
+from livebode.core.machine_levels import LEVELS, Level
 from livebode.lake import Lake
 from livebode.trending.trend import NotAssessed, Trend, trend_of
 
 Floats = NDArray[np.float64]
-Level = Literal["site", "line", "machine", "axis"]
 
-LEVELS: tuple[Level, ...] = get_args(Level)
 UNNAMED = "unnamed"
 """The machine of runs whose configuration names none."""
 _KEY = ["content", "recipe"]

@@ -1,10 +1,16 @@
-"""OPC UA: the asyncua server in another process."""
+"""OPC UA: the asyncua server in another process, forked from one that has imported it."""
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import json
+import os
+import signal
+import socket
 import subprocess
 import sys
+from functools import cache
 from itertools import count
 from pathlib import Path
 
@@ -14,10 +20,25 @@ from tests.support.peers.peer import CHANNELS, RATE_HZ, STAMP_S, Peer, free_port
 SERVER = Path(__file__).with_name("opcua_server.py")
 
 
+@cache
+def _forking() -> socket.socket:
+    """Orders to the process that forks servers; it ends when they do."""
+    own, orders = socket.socketpair()
+    process = subprocess.Popen([sys.executable, str(SERVER), str(orders.fileno())], pass_fds=[orders.fileno()])
+    orders.close()
+
+    def end() -> None:
+        own.close()
+        process.wait()
+
+    atexit.register(end)
+    return own
+
+
 class OpcUaPeer(Peer):
     def __init__(self, folder: Path, certificates: Path | None = None, login: tuple[str, ...] = ()) -> None:
         super().__init__(folder)
-        self._arguments = [str(certificates or ""), *login]
+        self._arguments = [str(certificates or ""), login]
 
     def __enter__(self) -> OpcUaPeer:
         self._port = free_port()
@@ -32,32 +53,29 @@ class OpcUaPeer(Peer):
         return self
 
     def _start(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, str(SERVER), str(self._port), *self._arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        self._expect("serving")
-
-    def _expect(self, word: str) -> None:
-        assert self._process.stdout is not None
-        fields = self._process.stdout.readline().strip()
-        if fields != word:
-            self.__exit__()
-        assert fields == word
+        (told, tell), (listen, said) = os.pipe(), os.pipe()
+        socket.send_fds(_forking(), [json.dumps([self._port, *self._arguments]).encode()], [told, said])
+        os.close(told)
+        os.close(said)
+        self._to, self._from = os.fdopen(tell, "w"), os.fdopen(listen)
+        word, number = self._from.readline().split()
+        assert word == "serving"
+        self._process = int(number)
 
     def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.communicate()
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self._process, signal.SIGKILL)
+        self._from.read()  # until it has ended
+        self._from.close()
+        with contextlib.suppress(BrokenPipeError):
+            self._to.close()
 
     def wait_ready(self) -> None:
-        self._expect("ready")
+        assert self._from.readline() == "ready\n"
 
     def _write(self, fields: dict) -> None:
-        assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps(fields) + "\n")
-        self._process.stdin.flush()
+        self._to.write(json.dumps(fields) + "\n")
+        self._to.flush()
 
     def send(self, batch: Batch) -> None:
         self._write({"sample": batch.first_sample, "data": batch.data.tolist(), "stamp_s": batch.stamp_s})

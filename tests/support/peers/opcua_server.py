@@ -1,7 +1,11 @@
-"""An asyncua server in a process of its own, told over standard input what to write.
+"""Servers of asyncua in processes of their own, each told over standard input what to write.
 
-Lines in: {"sample": …, "data": […, …], "stamp_s": …}. Lines out: "serving" once, and "ready" when every node is
-subscribed to.
+Lines in: {"sample": …, "data": […, …], "stamp_s": …}. Lines out: "serving" with the number of the process, and "ready"
+when every node is subscribed to.
+
+The import of asyncua and the nodes that the standard demands cost two seconds of the processor. The process that is
+started, with the number of a socket as its argument, has them once; it forks a server for each message, which has the
+port, the folder of certificates and the login, and the descriptors of the server's standard input and output.
 """
 
 from __future__ import annotations
@@ -9,6 +13,9 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import os
+import signal
+import socket
 import sys
 from datetime import UTC, datetime
 
@@ -29,9 +36,15 @@ class Users:
         return User(role=UserRole.User) if (username, password) == self._login else None
 
 
-async def serve(port: int, folder: str | None, login: list[str]) -> None:
-    server = Server(user_manager=Users(*login)) if login else Server()
+async def prepared() -> Server:
+    server = Server()
     await server.init()
+    return server
+
+
+async def serve(server: Server, port: int, folder: str, login: list[str]) -> None:
+    if login:
+        server.iserver.user_manager = Users(*login)
     server.set_endpoint(f"opc.tcp://127.0.0.1:{port}/livebode")
     if folder:
         server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
@@ -43,7 +56,7 @@ async def serve(port: int, folder: str | None, login: list[str]) -> None:
         empty = ua.Variant(0, ua.VariantType.Int64) if name == "sample" else ua.Variant([0.0], ua.VariantType.Double)
         variables[name] = await axis.add_variable(ua.NodeId(f"axis.{name}", 2), name, empty)
     async with server:
-        print("serving", flush=True)
+        print("serving", os.getpid(), flush=True)
         await asyncio.gather(obey(server, variables), report_ready(server))
 
 
@@ -72,6 +85,23 @@ async def report_ready(server: Server) -> None:
         await asyncio.sleep(0.01)
 
 
+def fork_servers(orders: socket.socket, server: Server) -> None:
+    """Until the tests have ended."""
+    while True:
+        message, files, _, _ = socket.recv_fds(orders, 1 << 16, 2)
+        if not message:
+            return
+        if os.fork() == 0:
+            orders.close()
+            for number, file in enumerate(files):
+                os.dup2(file, number)
+            asyncio.run(serve(server, *json.loads(message)))
+            return
+        for file in files:
+            os.close(file)
+
+
 if __name__ == "__main__":
     logging.disable(logging.CRITICAL)
-    asyncio.run(serve(int(sys.argv[1]), sys.argv[2] or None, sys.argv[3:]))
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for a server that was killed
+    fork_servers(socket.socket(fileno=int(sys.argv[1])), asyncio.run(prepared()))
