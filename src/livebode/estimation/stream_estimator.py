@@ -117,9 +117,9 @@ def signals_of(block: Block, settings: Settings) -> tuple[Floats, Floats | None]
 
 
 def _rows(data: Floats, which: list[int]) -> Floats:
-    """These rows, without a copy where they are evenly spaced, as those of three channels in any usual order are."""
+    """These rows; no copy where they are contiguous and evenly spaced, as three channels in the usual orders are."""
     first, step = which[0], which[1] - which[0] if len(which) > 1 else 1
-    if step == 0 or which != list(range(first, first + step * len(which), step)):
+    if step == 0 or data.strides[1] != data.itemsize or which != list(range(first, first + step * len(which), step)):
         return data[which]
     stop = first + step * len(which)
     return data[first : stop if stop >= 0 else None : step]
