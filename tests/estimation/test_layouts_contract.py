@@ -9,14 +9,13 @@ from livebode.core import Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 
-LINES = Lines.parse("20:100:20", 1000, 50)
-SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", hop=10)
+SETTINGS = Settings(lines=Lines.parse("20:100:20", 1000, 50), output="y", input="u", excitation="w", hop=10)
 NAMES = ("w", "u", "y")
 
 
 def signals() -> np.ndarray:
     rng = np.random.default_rng(0)
-    w = np.resize(multisine(LINES), 1000)
+    w = np.resize(multisine(SETTINGS.lines), 1000)
     u = w + 0.1 * rng.standard_normal(w.size)
     return np.array([w, u, np.roll(u, 3) + 0.1 * rng.standard_normal(w.size)])
 
