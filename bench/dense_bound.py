@@ -1,7 +1,8 @@
 """`python -m bench.dense_bound`: how near dense rows are to the memory's limit, and to Numba.
 
 "memory" only reads the table of twiddle factors and writes the rows (bench/native/traffic.c): a yardstick of what
-the memory takes, though a kernel that orders its accesses better can be faster.
+the memory takes, though a kernel that orders its accesses better can be faster. The
+share of the bound is the time of "memory" over that of the kernel: 1 where arithmetic is hidden behind the accesses.
 """
 
 import argparse
@@ -12,6 +13,8 @@ import numpy as np
 from bench import dense_rows, native_build
 from bench.work import ROWS, Array, signal
 
+TARGET = 3.0
+AT_BOUND = 0.9  # of the memory's time: repeated runs differ by as much
 CELLS = [(window, count) for window in (100, 200, 1000) for count in (7, 21)]
 
 
@@ -29,18 +32,33 @@ def measure(window: int, count: int, seconds: float) -> dict[str, float]:
     return dense_rows.nanoseconds(x, window, bins, out, seconds, memory=traffic(window, count, out))
 
 
+def verdict(ns: dict[str, float]) -> str:
+    """Of both phases: at least 3 × Numba, or as fast as the memory's part alone, or missed."""
+    found = []
+    for phase in ("window", "fixed"):
+        reached = ns["numba"] / ns[phase] >= TARGET
+        at_bound = ns["memory"] / ns[phase] >= AT_BOUND
+        found.append("met" if reached else "bound reached" if at_bound else "missed")
+    return ", ".join(found)
+
+
 def main() -> None:
+    """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m bench.dense_bound", description=__doc__)
     parser.add_argument("--seconds", type=float, default=1.0, help="duration per contender and cell")
     seconds = parser.parse_args().seconds
     native_build.build()
-    print("| N, K | Numba, ns per row | window | fixed | memory | Numba / window | Numba / fixed | Numba / memory |")
-    print("|---|---|---|---|---|---|---|---|")
+    print(
+        "| N, K | Numba, ns per row | window | fixed | memory | Numba / window | Numba / fixed | Numba / memory "
+        "| share of the bound, window | fixed | target ≥ 3, or the bound |"
+    )
+    print("|---" * 11 + "|")
     for window, count in CELLS:
         ns = measure(window, count, seconds)
         times = " | ".join(f"{ns[name]:.2f}" for name in ("numba", "window", "fixed", "memory"))
         ratios = " | ".join(f"{ns['numba'] / ns[name]:.2f}" for name in ("window", "fixed", "memory"))
-        print(f"| {window}, {count} | {times} | {ratios} |", flush=True)
+        shares = " | ".join(f"{ns['memory'] / ns[name]:.0%}" for name in ("window", "fixed"))
+        print(f"| {window}, {count} | {times} | {ratios} | {shares} | {verdict(ns)} |", flush=True)
 
 
 if __name__ == "__main__":

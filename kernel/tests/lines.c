@@ -80,7 +80,7 @@ static lb_line_rows rows_of(size_t rows, size_t lines)
 static uint64_t hash_of_rows(uint64_t hash, const lb_line_rows *out, size_t rows, size_t lines)
 {
     const size_t n = rows * lines;
-    const double *parts[] = {out->value,  out->variance,   out->coherence, out->input_coherence,
+    const double *parts[] = {out->value,  out->sigma,      out->coherence, out->input_coherence,
                              out->weight, out->distortion, out->dof,       out->moment};
     const size_t counts[] = {2 * n, n, n, n, 2 * n, n, rows, 3 * rows};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; ++i) {
@@ -98,7 +98,7 @@ static uint64_t hash_of_rows(uint64_t hash, const lb_line_rows *out, size_t rows
 static void release_rows(lb_line_rows *out)
 {
     free(out->value);
-    free(out->variance);
+    free(out->sigma);
     free(out->coherence);
     free(out->input_coherence);
     free(out->weight);
@@ -133,8 +133,7 @@ static void take_one(const lb_line_windows *in, size_t lines, size_t row, double
     one->clean += row;
     one->aside = in->aside ? in->aside + row : NULL;
     one->moving = in->moving ? in->moving + row : NULL;
-    one->distortion = in->distortion ? in->distortion + row * lines : NULL;
-    one->invalid = in->invalid ? in->invalid + row * lines : NULL;
+    one->verdict = in->verdict ? in->verdict + row : NULL;
     for (size_t i = 0; i < 3; ++i) {
         moment[i] = in->moment[i * in->rows + row];
     }
@@ -160,17 +159,22 @@ static void demand_one_by_one(const lb_line_weights *weights, const lb_line_sett
     release_moments(&m);
 }
 
-static uint64_t run(size_t lines, size_t places, unsigned options, uint64_t hash)
+static uint64_t run(size_t lines, size_t places, unsigned options, lb_instruction_set instructions, uint64_t hash)
 {
     uint32_t state = (uint32_t)(lines * 131u + places * 17u + options);
     const lb_line_weights weights = {options & 1u ? 1.0 : 0.5, options & 1u ? NULL : table, WEIGHTS};
-    const lb_line_settings set = {(options & 2u) != 0, (options & 4u) != 0, (lb_line_noise)(options / 8u % 3u), 2.5,
-                                  options & 1u ? 3.0 : 1e9};
+    const lb_line_settings set = {
+        (options & 2u) != 0,      (options & 4u) != 0, (lb_line_noise)(options / 8u % 3u), 2.5,
+        options & 1u ? 3.0 : 1e9, instructions};
     const size_t stride = lines + options % 3u, n = ROWS * lines;
     double *output = noises(2 * ROWS * stride, &state, 0), *reference = noises(2 * ROWS * stride, &state, 0);
     double *detected = noises(n, &state, 1), *distortion = noises(n, &state, 1), *moment = noises(3 * ROWS, &state, 0);
     uint8_t *whole = choices(ROWS, &state), *clean = choices(ROWS, &state), *aside = choices(ROWS, &state);
     uint8_t *moving = choices(ROWS, &state), *invalid = choices(n, &state);
+    int64_t *verdict = (int64_t *)claim(ROWS, sizeof(int64_t));
+    for (size_t row = 0; row < ROWS; ++row) {
+        verdict[row] = (int64_t)(row * row % ROWS);
+    }
     const lb_line_windows in = {places - 1,
                                 ROWS,
                                 stride,
@@ -184,6 +188,8 @@ static uint64_t run(size_t lines, size_t places, unsigned options, uint64_t hash
                                 set.noise ? moving : NULL,
                                 options & 1u ? distortion : NULL,
                                 options & 1u ? invalid : NULL,
+                                options & 1u ? verdict : NULL,
+                                ROWS,
                                 moment};
     lb_line_moments m = moments_of(places, lines);
     lb_line_rows out = rows_of(ROWS, lines);
@@ -192,7 +198,7 @@ static uint64_t run(size_t lines, size_t places, unsigned options, uint64_t hash
     hash = hashed(hash_of_moments(hash_of_rows(hash, &out, ROWS, lines), &m), &largest, 1);
     demand_one_by_one(&weights, &set, &in, &m, largest);
 
-    void *every[] = {output, reference, detected, distortion, moment, whole, clean, aside, moving, invalid};
+    void *every[] = {output, reference, detected, distortion, moment, whole, clean, aside, moving, invalid, verdict};
     for (size_t i = 0; i < sizeof every / sizeof *every; ++i) {
         free(every[i]);
     }
@@ -204,13 +210,16 @@ static uint64_t run(size_t lines, size_t places, unsigned options, uint64_t hash
 static void refuse_misuse(void)
 {
     const lb_line_weights weights = {0.5, table, WEIGHTS}, none = {0.5, NULL, 0};
-    const lb_line_settings set = {0, 0, LB_NOISE_SCATTER, 1, 1};
+    const lb_line_settings set = {0, 0, LB_NOISE_SCATTER, 1, 1, LB_BEST},
+                           unknown = {0, 0, LB_NOISE_SCATTER, 1, 1, (lb_instruction_set)99};
     lb_line_moments m = moments_of(1, 2), missing = m;
     lb_line_rows out = rows_of(1, 2), partial = out;
     const double spectrum[4] = {1, 2, 3, 4}, moment[3] = {0};
     const uint8_t yes[1] = {1};
+    const int64_t second[1] = {1}, before[1] = {-1};
     double largest = 0;
-    lb_line_windows in = {0, 1, 2, spectrum, spectrum, spectrum, NULL, yes, yes, NULL, NULL, NULL, NULL, moment};
+    lb_line_windows in = {0,   1,    2,    spectrum, spectrum, spectrum, NULL, yes,
+                          yes, NULL, NULL, NULL,     NULL,     NULL,     0,    moment};
     lb_line_windows wrong = in;
     DEMAND(lb_lines_process(&weights, &m, &largest, &set, &in, NULL) == LB_ERROR_NULL);
     DEMAND(lb_lines_process(&weights, &m, NULL, &set, &in, &out) == LB_ERROR_NULL);
@@ -224,6 +233,15 @@ static void refuse_misuse(void)
     DEMAND(lb_lines_process(&weights, &m, &largest, &set, &wrong, &out) == LB_ERROR_SIZE);
     wrong = in, wrong.stride = 1;
     DEMAND(lb_lines_process(&weights, &m, &largest, &set, &wrong, &out) == LB_ERROR_SIZE);
+    wrong = in, wrong.distortion = spectrum, wrong.verdicts = 1;
+    DEMAND(lb_lines_process(&weights, &m, &largest, &set, &wrong, &out) == LB_ERROR_NULL);
+    wrong.verdict = second;
+    DEMAND(lb_lines_process(&weights, &m, &largest, &set, &wrong, &out) == LB_ERROR_SIZE);
+    wrong.verdict = before;
+    DEMAND(lb_lines_process(&weights, &m, &largest, &set, &wrong, &out) == LB_ERROR_SIZE);
+    wrong = in, wrong.invalid = yes;
+    DEMAND(lb_lines_process(&weights, &m, &largest, &set, &wrong, &out) == LB_ERROR_NULL);
+    DEMAND(lb_lines_process(&weights, &m, &largest, &unknown, &in, &out) == LB_ERROR_INSTRUCTION_SET);
     DEMAND(lb_lines_process(&none, &m, &largest, &set, &in, &out) == LB_ERROR_SIZE);
     DEMAND(m.count[0] == 0 && largest == 0);
     release_rows(&out);
@@ -238,7 +256,11 @@ int main(void)
     for (size_t i = 0; i < sizeof lines / sizeof *lines; ++i) {
         for (size_t places = 1; places <= 4; places += 1 + i % 2) {
             for (unsigned options = 0; options < 24; ++options) {
-                total = run(lines[i], places, options, total);
+                const uint64_t found = run(lines[i], places, options, LB_BASELINE, total);
+                for (int set = LB_BEST; set <= (int)lb_best_instruction_set(); ++set) {
+                    DEMAND(run(lines[i], places, options, (lb_instruction_set)set, total) == found);
+                }
+                total = found;
             }
         }
     }

@@ -1,6 +1,6 @@
 """The line stage in C gives the bits of its NumPy twin."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ from livebode.kernel import (
     LineSettings,
     LineWindows,
     NewestWindows,
+    instruction_sets,
     line_twin,
     process_each,
     process_lines,
@@ -42,13 +43,15 @@ class Case:
     with_aside: bool
     with_repeating: bool
     dof_repeating: float
+    set: int
     pieces: tuple[int, ...]
     seed: int
 
     @property
     def settings(self) -> LineSettings:
         table = weights_of(self.forgetting).table
-        return LineSettings(self.forgetting, table, self.averages, self.denominator, self.reference, self.noise, 3.5)
+        signals = self.denominator, self.reference
+        return LineSettings(self.forgetting, table, self.averages, *signals, self.noise, 3.5, self.set)
 
     def moments(self) -> LineMoments:
         return LineMoments(
@@ -61,7 +64,7 @@ class Case:
 
 cases = st.builds(
     Case,
-    lines=st.sampled_from([1, 2, 6, 31, 32, 33, 65]),
+    lines=st.sampled_from([1, 2, 3, 6, 8, 9, 21, 31]),
     places=st.integers(1, 5),
     bins_beside=st.integers(0, 3),
     forgetting=st.sampled_from([1.0, 0.8, 0.3]),
@@ -73,6 +76,7 @@ cases = st.builds(
     with_aside=st.booleans(),
     with_repeating=st.booleans(),
     dof_repeating=st.sampled_from([4.0, np.inf]),
+    set=st.integers(0, len(instruction_sets())),
     pieces=st.lists(st.integers(0, 12), min_size=1, max_size=4).map(tuple),
     seed=st.integers(0, 2**32 - 1),
 )
@@ -102,7 +106,7 @@ class Numbers:
         case = self._case
         shape = rows, case.lines
         clean = self.flags(0.8, rows)
-        repeats = case.with_repeating
+        repeats, verdicts = case.with_repeating, 1 + rows // 3
         return LineWindows(
             largest,
             place,
@@ -112,8 +116,9 @@ class Numbers:
             clean,
             self.flags(0.2, rows) if case.with_aside else None,
             self.flags(0.3, rows) if case.noise else None,
-            np.abs(self.reals(*shape)) if repeats else None,
-            self.flags(0.2, *shape) if repeats else None,
+            np.abs(self.reals(verdicts, case.lines)) if repeats else None,
+            self.flags(0.2, verdicts, case.lines) if repeats else None,
+            self._rng.integers(0, verdicts, rows) if repeats else None,
             case.dof_repeating,
             self.reals(3, rows),
         )
@@ -155,10 +160,11 @@ def test_any_division_of_the_windows_gives_the_same_bits(case):
     for rows in case.pieces:
         at = slice(begun, begun + rows)
         part = [None if array is None else array[at] for array in (every.noise, every.whole, every.clean, every.aside)]
-        more = [None if array is None else array[at] for array in (every.moving, every.distortion, every.invalid)]
+        more = [None if array is None else array[at] for array in (every.moving, every.verdict)]
         spectrum, moment = np.ascontiguousarray(every.spectrum[:, at]), np.ascontiguousarray(every.moment[:, at])
         place = begun % case.places
-        windows = LineWindows(largest, place, spectrum, *part, *more, every.dof_repeating, moment)
+        repeating = more[0], every.distortion, every.invalid, more[1], every.dof_repeating
+        windows = LineWindows(largest, place, spectrum, *part, *repeating, moment)
         one, largest = process_lines(case.settings, parts, windows)
         found.append(one)
         begun += rows
@@ -184,7 +190,7 @@ def test_windows_of_several_machines_have_the_bits_of_each_alone_and_of_the_twin
         yes = np.ones(1, np.bool_)
         for i in range(machines):
             spectrum, moment = windows.spectrum[:, [i]].copy(), windows.moment[[i]].T.copy()
-            one = LineWindows(largest[i], place[i], spectrum, None, yes, yes, None, None, None, None, np.inf, moment)
+            one = LineWindows(largest[i], place[i], spectrum, None, yes, yes, *[None] * 5, np.inf, moment)
             rows, _ = process_lines(about, alone[i], one)
             own = found._replace(moment=found.moment.T)
             assert_same_bits(rows._replace(moment=rows.moment.T), type(own)(*(part[[i]] for part in own)))
@@ -207,12 +213,12 @@ def test_windows_of_several_machines_have_the_bits_of_each_alone_and_of_the_twin
     ],
 )
 def test_of_several_machines_none_changes_where_an_array_is_refused(wrong):
-    case = Case(2, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, (3,), 0)
+    case = Case(2, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, 0, (3,), 0)
     each, zeros = [case.moments(), case.moments()], np.zeros(2, np.int64)
     windows = NewestWindows(np.zeros(2), zeros, Numbers(case).complex_(3, 2, 2), np.zeros((2, 3)))
     with pytest.raises(ValueError, match=r"array|few|place"):
         process_each(case.settings, each, windows._replace(**wrong))
-    other = [case.moments(), Case(3, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, (3,), 0).moments()]
+    other = [case.moments(), replace(case, lines=3).moments()]
     with pytest.raises(ValueError, match="array"):
         process_each(case.settings, other, windows)
     for moments in (*each, other[0]):
@@ -231,13 +237,17 @@ def test_of_several_machines_none_changes_where_an_array_is_refused(wrong):
         {"spectrum": np.zeros((3, 3, 2), np.complex64)},
         {"spectrum": np.zeros((1, 3, 2), np.complex128)},
         {"spectrum": np.zeros((3, 3, 4), np.complex128)[:, :, ::2]},
-        {"distortion": np.zeros((3, 3))},
-        {"invalid": np.zeros((2, 2), np.bool_)},
+        {"distortion": np.zeros((3, 3)), "verdict": np.zeros(3, np.int64)},
+        {"distortion": np.zeros((3, 2)), "invalid": np.zeros((2, 2), np.bool_), "verdict": np.zeros(3, np.int64)},
+        {"distortion": np.zeros((3, 2)), "verdict": np.array([0, 3, 0])},
+        {"distortion": np.zeros((3, 2)), "verdict": np.array([0, -1, 0])},
+        {"distortion": np.zeros((3, 2)), "verdict": None},
+        {"invalid": np.zeros((0, 2), np.bool_)},
         {"moment": np.zeros((2, 3))},
     ],
 )
 def test_arrays_of_another_shape_or_type_are_refused_and_nothing_changes(wrong):
-    case = Case(2, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, (3,), 0)
+    case = Case(2, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, 0, (3,), 0)
     moments, windows = case.moments(), Numbers(case).windows(3, 0, 0.0)
     with pytest.raises(ValueError, match=r"array|few|refused|contiguous"):
         process_lines(case.settings, moments, windows._replace(**wrong))

@@ -42,7 +42,10 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86) -> 
     """All objects of the kernel."""
     switch = ["-DLB_DISPATCH"] if dispatch else []
     jobs: list[tuple[str, str, list[str]]] = [(name, name, []) for name in ("twiddle", "machine")]
-    jobs += [(f"lines/{name}", name, []) for name in ("moments", "lines")]
+    jobs += [(f"lines/{name}", f"lines_{name}", []) for name in ("lines", "rows", "sizes")]
+    for name, isa in SETS.items() if dispatch else ():
+        jobs.append(("lines/rows", f"lines_{name}", [f"-DLB_LINES_NAME=lb_lines_{name}", *isa]))
+        jobs.append(("lines/sizes", f"sizes_{name}", [f"-DLB_SIZES_NAME=lb_sizes_{name}", *isa]))
     jobs += [(f"repeating/{name}", name, []) for name in ("numbers", "hum", "distortion", "periods")]
     for bits in (32, 64):
         jobs += [(name, f"{name}{bits}", [f"-DLB_BITS={bits}"]) for name in TYPED]
@@ -109,6 +112,8 @@ def test_wide_objects_use_wide_registers(built):
             (file,) = (f for f in built[2] if f.name == f"tile{bits}_{name}.o")
             assembly = run(needed("objdump"), "-d", file)
             assert len(re.findall(rf"vmul{suffix} .*%{register}", assembly)) > 20
+        (file,) = (f for f in built[2] if f.name == f"lines_{name}.o")
+        assert len(re.findall(rf"vdivpd .*%{register}", run(needed("objdump"), "-d", file))) > 5
 
 
 def test_undefined_symbols_are_few_and_known(built):

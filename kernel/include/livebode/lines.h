@@ -51,6 +51,7 @@ typedef struct {
     lb_line_noise noise;
     double noise_dof;     /* degrees of freedom of the noise at detection lines */
     double dof_repeating; /* and of the errors that repeat */
+    lb_instruction_set set;
 } lb_line_settings;
 
 /* Windows at consecutive places, from `place` on. Rows of spectra are `stride` complex numbers apart. */
@@ -62,15 +63,18 @@ typedef struct {
     const uint8_t *clean;                           /* [rows], and no spike */
     const uint8_t *aside;                           /* [rows], nothing is learned from it; NULL without */
     const uint8_t *moving;                          /* [rows], the machine moves; NULL if never */
-    const double *distortion; /* [rows][lines], errors that repeat, NaN where not known; NULL without */
-    const uint8_t *invalid;   /* [rows][lines], the line is invalid because of them; NULL without */
-    const double *moment;     /* [3][rows]: time, schedule, oldest sample */
+    const double *distortion;                       /* [verdicts][lines], errors that repeat, NaN where not known; NULL
+                                                       without */
+    const uint8_t *invalid;                         /* [verdicts][lines], invalid because of them; NULL without */
+    const int64_t *verdict;                         /* [rows], which verdict is that of the row */
+    size_t verdicts;
+    const double *moment; /* [3][rows]: time, schedule, oldest sample */
 } lb_line_windows;
 
 /* For each row and line, and for each row. NaN where a value is not known. */
 typedef struct {
     double *value;           /* [rows][lines][2] */
-    double *variance;        /* [rows][lines], of the value */
+    double *sigma;           /* [rows][lines], of the value */
     double *coherence;       /* [rows][lines], of reference and output, without its bias */
     double *input_coherence; /* [rows][lines], of reference and denominator; NaN for `direct` */
     double *weight;          /* [rows][lines][2], of the row in a mean */
@@ -83,8 +87,9 @@ typedef struct {
 
 /* Responses of the windows, whose moments are updated, and so is the largest power of the reference so far.
  *
- * LB_ERROR_NULL for a missing pointer, LB_ERROR_SIZE for a place that the period does not have, no places or lines, or
- * rows that are closer than their lines. */
+ * LB_ERROR_NULL for a missing pointer, LB_ERROR_SIZE for a place that the period does not have, no places or lines,
+ * rows that are closer than their lines, or a verdict that does not exist, LB_ERROR_INSTRUCTION_SET for one that this
+ * machine does not have. */
 lb_status lb_lines_process(const lb_line_weights *weights, const lb_line_moments *moments, double *largest,
                            const lb_line_settings *settings, const lb_line_windows *in, const lb_line_rows *out);
 

@@ -3,17 +3,21 @@
 #define LB_MOMENTS_H
 
 #include "../lb_assert.h"
+#include "lanes.h"
 #include "livebode/lines.h"
-
-/* Lines of a row that are processed together: what is known of them stays in the first-level cache. */
-#define LB_TOGETHER 32u
 
 /* Order of the means. */
 enum { NUM_RE, NUM_IM, DEN_RE, DEN_IM, REF_RE, REF_IM, REF_POWER, OUT_POWER, NOISE_POWER, DEN_POWER };
+/* Order of the scatter. */
+enum { NUM_SCATTER, DEN_SCATTER, SHARED_RE, SHARED_IM };
 
+/* Some lines of a window, and of the moments of its place, as they are in registers. */
 typedef struct {
-    double of[LB_LINE_MEANS][LB_TOGETHER];
+    lb_lanes of[LB_LINE_MEANS];
 } lb_window;
+typedef struct {
+    lb_lanes mean[LB_LINE_MEANS], scatter[LB_LINE_SCATTER];
+} lb_some_moments;
 
 /* Sums of weights: Σλ^i, Σλ^2i, Σλ^3i. */
 typedef struct {
@@ -49,8 +53,56 @@ static inline size_t lb_place(const lb_line_moments *m, size_t place, size_t fir
 
 static inline size_t lb_step(const lb_line_moments *m) { return m->places * m->lines; }
 
-/* Adds some lines of a window to the moments of its place, by deviations (West 1979). Where it has no noise, that of
- * the mean is written to it. `share` is its share of the mean. */
-void lb_moments_add(const lb_line_moments *m, size_t at, double forgetting, double share, size_t count, lb_window *now);
+LB_INLINE lb_some_moments lb_load_moments(const lb_line_moments *m, size_t at, size_t count)
+{
+    lb_some_moments s;
+    for (size_t q = 0; q < LB_LINE_MEANS; ++q) {
+        s.mean[q] = lb_load(m->means + q * lb_step(m) + at, count);
+    }
+    for (size_t q = 0; q < LB_LINE_SCATTER; ++q) {
+        s.scatter[q] = lb_load(m->scatter + q * lb_step(m) + at, count);
+    }
+    return s;
+}
+
+LB_INLINE void lb_store_moments(const lb_line_moments *m, size_t at, size_t count, const lb_some_moments *s)
+{
+    for (size_t q = 0; q < LB_LINE_MEANS; ++q) {
+        lb_store(m->means + q * lb_step(m) + at, s->mean[q], count);
+    }
+    for (size_t q = 0; q < LB_LINE_SCATTER; ++q) {
+        lb_store(m->scatter + q * lb_step(m) + at, s->scatter[q], count);
+    }
+}
+
+/* A window with the start or end of the excitation has no noise: the mean is of the others. */
+LB_INLINE void lb_complete_noise(lb_lanes *mean, double share, lb_lanes *now)
+{
+    *mean = lb_select(lb_are_numbers(*mean), *mean, *now);
+    if (share < 1.0) {
+        *now = lb_select(lb_are_numbers(*now), *now, *mean);
+    }
+}
+
+/* Adds some lines of a window to the moments of its place, by deviations (West 1979). `share` is its share of the
+ * mean. */
+LB_INLINE void lb_add_window(lb_some_moments *s, double forgetting, double share, const lb_window *window)
+{
+    lb_window now = *window;
+    lb_lanes deviation[LB_LINE_MEANS];
+    const double kept = 1.0 - share;
+    LB_ASSERT(share > 0.0 && share <= 1.0);
+    lb_complete_noise(&s->mean[NOISE_POWER], share, &now.of[NOISE_POWER]);
+    for (size_t q = 0; q < LB_LINE_MEANS; ++q) {
+        deviation[q] = now.of[q] - s->mean[q];
+        s->mean[q] += deviation[q] * share;
+    }
+    const lb_lanes nr = deviation[NUM_RE], ni = deviation[NUM_IM], dr = deviation[DEN_RE], di = deviation[DEN_IM];
+    const lb_lanes found[LB_LINE_SCATTER] = {nr * nr + ni * ni, dr * dr + di * di, nr * dr + ni * di,
+                                             ni * dr - nr * di};
+    for (size_t q = 0; q < LB_LINE_SCATTER; ++q) {
+        s->scatter[q] = s->scatter[q] * forgetting + found[q] * kept;
+    }
+}
 
 #endif

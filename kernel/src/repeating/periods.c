@@ -122,22 +122,19 @@ static void add_moments(const job *j)
 {
     const lb_line_moments *m = &j->state->moments;
     const double share = 1.0 / (double)*m->count;
-    for (size_t first = 0; first < m->lines; first += LB_TOGETHER) {
-        const size_t count = m->lines - first < LB_TOGETHER ? m->lines - first : LB_TOGETHER;
+    for (size_t first = 0; first < m->lines; first += LB_LANES) {
+        const size_t count = m->lines - first < LB_LANES ? m->lines - first : LB_LANES;
+        lb_some_moments some = lb_load_moments(m, first, count);
         lb_window now;
         for (size_t s = 0; s < 3u; ++s) {
             const double *from = j->scratch.spectra + 2u * (s * m->lines + first);
-            for (size_t i = 0; i < count; ++i) {
-                now.of[2u * s][i] = from[2u * i];
-                now.of[2u * s + 1u][i] = from[2u * i + 1u];
-            }
+            lb_load_pairs(from, count, &now.of[2u * s], &now.of[2u * s + 1u]);
         }
-        for (size_t i = 0; i < count; ++i) {
-            now.of[REF_POWER][i] = now.of[REF_RE][i] * now.of[REF_RE][i] + now.of[REF_IM][i] * now.of[REF_IM][i];
-            now.of[OUT_POWER][i] = now.of[NUM_RE][i] * now.of[NUM_RE][i] + now.of[NUM_IM][i] * now.of[NUM_IM][i];
-            now.of[NOISE_POWER][i] = now.of[DEN_POWER][i] = 0.0;
-        }
-        lb_moments_add(m, first, equal_weights.forgetting, share, count, &now);
+        now.of[REF_POWER] = now.of[REF_RE] * now.of[REF_RE] + now.of[REF_IM] * now.of[REF_IM];
+        now.of[OUT_POWER] = now.of[NUM_RE] * now.of[NUM_RE] + now.of[NUM_IM] * now.of[NUM_IM];
+        now.of[NOISE_POWER] = now.of[DEN_POWER] = lb_all(0.0);
+        lb_add_window(&some, equal_weights.forgetting, share, &now);
+        lb_store_moments(m, first, count, &some);
     }
 }
 

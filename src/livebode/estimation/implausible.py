@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Stage, StatefulBase
+from livebode.kernel import largest_sizes
 
 Floats = NDArray[np.float64]
 
@@ -28,13 +29,17 @@ class PlausibleRange(StatefulBase):
         self._limit = np.full(signals, np.inf)
         self._at = 0
 
-    def process(self, data: Floats) -> NDArray[np.intp]:
-        """Positions in `data` (channels, samples), all finite, of samples that are too large in any channel."""
-        size = np.abs(data)
-        starts = np.arange(self._window - self._at - self._window, size.shape[1], self._window)
-        starts[0] = 0
-        found = self._found(size, starts)
-        self._at = (self._at + size.shape[1]) % self._window
+    def sizes(self, data: Floats) -> Floats:
+        """Largest |x| in what remains of the period and in each after it, (channels, periods); NaN where one is."""
+        return largest_sizes(data, self._window - self._at, self._window)
+
+    def process(self, data: Floats, sizes: Floats | None = None) -> NDArray[np.intp]:
+        """Positions in `data` (channels, samples), all finite, of samples that are too large in any channel.
+
+        `sizes` are those of the same data, where they are known.
+        """
+        found = self._found(data, self.sizes(data) if sizes is None else sizes)
+        self._at = (self._at + data.shape[1]) % self._window
         if self._at == 0:
             self._end_period()
         return np.concatenate(found) if found else _NONE
@@ -62,9 +67,8 @@ class PlausibleRange(StatefulBase):
             else:
                 one._largest[:] = largest
 
-    def _found(self, size: Floats, starts: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    def _found(self, data: Floats, every: Floats) -> list[NDArray[np.intp]]:
         """The same, in pieces that begin a period, or continue the one that has begun."""
-        every = np.maximum.reduceat(size, starts, axis=1)
         every[:, 0] = np.maximum(self._largest, every[:, 0])
         limits = np.empty(every.shape)
         limits[:, 0], limits[:, 1:] = self._limit, _limits(every[:, :-1])
@@ -76,9 +80,10 @@ class PlausibleRange(StatefulBase):
             if i > 0:
                 self._end_period()
             if np.any(largest > self._limit):
-                piece = size[:, starts[i] : starts[i + 1] if i + 1 < starts.size else None]
+                start = i * self._window - self._at
+                piece = np.abs(data[:, max(start, 0) : start + self._window])
                 wrong = piece > self._limit[:, np.newaxis]
-                found.append(starts[i] + np.flatnonzero(wrong.any(axis=0)))
+                found.append(max(start, 0) + np.flatnonzero(wrong.any(axis=0)))
                 largest = np.max(piece, axis=1, where=~wrong, initial=0.0)
             self._largest = np.maximum(self._largest, largest)
         return found

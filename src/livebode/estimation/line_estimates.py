@@ -30,11 +30,9 @@ class LineEstimates:
 
     @classmethod
     def of(cls, found: LineRows) -> LineEstimates:
-        """Those of the kernel, whose variances become sigmas in place."""
-        sigma = np.sqrt(found.variance, out=found.variance)
-        return cls(
-            found.value, sigma, found.coherence, found.input_coherence, found.weight, found.distortion, found.valid
-        )
+        """Those of the kernel."""
+        coherence = found.coherence, found.input_coherence
+        return cls(found.value, found.sigma, *coherence, found.weight, found.distortion, found.valid)
 
     def with_ripple(self, ripple: Floats, input_power: Floats) -> LineEstimates:
         """With the share of a ripple that is added to an input of this power."""

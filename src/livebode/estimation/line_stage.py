@@ -20,7 +20,7 @@ from livebode.estimation.periodicity import Periodicity
 from livebode.estimation.products import power, times
 from livebode.estimation.repeating import Repeating
 from livebode.estimation.settings import Settings
-from livebode.estimation.spectra import SpectraRows
+from livebode.estimation.spectra import SpectraRows, check_instruction_set
 from livebode.kernel import (
     NOISE_LARGER,
     NOISE_MOVING,
@@ -29,6 +29,7 @@ from livebode.kernel import (
     LineSettings,
     LineWindows,
     NewestWindows,
+    chosen_instruction_set,
     process_each,
     process_lines,
 )
@@ -86,7 +87,9 @@ class LineStage(StatefulBase):
         if self._detection is not None:
             noise, noise_dof = NOISE_LARGER if s.noise == "quiet" else NOISE_MOVING, self._detection.dof
         denominator, reference = (self._roles.index(role) for role in (s.method.denominator, s.method.reference))
-        return LineSettings(weights.forgetting, weights.table, s.average, denominator, reference, noise, noise_dof)
+        weighting = weights.forgetting, weights.table
+        check_instruction_set()
+        return LineSettings(*weighting, s.average, denominator, reference, noise, noise_dof, chosen_instruction_set())
 
     def _state(self) -> dict[str, Any]:
         return super()._state() | ({"periodicity": self._periodicity} if self._periodicity else {})
@@ -191,10 +194,10 @@ class LineStage(StatefulBase):
         moving = self._moves(series, centre, rows.sample)
         first = rows.sample - s.lines.window + 1
         noise = self._detected(signals)
-        distortion, invalid, dof_repeating = None, None, np.inf
+        distortion, invalid, verdict, dof_repeating = None, None, None, np.inf
         if repeating is not None:
-            distortion, dof_repeating = np.ascontiguousarray(repeating.distortion), repeating.dof
-            invalid = None if self._converts else np.ascontiguousarray(repeating.invalid)
+            distortion, verdict, dof_repeating = repeating.distortion, repeating.verdict, repeating.dof
+            invalid = None if self._converts else repeating.invalid
         windows = LineWindows(
             self._largest,
             series,
@@ -206,6 +209,7 @@ class LineStage(StatefulBase):
             moving,
             distortion,
             invalid,
+            verdict,
             dof_repeating,
             np.concatenate([centre, first[np.newaxis]]),
         )
@@ -216,7 +220,7 @@ class LineStage(StatefulBase):
         if self._converts:
             estimates = estimates.converted(s)
             if repeating is not None:
-                estimates = estimates.without(_where_not(repeating.invalid, moving))
+                estimates = estimates.without(_where_not(repeating.invalid[repeating.verdict], moving))
         if self._periodicity is not None:
             input_ = signals["input"][:, :lines]
             leaks = self._periodicity.process(input_, found.usable, rows.sample, centre[0])

@@ -29,10 +29,21 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Repeating:
-    """Verdict of the periods before each window: `distortion` of numerator/denominator and `invalid`, (rows, lines)."""
+    """Verdicts on lines: before the first period of some samples, and after each that ends in them.
+
+    Attributes
+    ----------
+    distortion, invalid
+        Of numerator/denominator, and lines that do not count, shape (verdicts, lines).
+    verdict
+        Which one is that of a window: of the periods before it, shape (rows,).
+    dof
+        Degrees of freedom of `distortion`.
+    """
 
     distortion: Floats
     invalid: NDArray[np.bool_]
+    verdict: NDArray[np.int64]
     dof: float
 
 
@@ -142,7 +153,7 @@ class RepeatingErrors(PeriodCutter):
             now = found[0].distortion, found[0].invalid
         else:
             now = _joined([one.distortion for one in found]), _joined([one.invalid for one in found])
-        return Repeating(now[0][which], now[1][which], self._dof)
+        return Repeating(*now, which, self._dof)
 
     def _verdicts(self, periods: Periods, block: Block, kind: QuantityKind | None) -> PeriodVerdicts:
         """Those before and after each of these periods."""

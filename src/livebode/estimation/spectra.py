@@ -118,8 +118,13 @@ class LineSpectra(StatefulBase):
     def process(self, data: Floats) -> SpectraRows:
         """Rows of the next samples, `data` (channels, samples); samples that are not finite make rows not whole."""
         with np.errstate(over="ignore", invalid="ignore"):  # a value too large for the dtype becomes infinite
-            finite, not_finite = self._prepare(data)
-        implausible = self._range.process(finite)
+            finite = self._prepare(data)
+        sizes, not_finite = self._range.sizes(finite), _NONE
+        if not np.isfinite(sizes).all():
+            bad = ~np.isfinite(finite).all(axis=0)
+            finite, not_finite = np.where(bad, 0.0, finite), np.flatnonzero(bad)
+            sizes = self._range.sizes(finite)
+        implausible = self._range.process(finite, sizes)
         if implausible.size:
             finite = finite.copy()
             finite[:, implausible] = 0.0
@@ -149,7 +154,7 @@ class LineSpectra(StatefulBase):
         first, stop = np.searchsorted(samples, (self._next, self._next + count))
         return np.asarray(samples[first:stop] - self._next, dtype=np.intp)
 
-    def _prepare(self, data: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    def _prepare(self, data: Floats) -> Floats:
         if self._dtype != data.dtype:
             data = data.astype(self._dtype).astype(np.float64)
         if self._differenced.any():
@@ -160,11 +165,7 @@ class LineSpectra(StatefulBase):
             shifted = np.concatenate([self._before[:, np.newaxis], data[:, :-1]], axis=1)
             self._before = data[:, -1].copy()
             data = np.where(self._differenced[:, np.newaxis], data - shifted, data)
-        # A finite sum proves in one pass that every sample is finite.
-        if np.isfinite(data.sum()):
-            return data, _NONE
-        bad = ~np.isfinite(data).all(axis=0)
-        return np.where(bad, 0.0, data), np.flatnonzero(bad)
+        return data
 
     def _spectra(self, data: Floats, offset: int) -> tuple[Complex, NDArray[np.int64]]:
         first = (self._next + offset) % self._window

@@ -21,6 +21,7 @@ from livebode.kernel._fit import (
 )
 from livebode.kernel._hopping import HoppingDFT, fft_is_cheaper
 from livebode.kernel._instructions import VARIABLE as INSTRUCTION_SET_VARIABLE
+from livebode.kernel._instructions import chosen as chosen_instruction_set
 from livebode.kernel._instructions import instruction_set, instruction_sets
 from livebode.kernel._lines import (
     MEANS,
@@ -53,6 +54,7 @@ from livebode.kernel._repeating import (
     Tones,
     judge_periods,
 )
+from livebode.kernel._sizes import largest_sizes
 from livebode.kernel._sliding import SlidingDFT
 
 __all__ = [
@@ -92,6 +94,7 @@ __all__ = [
     "SlidingDFT",
     "Tones",
     "WeightSums",
+    "chosen_instruction_set",
     "fft_is_cheaper",
     "fit",
     "fit_epsilon",
@@ -100,6 +103,7 @@ __all__ = [
     "instruction_set",
     "instruction_sets",
     "judge_periods",
+    "largest_sizes",
     "process_each",
     "process_lines",
 ]

@@ -11,7 +11,7 @@ NAMES: Final = ("best", "baseline", "avx2", "avx512")
 
 
 def chosen() -> int:
-    """The number of the set that a new SlidingDFT uses: that of the environment, by default the best."""
+    """The number of the set that a new SlidingDFT or line stage uses: that of the environment, by default the best."""
     name = os.environ.get(VARIABLE, "best")
     if name not in NAMES:
         raise ValueError(f"{VARIABLE}={name!r} is not one of {', '.join(NAMES)}")

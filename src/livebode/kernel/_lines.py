@@ -107,6 +107,8 @@ class LineSettings(NamedTuple):
         NOISE_SCATTER, NOISE_MOVING or NOISE_LARGER.
     noise_dof
         Degrees of freedom of the noise at detection lines.
+    instruction_set
+        Its number (`livebode.kernel._instructions`), which changes no bit; 0 for the widest of this machine.
     """
 
     forgetting: float
@@ -116,6 +118,7 @@ class LineSettings(NamedTuple):
     reference: int
     noise: int
     noise_dof: float
+    instruction_set: int
 
 
 class LineWindows(NamedTuple):
@@ -136,7 +139,9 @@ class LineWindows(NamedTuple):
     moving
         Windows in which the machine moves, shape (rows,); None if never.
     distortion, invalid
-        Errors that repeat with the excitation, and lines that are invalid because of them, shape (rows, lines).
+        Errors that repeat with the excitation, and lines that are invalid because of them, shape (verdicts, lines).
+    verdict
+        Number of the verdict that is that of the row, shape (rows,); None without.
     dof_repeating
         Degrees of freedom of `distortion`.
     moment
@@ -153,6 +158,7 @@ class LineWindows(NamedTuple):
     moving: Flags | None
     distortion: Floats | None
     invalid: Flags | None
+    verdict: Integers | None
     dof_repeating: float
     moment: Floats
 
@@ -179,12 +185,12 @@ class NewestWindows(NamedTuple):
 class LineRows(NamedTuple):
     """Results: shape (rows, lines), of `dof` and `usable` (rows,), of `moment` (3, rows); NaN where not known.
 
-    `variance` is that of the value, `coherence` that of reference and output and `input_coherence` that of reference
+    `sigma` is that of the value, `coherence` that of reference and output and `input_coherence` that of reference
     and denominator (NaN where they are one signal), `usable` tells which windows entered the moments.
     """
 
     value: Complex
-    variance: Floats
+    sigma: Floats
     coherence: Floats
     input_coherence: Floats
     weight: Complex

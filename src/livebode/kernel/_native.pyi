@@ -9,6 +9,9 @@ def best_instruction_set() -> int: ...
 def process_lines(
     settings: tuple[Any, ...], moments: tuple[Any, ...], windows: tuple[Any, ...], out: tuple[Any, ...], /
 ) -> float: ...
+def largest_sizes(
+    samples: npt.NDArray[np.float64], begun: int, window: int, instruction_set: int, out: npt.NDArray[np.float64], /
+) -> None: ...
 def fit(
     model: tuple[Any, ...],
     frequency_hz: npt.NDArray[np.float64],

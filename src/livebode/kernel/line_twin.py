@@ -55,7 +55,7 @@ def process_each(settings: LineSettings, moments: list[LineMoments], windows: Ne
     for i, own in enumerate(moments):
         spectrum, moment = windows.spectrum[:, i : i + 1], windows.moment[i : i + 1].T
         begin = float(windows.largest[i]), int(windows.place[i]), np.ascontiguousarray(spectrum)
-        one = LineWindows(*begin, None, yes, yes, None, None, None, None, np.inf, np.ascontiguousarray(moment))
+        one = LineWindows(*begin, None, yes, yes, None, None, None, None, None, np.inf, np.ascontiguousarray(moment))
         found.append(process_lines(settings, own, one))
     rows = [one._replace(moment=one.moment.T) for one, _ in found]
     joined = LineRows(*map(np.concatenate, zip(*rows)))
@@ -108,11 +108,11 @@ def _process(s: LineSettings, moments: LineMoments, w: LineWindows) -> tuple[Lin
     valid = seen[:, np.newaxis] & excited & np.isfinite(value)
     distortion = np.full(value.shape, np.nan)
     if w.distortion is not None:
-        distortion = np.where(moving[:, np.newaxis], np.nan, w.distortion)
+        distortion = np.where(moving[:, np.newaxis], np.nan, w.distortion[w.verdict])
         variance, dof = _contained(variance, dof, distortion, w.dof_repeating)
     distortion = np.where(valid, distortion, np.nan)
     if w.invalid is not None:
-        against = w.invalid & ~moving[:, np.newaxis]
+        against = w.invalid[w.verdict] & ~moving[:, np.newaxis]
         distortion, valid = np.where(valid & against, np.inf, distortion), valid & ~against
     weight = _weight(s, means, pair, power)
     several = valid & np.isfinite(sums.dof)[:, np.newaxis]
@@ -122,7 +122,7 @@ def _process(s: LineSettings, moments: LineMoments, w: LineWindows) -> tuple[Lin
     nothing = complex(np.nan, np.nan)
     return LineRows(
         np.where(valid, value, nothing),
-        np.where(valid, variance, np.nan),
+        np.sqrt(np.where(valid, variance, np.nan)),
         np.where(several, _coherence(means, sums, 0, 7), np.nan),
         of_input,
         np.where(valid, weight, nothing),

@@ -3,8 +3,11 @@
 
 #include <nanobind/nanobind.h>
 
+#include <cstring>
 #include <deque>
+#include <memory>
 
+#include "livebode/sizes.h"
 #include "native_array.h"
 
 namespace nb = nanobind;
@@ -30,6 +33,11 @@ struct Moments {
     }
 };
 
+lb_instruction_set instruction_set_of(nb::tuple settings)
+{
+    return static_cast<lb_instruction_set>(nb::cast<int>(settings[7]));
+}
+
 double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tuple out)
 {
     const Moments m(moments, nb::cast<double>(settings[0]), settings[1]);
@@ -39,16 +47,21 @@ double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tup
                  reference = nb::cast<size_t>(settings[4]);
     if (denominator >= signals || reference >= signals || bins < lines)
         throw nb::value_error("the spectra have too few signals or lines");
-    const lb_line_settings set = {nb::cast<bool>(settings[2]), denominator == reference,
-                                  static_cast<lb_line_noise>(nb::cast<int>(settings[5])), nb::cast<double>(settings[6]),
-                                  nb::cast<double>(windows[10])};
+    const lb_line_settings set = {nb::cast<bool>(settings[2]),
+                                  denominator == reference,
+                                  static_cast<lb_line_noise>(nb::cast<int>(settings[5])),
+                                  nb::cast<double>(settings[6]),
+                                  nb::cast<double>(windows[11]),
+                                  instruction_set_of(settings)};
 
     const Array spectra(spectrum, COMPLEX, {signals, rows, bins});
     const Array noise(windows[3], REAL, {rows, lines}, READ, true);
     const Array whole(windows[4], FLAG, {rows}), clean(windows[5], FLAG, {rows});
     const Array aside(windows[6], FLAG, {rows}, READ, true), moving(windows[7], FLAG, {rows}, READ, true);
-    const Array distortion(windows[8], REAL, {rows, lines}, READ, true);
-    const Array invalid(windows[9], FLAG, {rows, lines}, READ, true), moment(windows[11], REAL, {3, rows});
+    const size_t verdicts = windows[8].is_none() ? 0 : length_of(windows[8], 0);
+    const Array distortion(windows[8], REAL, {verdicts, lines}, READ, true);
+    const Array invalid(windows[9], FLAG, {verdicts, lines}, READ, true);
+    const Array verdict(windows[10], INTEGER, {rows}, READ, true), moment(windows[12], REAL, {3, rows});
     const double *first = spectra.data<double>();
     const size_t signal = 2 * rows * bins;
     const lb_line_windows in = {nb::cast<size_t>(windows[1]),
@@ -64,15 +77,17 @@ double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tup
                                 moving,
                                 distortion,
                                 invalid,
+                                verdict,
+                                verdicts,
                                 moment};
 
-    const Array value(out[0], COMPLEX, {rows, lines}, WRITE), variance(out[1], REAL, {rows, lines}, WRITE);
+    const Array value(out[0], COMPLEX, {rows, lines}, WRITE), sigma(out[1], REAL, {rows, lines}, WRITE);
     const Array coherence(out[2], REAL, {rows, lines}, WRITE), of_input(out[3], REAL, {rows, lines}, WRITE);
     const Array weight(out[4], COMPLEX, {rows, lines}, WRITE), errors(out[5], REAL, {rows, lines}, WRITE);
     const Array valid(out[6], FLAG, {rows, lines}, WRITE), dof(out[7], REAL, {rows}, WRITE);
     const Array centre(out[8], REAL, {3, rows}, WRITE), usable(out[9], FLAG, {rows}, WRITE);
     const lb_line_rows rows_out = {
-        value.data<double>(), variance, coherence, of_input, weight.data<double>(), errors, valid, dof, centre, usable};
+        value.data<double>(), sigma, coherence, of_input, weight.data<double>(), errors, valid, dof, centre, usable};
     double largest = nb::cast<double>(windows[0]);
     call(rows * lines, [&] { return lb_lines_process(&m.weights, &m.moments, &largest, &set, &in, &rows_out); });
     return largest;
@@ -103,7 +118,8 @@ void process_each(nb::tuple settings, nb::list each, nb::handle largest_so_far, 
         throw nb::value_error("the spectra have too few signals or lines");
     const Array table(settings[1], REAL, {3, length_of(settings[1], 1)});
     const lb_line_weights weights = {nb::cast<double>(settings[0]), table, length_of(settings[1], 1)};
-    const lb_line_settings set = {nb::cast<bool>(settings[2]), denominator == reference, LB_NOISE_SCATTER, 0.0, 0.0};
+    const lb_line_settings set = {nb::cast<bool>(settings[2]), denominator == reference, LB_NOISE_SCATTER, 0.0, 0.0,
+                                  instruction_set_of(settings)};
     std::deque<StageMoments> moments;
     for (const nb::handle one : each) moments.emplace_back(nb::cast<nb::tuple>(one), places, lines);
 
@@ -113,7 +129,7 @@ void process_each(nb::tuple settings, nb::list each, nb::handle largest_so_far, 
     for (size_t i = 0; i < stages; ++i)
         if (place_of[i] < 0 || static_cast<size_t>(place_of[i]) >= places)
             throw nb::value_error("the period does not have this place");
-    const Array value(out[0], COMPLEX, {stages, lines}, WRITE), variance(out[1], REAL, {stages, lines}, WRITE);
+    const Array value(out[0], COMPLEX, {stages, lines}, WRITE), sigma(out[1], REAL, {stages, lines}, WRITE);
     const Array coherence(out[2], REAL, {stages, lines}, WRITE), of_input(out[3], REAL, {stages, lines}, WRITE);
     const Array weight(out[4], COMPLEX, {stages, lines}, WRITE), errors(out[5], REAL, {stages, lines}, WRITE);
     const Array valid(out[6], FLAG, {stages, lines}, WRITE), dof(out[7], REAL, {stages}, WRITE);
@@ -140,13 +156,38 @@ void process_each(nb::tuple settings, nb::list each, nb::handle largest_so_far, 
                                         nullptr,
                                         nullptr,
                                         nullptr,
+                                        nullptr,
+                                        0,
                                         moment.data<double>() + 3 * i};
-            const lb_line_rows rows = {value.data<double>() + 2 * to,  variance.data<double>() + to,
+            const lb_line_rows rows = {value.data<double>() + 2 * to,  sigma.data<double>() + to,
                                        coherence.data<double>() + to,  of_input.data<double>() + to,
                                        weight.data<double>() + 2 * to, errors.data<double>() + to,
                                        valid.data<uint8_t>() + to,     dof.data<double>() + i,
                                        centre.data<double>() + 3 * i,  usable.data<uint8_t>() + i};
             status = lb_lines_process(&weights, &m, largest.data<double>() + i, &set, &in, &rows);
+        }
+        return status;
+    });
+}
+
+// Samples (signals, any), contiguous along the last axis, and their largest sizes (signals, stretches).
+void largest_sizes(nb::handle samples, size_t begun, size_t window, int set, nb::handle out)
+{
+    Py_buffer rows;
+    if (PyObject_GetBuffer(samples.ptr(), &rows, PyBUF_STRIDES | PyBUF_FORMAT) != 0) throw nb::python_error();
+    const std::unique_ptr<Py_buffer, void (*)(Py_buffer *)> held(&rows, PyBuffer_Release);
+    const bool fits = rows.ndim == 2 && std::strcmp(rows.format, REAL) == 0 && rows.strides[1] == sizeof(double);
+    if (!fits || !begun || !window) throw nb::value_error("an array has another type or shape");
+    const size_t signals = rows.shape[0], count = rows.shape[1];
+    const size_t stretches = 1 + (count > begun ? (count - begun + window - 1) / window : 0);
+    double *found = Array(out, REAL, {signals, stretches}, WRITE);
+    const char *first = static_cast<const char *>(rows.buf);
+    call(signals * count, [&] {
+        lb_status status = LB_OK;
+        for (size_t i = 0; i < signals && status == LB_OK; ++i) {
+            const double *x = reinterpret_cast<const double *>(first + static_cast<Py_ssize_t>(i) * rows.strides[0]);
+            status =
+                lb_largest_sizes(x, count, begun, window, static_cast<lb_instruction_set>(set), found + i * stretches);
         }
         return status;
     });
@@ -158,4 +199,5 @@ void bind_lines(nb::module_ &m)
 {
     m.def("process_lines", &process);
     m.def("process_each", &process_each);
+    m.def("largest_sizes", &largest_sizes);
 }
