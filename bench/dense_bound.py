@@ -14,7 +14,7 @@ from bench import dense_rows, native_build
 from bench.work import ROWS, Array, signal
 
 TARGET = 3.0
-AT_BOUND = 0.9  # of the memory's time: repeated runs differ by as much
+AT_BOUND = 0.9  # share of the bound from which on arithmetic counts as hidden
 CELLS = [(window, count) for window in (100, 200, 1000) for count in (7, 21)]
 
 

@@ -5,8 +5,8 @@ and compute only the quotient S_wy/S_wu at the lines; livebode also reads the fi
 writes a run directory with pictures. ShortTimeFFT is also timed as what a user would run: a process that reads the
 file, computes, and writes the quotients.
 
-livebode's tracker and the sliding rfft write into memory that exists: to get 40 MB from the system costs a tenth of
-either. ShortTimeFFT has no argument for it, and its call would save a hundredth.
+livebode's tracker and the sliding rfft write into memory that exists: memory from the system for 40 MB of results was
+a fifth of the tracker's time and a seventh of the rfft's.
 
 All take turns; each figure is the least of the rounds, in processor time, which a busy computer changes less than the
 time on the wall. ShortTimeFFT is slower in a new process, whose memory the system has to prepare: the ratios for the
