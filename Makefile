@@ -83,6 +83,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.readers
 	$(BIN)/python -m bench.runs
 	$(BIN)/python -m bench.archive
+	$(BIN)/python -m bench.growth
 
 BASE ?=
 bench-compare: $(BUILT)  ## the speed of this version and of another commit, alternately (BASE=REV; default: newest tag or stored result)

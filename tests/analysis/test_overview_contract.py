@@ -39,6 +39,16 @@ def test_an_overview_retains_every_nth_row(sizes: list[int]) -> None:
     assert np.array_equal(kept.value[:, 0].real, kept.sample)
 
 
+def test_an_overview_with_a_limit_of_values_has_fewer_rows_of_the_same_run() -> None:
+    limited, whole = Overview(300), Overview()
+    for first in range(0, 2000, 10):
+        limited.add(batch(first, 10))
+        whole.add(batch(first, 10))
+    kept = limited.responses()
+    assert 150 < len(kept) <= 300
+    assert kept.equals(whole.responses()[:: kept.sample[1]])
+
+
 @pytest.mark.parametrize("rows", [0, 1, 5])
 def test_memory_of_an_overview_does_not_grow_with_the_batches(rows: int) -> None:
     overview, first = Overview(), 0

@@ -18,11 +18,11 @@ from livebode.core import Block, Event, Lines, Responses, ServerError
 from livebode.dashboard import Hub
 from livebode.dashboard.alarm_actions import acknowledgement
 from livebode.dashboard.frames import KINDS, frame
-from livebode.dashboard.hub import EVENTS_MAX, VALUES_MAX
+from livebode.dashboard.hub import EVENTS_MAX, ITEMS_MAX, VALUES_MAX
 from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id
 from livebode.dashboard.past import Past
 from livebode.dashboard.quantities import QUANTITIES, Quantities
-from livebode.dashboard.recent import RecentResponses
+from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import POINTS_MAX, ParameterTrend, TrendRows
 from livebode.runtime import RunControl
@@ -152,6 +152,27 @@ def test_delay_is_from_arrival_to_published() -> None:
     assert (hub.samples, hub.gaps) == (80, 1)
 
 
+def test_the_mailbox_is_bounded_for_batches_of_one_response() -> None:
+    hub, one = Hub("axis"), made(1, LINES)
+    for _ in range(ITEMS_MAX + 100):
+        hub(one)
+    assert len(hub.take()) == ITEMS_MAX
+    assert hub.given_up == 100
+
+
+@pytest.mark.parametrize("size", [1, 7, 500])
+def test_recent_responses_of_many_lines_are_fewer(size: int) -> None:
+    lines = Lines(tuple(range(1, 102)), 300, 1000.0)
+    recent, rows = RecentResponses(RECORDED_VALUES_MAX), made(500, lines, hop=50)
+    for first in range(0, 500, size):
+        recent.add(rows[first : first + size])
+    kept = recent.all()
+    assert kept is not None
+    assert kept.equals(rows[-(RECORDED_VALUES_MAX // 101) :])
+    held = sum(len(part) for part in recent._parts)
+    assert held <= 1.25 * len(kept)
+
+
 def test_recent_responses_are_the_newest_and_thinned() -> None:
     recent, hop = RecentResponses(), 20
     for start in range(0, 40_000, 500):
@@ -174,6 +195,7 @@ def test_a_trend_is_evenly_thinned_however_it_came(sizes: list[int]) -> None:
         time_s = np.arange(at, at + size, dtype=float)
         trend.add(TrendRows(time_s, time_s, 2 * time_s, time_s, np.full(size, "ok")))
         at += size
+    assert len(trend._rows) <= 16
     kept = trend.rows()
     assert len(kept) <= POINTS_MAX
     assert len(set(np.diff(kept.time_s))) <= 1

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import threading
+from math import inf
 
 from livebode.core import Responses
 
-_ROWS_MAX = 2048
+ROWS_MAX = 2048
+LIVE_VALUES_MAX = 1 << 13
+"""Responses × lines of a live run, about 0.5 MB: a process may have many axes."""
+_ROWS_MIN = 256
 _PARTS_MAX = 64
 
 
@@ -15,9 +19,15 @@ class Overview:
 
     It contains at most 2,048 rows in at most 64 parts, for any size of batches. The tracking thread adds rows; any
     other thread may read at the same time.
+
+    Parameters
+    ----------
+    values_max
+        Largest number of values (responses × lines), but at least 256 responses are permitted. Default: no limit.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, values_max: float = inf) -> None:
+        self._values_max = values_max
         self._parts: list[Responses] = []
         self._stride = 1
         self._seen = 0
@@ -36,7 +46,8 @@ class Overview:
     def _add(self, responses: Responses) -> None:
         self._append(responses[-self._seen % self._stride :: self._stride])
         self._seen += len(responses)
-        while self._rows > _ROWS_MAX:
+        most = min(ROWS_MAX, max(_ROWS_MIN, self._values_max / len(responses.lines)))
+        while self._rows > most:
             thinned = Responses.join(self._parts)[::2]
             self._parts, self._rows = [], 0
             self._append(thinned)

@@ -28,6 +28,8 @@ Item = Responses | tuple[Parameters, ...] | Event
 
 VALUES_MAX = 1 << 20
 """Largest number of values (responses × lines) that wait for the dashboard, about 40 MB; older ones are dropped."""
+ITEMS_MAX = 2048
+"""Largest number of batches that wait: one of a single response takes several kB, whatever its number of lines."""
 EVENTS_MAX = 4096
 _DELAYS = 1024
 _INTERVALS = 16
@@ -121,7 +123,7 @@ class Hub:
         with self._lock:
             self._rows.append(item)
             self._values += values
-            while self._values > VALUES_MAX and len(self._rows) > 1:
+            while (self._values > VALUES_MAX or len(self._rows) > ITEMS_MAX) and len(self._rows) > 1:
                 old = self._rows.popleft()
                 self._values -= _size(old)
                 self.given_up += 1

@@ -10,13 +10,23 @@ ROWS_MAX = 2400
 EVERY_S = 0.05
 """At most one response is retained per interval of this many seconds: 2,400 are two minutes."""
 _VALUES_MAX = 1 << 21
-_PARTS_MAX = 64
+RECORDED_VALUES_MAX = 1 << 13
+"""Responses × lines of a run in segments, about 0.5 MB: older ones are in the record, and there may be many axes."""
+_PARTS_MAX = 32
+_SLACK = 1.25
 
 
 class RecentResponses:
-    """The newest responses of a stream, one per `EVERY_S` of the machine's time."""
+    """The newest responses of a stream, one per `EVERY_S` of the machine's time.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    values_max
+        Largest number of values (responses × lines), but at least 64 responses are permitted.
+    """
+
+    def __init__(self, values_max: int = _VALUES_MAX) -> None:
+        self._values_max = values_max
         self.count = 0
         self._parts: list[Responses] = []
         self._kept = 0
@@ -37,9 +47,9 @@ class RecentResponses:
         self._parts.append(kept)
         self._kept += len(kept)
         self.count += len(kept)
-        if len(self._parts) > _PARTS_MAX or self._kept > 2 * self._most(responses):
+        if len(self._parts) > _PARTS_MAX or self._kept > _SLACK * self._most(responses):
             # A one-row part takes three times the memory of its data, for its array objects. Joined rows are a copy.
-            self._parts = [Responses.join([Responses.join(self._parts)[-self._most(responses) :]])]
+            self._parts = [Responses.join(self._without_oldest(self._kept - self._most(responses)))]
             self._kept = len(self._parts[0])
 
     def newest(self, rows: int) -> Responses | None:
@@ -54,9 +64,15 @@ class RecentResponses:
         first = self._parts[at][-(rows - found + len(self._parts[at])) :]
         return Responses.join([first, *self._parts[at + 1 :]])
 
+    def _without_oldest(self, rows: int) -> list[Responses]:
+        first, *others = self._parts
+        while others and rows >= len(first):
+            rows, (first, *others) = rows - len(first), others
+        return [first[max(0, rows) :], *others]
+
     def all(self) -> Responses | None:
         """All retained responses."""
         return self.newest(self._most(self._parts[-1])) if self._parts else None
 
     def _most(self, responses: Responses) -> int:
-        return max(64, min(ROWS_MAX, _VALUES_MAX // max(1, len(responses.lines))))
+        return max(64, min(ROWS_MAX, self._values_max // max(1, len(responses.lines))))

@@ -26,7 +26,7 @@ from livebode.dashboard.hub import Hub, Item
 from livebode.dashboard.notices import EventCauses
 from livebode.dashboard.overlays import FittedCurve, Healthy, grid_hz, overlays_of
 from livebode.dashboard.quantities import QUANTITIES, Quantities
-from livebode.dashboard.recent import RecentResponses
+from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses
 from livebode.dashboard.trends import Trends
 from livebode.margins import peak_sensitivity_at_lines
 from livebode.records import RunRecord, to_json
@@ -97,6 +97,8 @@ class State:
         """Start a run with its directory and run.json; `runs` counts the runs of the axis."""
         self.runs += 1
         self.directory, self._summary = directory, json.loads(to_json(dict(summary)))  # as it is read back
+        if "record" in self._summary:
+            self.recent = RecentResponses(RECORDED_VALUES_MAX)
         self.quantities = Quantities.of(self._summary)
         self._fitted, self._healthy, self._remark = overlays_of(self._summary, self.quantities)
 

@@ -14,6 +14,7 @@ Floats = NDArray[np.float64]
 
 POINTS_MAX = 1024
 TRENDS_MAX = 256
+_PARTS_MAX = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,8 @@ class ParameterTrend:
         if len(rows):
             self._rows.append(TrendRows.join([rows]))  # a copy
             self._kept += len(rows)
+            if len(self._rows) > _PARTS_MAX:  # a one-row part takes ten times the memory of its data
+                self.rows()
 
 
 class Trends:

@@ -12,7 +12,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from livebode.analysis.overview import Overview
+from livebode.analysis.overview import LIVE_VALUES_MAX, Overview
 from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel, Event, LivebodeError, Parameters, Responses, SignalError
 from livebode.estimation import plant_kinds, response_unit
@@ -138,7 +138,7 @@ class RunLoop:
         self._begun = summary.begun(self._about, self._follower, *self._plant)
         if (detection := pipeline.detection) is not None and detection.baseline is not None:
             self._begun["monitoring"] = detection.compared_with
-        self._overview = Overview()
+        self._overview = Overview(LIVE_VALUES_MAX) if self._live else Overview()
         self._done: dict[str, Any] = {}
         self._found_on_the_way: dict[str, Any] = {}
         self._newest: Fit | None = None

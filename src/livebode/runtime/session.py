@@ -14,6 +14,7 @@ from livebode.configuration.axes import Axes, ConfigurationFile
 from livebode.configuration.axis import Axis
 from livebode.core import ConfigError, Event, LivebodeError
 from livebode.core.ending import ENDING, Handler, handled
+from livebode.runtime.allocation import share_between_threads
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
 from livebode.runtime.destination import Destination
@@ -68,6 +69,7 @@ class Session:
 
     def run(self, look: Callable[[], None] = lambda: None) -> None:
         """Wait until every axis ended; `look` is called ten times a second, in this thread."""
+        share_between_threads()
         with self._hearing():
             for thread in list(self.threads.values()):
                 thread.start()
