@@ -11,18 +11,20 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any, cast
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from livebode.cli.command_help import error_page, help_page
 from livebode.cli.commands import GROUPS, SUMMARIES, command, subcommand
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.first_page import ABOUT, OPTIONS
 from livebode.cli.log_options import File, Level, LogOptions, with_log
 from livebode.cli.remote import with_copies
-from livebode.cli.terminal import protect, unchecked_output
+from livebode.cli.terminal import print_page, protect
 from livebode.core import DamageWarning, LivebodeError
 from livebode.version import __version__
 
@@ -34,10 +36,13 @@ _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(si
 class _Command(TyperCommand):
     """One command, with help in colour and errors that name its options."""
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Format the help; escape codes pass unchecked because the texts belong to the program."""
-        with unchecked_output():
-            super().format_help(ctx, formatter)
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        _leave_missing(self.params)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
+        """Print the help: Typer's own would load Rich with all that it can draw."""
+        print_page(lambda width, colours: help_page(self, ctx, width, colours=colours))
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Make the context; with --json, an invalid option is an error with a code."""
@@ -57,6 +62,18 @@ class _Command(TyperCommand):
         except LivebodeError as error:
             name_options(error, self.params)
             raise
+
+
+def _leave_missing(parameters: Iterable[Any]) -> None:
+    """Pass by what was not given: Typer would build the pydantic model of each option to convert None."""
+    for parameter in parameters:
+        if not parameter.required and parameter.callback is None:
+            missing = () if parameter.multiple or parameter.nargs == -1 else None
+            parameter.process_value = partial(_processed, parameter.process_value, missing)
+
+
+def _processed(process: Callable[[Any, Any], Any], missing: Any, context: Any, value: Any) -> Any:
+    return missing if value is None else process(context, value)
 
 
 class _Commands(Mapping[str, TyperCommand]):
@@ -88,6 +105,7 @@ class _Group(TyperGroup):
 
     def __init__(self, group: str | None = None, **options: Any) -> None:
         super().__init__(**options)
+        _leave_missing(self.params)
         self._summaries = GROUPS[group] if group else SUMMARIES
         self.commands = _Commands(group)  # type: ignore[assignment]
 
@@ -107,10 +125,9 @@ class _Group(TyperGroup):
         name, listed, rest = super().resolve_command(ctx, args)
         return name, listed and self.commands[listed.name or ""], rest
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Format the help; escape codes pass unchecked because the texts belong to the program."""
-        with unchecked_output():
-            super().format_help(ctx, formatter)
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
+        """Print the help: Typer's own would load Rich with all that it can draw."""
+        print_page(lambda width, colours: help_page(self, ctx, width, colours=colours))
 
 
 app = typer.Typer(
@@ -141,9 +158,14 @@ def run_application() -> None:
     _prepare_process()
     try:
         try:
-            app()
-        finally:  # app() ends by SystemExit, and writing the buffered output may fail
+            code = app(standalone_mode=False)
+        finally:  # writing the buffered output may fail
             sys.stdout.flush()
+    except typer.Abort:
+        _stop("livebode: aborted", 1)
+    except typer.TyperException as error:
+        _show_usage_error(error)
+        sys.exit(error.exit_code)
     except KeyboardInterrupt:
         _stop("livebode: stopped; nothing was written", 130)
     except BrokenPipeError:
@@ -151,6 +173,13 @@ def run_application() -> None:
         _discard_output()
     except Exception as error:
         _fail(error)
+    else:
+        sys.exit(code)
+
+
+def _show_usage_error(error: typer.TyperException) -> None:
+    if error.format_message():  # none where the help was printed instead
+        print_page(lambda width, colours: error_page(error, width, colours=colours), stderr=True)
 
 
 def _fail(error: Exception) -> None:
