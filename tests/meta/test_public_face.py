@@ -58,8 +58,27 @@ def test_version_and_help_load_nothing_but_the_first_page(word: str) -> None:
     heavy = {"numpy", "scipy", "pyarrow", "matplotlib", "pydantic", "starlette", "typer", "rich", "logging"}
     assert loaded & heavy == set()
     assert {name for name in loaded if name.startswith("livebode.")} <= {
-        "livebode.version", "livebode.cli", "livebode.cli.start", "livebode.cli.first_page", "livebode.cli.commands"
+        "livebode.version", "livebode.on_first_use", "livebode.cli", "livebode.cli.start", "livebode.cli.first_page",
+        "livebode.cli.frames", "livebode.cli.commands",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("words", [[name, "--help"] for name in SUMMARIES] + [["rn"], ["run", "--nonsense"]])
+def test_the_help_of_a_command_and_a_wrong_one_load_no_library_but_typer(words: list[str]) -> None:
+    code = f"""
+import sys
+from livebode.cli import main
+sys.argv[1:] = {words!r}
+try:
+    main()
+except SystemExit:
+    print(*sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.splitlines()[-1].split())
+    heavy = {"numpy", "scipy", "pyarrow", "matplotlib", "pydantic", "starlette", "rich", "fsspec", "asyncio"}
+    assert "typer" in loaded
+    assert loaded & heavy == set()
 
 
 def test_the_package_has_the_version_that_is_published() -> None:

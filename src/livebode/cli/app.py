@@ -33,16 +33,36 @@ _OPTIONS = {names.split()[0] for names in OPTIONS}
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
-class _Command(TyperCommand):
-    """One command, with help in colour and errors that name its options."""
+class _Light:
+    """A command of Typer that loads neither Rich nor pydantic for its help, a completion or a wrong option."""
 
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        _leave_missing(self.params)
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The arguments and options, also --help."""
+        found: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        _leave_missing(found)
+        return found
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
-        """Print the help: Typer's own would load Rich with all that it can draw."""
+        """Print the help."""
         print_page(lambda width, colours: help_page(self, ctx, width, colours=colours))
+
+
+def _leave_missing(parameters: Iterable[Any]) -> None:
+    """Pass by what was not given: Typer would build the pydantic model of each option to convert None."""
+    for parameter in parameters:
+        if "process_value" not in vars(parameter):
+            parameter.process_value = partial(_processed, parameter, parameter.process_value)
+
+
+def _processed(parameter: Any, process: Callable[[Any, Any], Any], context: Any, value: Any) -> Any:
+    if value is not None or (parameter.required and not context.resilient_parsing):
+        return process(context, value)
+    missing = () if parameter.multiple or parameter.nargs == -1 else None
+    return missing if parameter.callback is None else parameter.callback(context, parameter, missing)
+
+
+class _Command(_Light, TyperCommand):
+    """One command, with help in colour and errors that name its options."""
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Make the context; with --json, an invalid option is an error with a code."""
@@ -62,18 +82,6 @@ class _Command(TyperCommand):
         except LivebodeError as error:
             name_options(error, self.params)
             raise
-
-
-def _leave_missing(parameters: Iterable[Any]) -> None:
-    """Pass by what was not given: Typer would build the pydantic model of each option to convert None."""
-    for parameter in parameters:
-        if not parameter.required and parameter.callback is None:
-            missing = () if parameter.multiple or parameter.nargs == -1 else None
-            parameter.process_value = partial(_processed, parameter.process_value, missing)
-
-
-def _processed(process: Callable[[Any, Any], Any], missing: Any, context: Any, value: Any) -> Any:
-    return missing if value is None else process(context, value)
 
 
 class _Commands(Mapping[str, TyperCommand]):
@@ -100,12 +108,11 @@ class _Commands(Mapping[str, TyperCommand]):
         return len(self._summaries)
 
 
-class _Group(TyperGroup):
+class _Group(_Light, TyperGroup):
     """A group of commands, with help in colour: the program, or a command with subcommands."""
 
     def __init__(self, group: str | None = None, **options: Any) -> None:
         super().__init__(**options)
-        _leave_missing(self.params)
         self._summaries = GROUPS[group] if group else SUMMARIES
         self.commands = _Commands(group)  # type: ignore[assignment]
 
@@ -124,10 +131,6 @@ class _Group(TyperGroup):
             ctx.fail(f"No such command {args[0]!r}. Did you mean 'livebode --{args[0]}'?")
         name, listed, rest = super().resolve_command(ctx, args)
         return name, listed and self.commands[listed.name or ""], rest
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
-        """Print the help: Typer's own would load Rich with all that it can draw."""
-        print_page(lambda width, colours: help_page(self, ctx, width, colours=colours))
 
 
 app = typer.Typer(
