@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 import livebode
+from livebode.cli.commands import SUMMARIES
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "livebode"
