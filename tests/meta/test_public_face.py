@@ -6,6 +6,7 @@ import dataclasses
 import doctest
 import inspect
 import io
+import pkgutil
 import pydoc
 import re
 import subprocess
@@ -226,3 +227,13 @@ def _pins(lock: Path) -> dict[str, set[str]]:
     for package, release in re.findall(r"^([a-z0-9-]+)==(\S+)", text, re.M):
         pins.setdefault(package, set()).add(release)
     return pins
+
+
+@pytest.mark.parametrize(
+    "package", ["livebode", "livebode.core", "livebode.locations", "livebode.output_only", "livebode.runtime"]
+)
+def test_what_a_package_loads_when_it_is_used_has_the_name_of_no_module_of_it(package: str) -> None:
+    """Else the module, once loaded, would be found in its place."""
+    loaded = import_module(package)
+    modules = {module.name for module in pkgutil.iter_modules(loaded.__path__)}
+    assert set(loaded.__all__) & modules <= {"run"}  # of livebode.runtime, which is loaded at once

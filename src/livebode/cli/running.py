@@ -6,14 +6,13 @@ import re
 import signal
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
 from livebode.cli import terminal
 from livebode.cli.band import parsed_band
 from livebode.cli.notices import NoticePrinter
-from livebode.cli.output_only import draw_modes, show_modes
 from livebode.cli.pictures import drawing, load_beside, show, tracked_amount
 from livebode.cli.remote import recorded_at
 from livebode.cli.serving import SubscribersOf, served
@@ -22,20 +21,12 @@ from livebode.configuration.serve_section import ServeSection
 from livebode.core import ConfigError, LivebodeError, LocationError, UsageError
 from livebode.locations import Location, Url, local_copy, location, original
 from livebode.records import to_json
-from livebode.runtime import (
-    Destination,
-    Document,
-    Draw,
-    Outcome,
-    OutputOnlyOutcome,
-    Session,
-    StoppedError,
-    Subscriber,
-    run,
-    run_output_only,
-)
+from livebode.runtime import Destination, Document, Draw, Outcome, StoppedError, Subscriber, run
 from livebode.runtime.documents import TrackerResults
 from livebode.sources.formats import read_head
+
+if TYPE_CHECKING:
+    from livebode.runtime import OutputOnlyOutcome
 
 T = TypeVar("T")
 
@@ -181,6 +172,9 @@ def _run_output_only(
     axis: Axis, directory: Path, force: bool, as_json: bool, serve: bool, send: Callable[[], None]
 ) -> None:
     """Track the modes of one recording, and print the result."""
+    from livebode.cli.output_only import draw_modes, show_modes
+    from livebode.runtime import run_output_only
+
     if serve:
         raise UsageError(
             "conflict",
@@ -236,6 +230,7 @@ def _run_axes(
 ) -> None:
     """Track live sources or several axes until all have ended."""
     from livebode.cli.axes_terminal import AxesTerminal, plain
+    from livebode.runtime import Session
 
     def to(name: str, axis: Axis) -> Destination:
         subscribers = (*subscribers_of(name), shown.subscriber(name))
