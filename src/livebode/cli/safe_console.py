@@ -9,7 +9,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-from livebode.cli.terminal import visible
+from livebode.cli.visible import visible
 
 
 class SafeConsole(Console):

@@ -12,22 +12,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from livebode.cli.frames import has_colours, printable, terminal_width
+from livebode.cli.visible import visible
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-# Also characters that change the direction of writing: they can disguise a text.
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 _COLOUR = re.compile("(\x1b\\[[0-9;]*m)")
-
-
-def visible(text: str) -> str:
-    r"""Replace control characters, except new lines and tabs, by JSON escapes.
-
-    >>> visible("belt\x1b[2J\u202e ok")
-    'belt\\u001b[2J\\u202e ok'
-    """
-    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 class VisibleText(io.TextIOWrapper):
