@@ -91,6 +91,17 @@ def as_script(log: Path, out: Path) -> None:
     pq.write_table(pa.table(columns | {"im": value.imag.ravel()}), out)
 
 
+def bound(log: Path, run: Path, out: Path) -> None:
+    """Read the recording and write the table of the run, without any work between; print the seconds."""
+    from livebode.records import RESPONSES
+
+    written = pq.read_table(run / "responses.parquet")
+    begun = time.process_time()
+    pq.read_table(log)
+    pq.write_table(written, out, compression="lz4", use_dictionary=list(RESPONSES.repeating))
+    print(time.process_time() - begun)
+
+
 def pictures(run: Path) -> None:
     """Draw the pictures of a run; print the seconds of the first time, which loads Matplotlib, and of the best."""
     import livebode.report
@@ -140,6 +151,8 @@ def measure(rounds: int = ROUNDS) -> dict[str, float]:
             one["pictures_first_s"], one["pictures_s"] = map(
                 float, processes.run(*itself, "pictures", str(out))[2].split()
             )
+            arrow_s = processes.run(sys.executable, "-c", "import numpy, pyarrow.parquet")[0]
+            one["bound_s"] = arrow_s + float(processes.run(*itself, "bound", str(log), str(out), str(folder / "b"))[2])
             found.append(one)
         table = pq.read_table(out / "responses.parquet", columns=["re", "im"])
         ours = (table["re"].to_numpy() + 1j * table["im"].to_numpy()).reshape(-1, len(BINS))
@@ -176,6 +189,7 @@ def report(result: dict[str, float]) -> None:
         ratios = [result[other] / result[key] for other in (stft, "rfft_s")]
         print(f"{label:42}{result[key]:9.3f}" + "".join(f"{ratio:14.1f} × " for ratio in ratios))
     for label, key in {
+        "start of NumPy, Arrow; reading, writing": "bound_s",
         "ShortTimeFFT, first call of a process": "stft_first_s",
         "ShortTimeFFT, best call": "stft_s",
         "ShortTimeFFT, a process that reads, writes": "script_s",
@@ -186,6 +200,11 @@ def report(result: dict[str, float]) -> None:
         print(f"{label:42}{result[key]:9.3f}")
     wall = result["script_wall_s"] / result["command_wall_s"]
     print(f"on the wall: the command {result['command_wall_s']:.3f} s, the process of ShortTimeFFT {wall:.1f} × that")
+    print(f"the command: {result['command_s'] / result['bound_s']:.1f} × what starts NumPy and Arrow, reads and writes")
+    first = result["stft_first_s"] / result["command_wall_s"]
+    print(f"ShortTimeFFT in memory, its first call: {first:.1f} × the command on the wall")
+    script = result["script_s"] / result["command_s"]
+    print(f"the process of ShortTimeFFT: {script:.1f} × the command in processor time")
     reached = {
         "whole command, ShortTimeFFT": (result["stft_first_s"] / result["command_s"], TARGETS["command"]),
         "tracking alone, ShortTimeFFT": (result["stft_s"] / result["tracking_s"], TARGETS["tracking"]),
@@ -208,6 +227,8 @@ if __name__ == "__main__":
     match sys.argv[1:]:
         case ["script", log, out]:
             as_script(Path(log), Path(out))
+        case ["bound", log, run, out]:
+            bound(Path(log), Path(run), Path(out))
         case ["pictures", run]:
             pictures(Path(run))
         case _:

@@ -49,9 +49,9 @@ Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the 
 together with the `__all__` of the packages that docs/reference/python.md lists; other modules may change at any time.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from livebode.on_first_use import on_first_use
 from livebode.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ _HOME = {
     "simulation": ("BeltAxis", "SimulatedAxis", "Strokes"),
     "sources": ("Log", "open_log"),
 }
-_MODULE = {name: module for module, names in _HOME.items() for name in names}
+__getattr__ = on_first_use(__name__, _HOME)
 
 __all__ = [
     "PID",
@@ -237,12 +237,6 @@ __all__ = [
     "stepped_sine",
     "welch",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULE:
-        raise AttributeError(f"module 'livebode' has no attribute {name!r}")
-    return getattr(import_module(f"livebode.{_MODULE[name]}"), name)
 
 
 def __dir__() -> list[str]:

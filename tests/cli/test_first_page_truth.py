@@ -35,7 +35,7 @@ def test_the_page_has_every_option_of_the_application_with_its_help(group: Any) 
     options = {option: parameter for parameter in group.get_params(typer.Context(group)) for option in parameter.opts}
     listed = {name.split()[0]: text for name, text in OPTIONS.items()}
     assert listed.keys() == options.keys()
-    assert all(text.startswith(options[name].help.rstrip(".")) for name, text in listed.items())
+    assert all(text.startswith(options[name].help.replace("\\[", "[").rstrip(".")) for name, text in listed.items())
 
 
 @pytest.mark.parametrize("width", [1, 40, 79, 200])

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode.cli.terminal import visible
+from livebode.cli.visible import visible
 from tests.support.command import livebode, signals
 
 EVIL = "\x1b[2J\x1b]0;owned\x07\x9b31m\u202e"

@@ -6,6 +6,7 @@ import dataclasses
 import doctest
 import inspect
 import io
+import pkgutil
 import pydoc
 import re
 import subprocess
@@ -18,6 +19,7 @@ from pathlib import Path
 import pytest
 
 import livebode
+from livebode.cli.commands import SUMMARIES
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "livebode"
@@ -58,8 +60,27 @@ def test_version_and_help_load_nothing_but_the_first_page(word: str) -> None:
     heavy = {"numpy", "scipy", "pyarrow", "matplotlib", "pydantic", "starlette", "typer", "rich", "logging"}
     assert loaded & heavy == set()
     assert {name for name in loaded if name.startswith("livebode.")} <= {
-        "livebode.version", "livebode.cli", "livebode.cli.start", "livebode.cli.first_page", "livebode.cli.commands"
+        "livebode.version", "livebode.on_first_use", "livebode.cli", "livebode.cli.start", "livebode.cli.first_page",
+        "livebode.cli.frames", "livebode.cli.commands",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("words", [[name, "--help"] for name in SUMMARIES] + [["rn"], ["run", "--nonsense"]])
+def test_the_help_of_a_command_and_a_wrong_one_load_no_library_but_typer(words: list[str]) -> None:
+    code = f"""
+import sys
+from livebode.cli import main
+sys.argv[1:] = {words!r}
+try:
+    main()
+except SystemExit:
+    print(*sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.splitlines()[-1].split())
+    heavy = {"numpy", "scipy", "pyarrow", "matplotlib", "pydantic", "starlette", "rich", "fsspec", "asyncio"}
+    assert "typer" in loaded
+    assert loaded & heavy == set()
 
 
 def test_the_package_has_the_version_that_is_published() -> None:
@@ -206,3 +227,13 @@ def _pins(lock: Path) -> dict[str, set[str]]:
     for package, release in re.findall(r"^([a-z0-9-]+)==(\S+)", text, re.M):
         pins.setdefault(package, set()).add(release)
     return pins
+
+
+@pytest.mark.parametrize(
+    "package", ["livebode", "livebode.core", "livebode.locations", "livebode.output_only", "livebode.runtime"]
+)
+def test_what_a_package_loads_when_it_is_used_has_the_name_of_no_module_of_it(package: str) -> None:
+    """Else the module, once loaded, would be found in its place."""
+    loaded = import_module(package)
+    modules = {module.name for module in pkgutil.iter_modules(loaded.__path__)}
+    assert set(loaded.__all__) & modules <= {"run"}  # of livebode.runtime, which is loaded at once

@@ -11,18 +11,20 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any, cast
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from livebode.cli.command_help import error_page, help_page
 from livebode.cli.commands import GROUPS, SUMMARIES, command, subcommand
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.first_page import ABOUT, OPTIONS
 from livebode.cli.log_options import File, Level, LogOptions, with_log
 from livebode.cli.remote import with_copies
-from livebode.cli.terminal import protect, unchecked_output
+from livebode.cli.terminal import print_page, protect
 from livebode.core import DamageWarning, LivebodeError
 from livebode.version import __version__
 
@@ -31,13 +33,36 @@ _OPTIONS = {names.split()[0] for names in OPTIONS}
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
-class _Command(TyperCommand):
-    """One command, with help in colour and errors that name its options."""
+class _Light:
+    """A command of Typer that loads neither Rich nor pydantic for its help, a completion or a wrong option."""
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Format the help; escape codes pass unchecked because the texts belong to the program."""
-        with unchecked_output():
-            super().format_help(ctx, formatter)
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The arguments and options, also --help."""
+        found: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        _leave_missing(found)
+        return found
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
+        """Print the help."""
+        print_page(lambda width, colours: help_page(self, ctx, width, colours=colours))
+
+
+def _leave_missing(parameters: Iterable[Any]) -> None:
+    """Pass by what was not given: Typer would build the pydantic model of each option to convert None."""
+    for parameter in parameters:
+        if "process_value" not in vars(parameter):
+            parameter.process_value = partial(_processed, parameter, parameter.process_value)
+
+
+def _processed(parameter: Any, process: Callable[[Any, Any], Any], context: Any, value: Any) -> Any:
+    if value is not None or (parameter.required and not context.resilient_parsing):
+        return process(context, value)
+    missing = () if parameter.multiple or parameter.nargs == -1 else None
+    return missing if parameter.callback is None else parameter.callback(context, parameter, missing)
+
+
+class _Command(_Light, TyperCommand):
+    """One command, with help in colour and errors that name its options."""
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Make the context; with --json, an invalid option is an error with a code."""
@@ -83,7 +108,7 @@ class _Commands(Mapping[str, TyperCommand]):
         return len(self._summaries)
 
 
-class _Group(TyperGroup):
+class _Group(_Light, TyperGroup):
     """A group of commands, with help in colour: the program, or a command with subcommands."""
 
     def __init__(self, group: str | None = None, **options: Any) -> None:
@@ -106,11 +131,6 @@ class _Group(TyperGroup):
             ctx.fail(f"No such command {args[0]!r}. Did you mean 'livebode --{args[0]}'?")
         name, listed, rest = super().resolve_command(ctx, args)
         return name, listed and self.commands[listed.name or ""], rest
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Format the help; escape codes pass unchecked because the texts belong to the program."""
-        with unchecked_output():
-            super().format_help(ctx, formatter)
 
 
 app = typer.Typer(
@@ -141,9 +161,14 @@ def run_application() -> None:
     _prepare_process()
     try:
         try:
-            app()
-        finally:  # app() ends by SystemExit, and writing the buffered output may fail
+            code = app(standalone_mode=False)
+        finally:  # writing the buffered output may fail
             sys.stdout.flush()
+    except typer.Abort:
+        _stop("livebode: aborted", 1)
+    except typer.TyperException as error:
+        _show_usage_error(error)
+        sys.exit(error.exit_code)
     except KeyboardInterrupt:
         _stop("livebode: stopped; nothing was written", 130)
     except BrokenPipeError:
@@ -151,6 +176,13 @@ def run_application() -> None:
         _discard_output()
     except Exception as error:
         _fail(error)
+    else:
+        sys.exit(code)
+
+
+def _show_usage_error(error: typer.TyperException) -> None:
+    if error.format_message():  # none where the help was printed instead
+        print_page(lambda width, colours: error_page(error, width, colours=colours), stderr=True)
 
 
 def _fail(error: Exception) -> None:

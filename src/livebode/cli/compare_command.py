@@ -10,7 +10,6 @@ from typing import Annotated
 
 import typer
 
-from livebode.cli.documents import write_documents
 from livebode.cli.options import Json
 from livebode.cli.report_options import (
     Appendix,
@@ -28,9 +27,7 @@ from livebode.cli.report_options import (
     header,
 )
 from livebode.core import UsageError
-from livebode.language import in_language
 from livebode.locations import location
-from livebode.records import to_json
 
 
 def compare_command(
@@ -64,7 +61,10 @@ def compare_command(
     Runs with a schedule, such as a position, are compared by place and direction, and over all places. The first page
     of the files is as in `livebode report`; limits apply to AFTER.
     """
+    from livebode.cli.documents import write_documents
     from livebode.configuration.recorded import recorded_report
+    from livebode.language import in_language
+    from livebode.records import to_json
     from livebode.reporting.compare_report import Comparison
 
     found = Comparison.of(before, after, ignore_below=_share(ignore_below))

@@ -6,19 +6,16 @@ import sys
 from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from livebode.cli import terminal
 from livebode.cli.options import Json, Port, Serve
-from livebode.cli.pictures import drawing, show
-from livebode.cli.serving import served
-from livebode.configuration.serve_section import ServeSection
-from livebode.core import Responses
-from livebode.records import to_json
-from livebode.runtime import Destination, Document
-from livebode.runtime.documents import TrackerResults
+
+if TYPE_CHECKING:
+    from livebode.core import Responses
+    from livebode.runtime import Document
 
 _SHOWN = 4
 
@@ -37,7 +34,14 @@ def demo_command(
     """Track a simulated belt axis during its strokes, live; halfway, the belt loses 10 % of its stiffness."""
     from rich.progress import BarColumn, Progress, TextColumn
 
+    from livebode.cli.pictures import drawing, show
+    from livebode.cli.serving import served
+    from livebode.configuration.serve_section import ServeSection
+    from livebode.core import Responses
+    from livebode.records import to_json
+    from livebode.runtime import Destination
     from livebode.runtime.demo import LEARNED_S, check_seconds, demo, demo_baseline  # with the simulation
+    from livebode.runtime.documents import TrackerResults
 
     check_seconds(seconds)
     console = terminal.console(stderr=True)

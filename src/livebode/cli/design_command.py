@@ -12,7 +12,6 @@ from livebode.cli import terminal
 from livebode.cli.band import parsed_band
 from livebode.cli.options import Json
 from livebode.core import counted
-from livebode.records import to_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -49,6 +48,7 @@ def design_command(
     """Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml."""
     from livebode.experiments.designing import design_experiment  # with the simulation
     from livebode.experiments.experiment import Experiment
+    from livebode.records import to_json
 
     over: dict[str, Any] = {
         "resolution_hz": resolution, "amplitude_n_m": amplitude, "accuracy": accuracy, "seed": seed,

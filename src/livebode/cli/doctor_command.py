@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.text import Text
 
 from livebode.cli import terminal
 from livebode.cli.options import Json
-from livebode.records import to_json
 
 if TYPE_CHECKING:
     from livebode.doctor import Check
@@ -38,6 +36,7 @@ def doctor_command(
     Exit code 2 where a check failed. No data is changed; a connection is opened and closed.
     """
     from livebode.doctor import Subject, examine, worst, write_bundle  # with the dashboard and the simulation
+    from livebode.records import to_json
 
     subject = Subject.of(targets or [])
     checks = examine(subject, runs)
@@ -56,6 +55,7 @@ def doctor_command(
 
 def _show(checks: list[Check]) -> None:
     from rich.table import Table
+    from rich.text import Text
 
     if terminal.is_terminal() and (console := terminal.console(markup=False)).width < _TABLE_COLUMNS:
         for check in checks:

@@ -10,9 +10,8 @@ import typer
 
 from livebode.cli.options import Json
 from livebode.cli.remote import beside
-from livebode.core import Responses, UsageError, counted
+from livebode.core import UsageError, counted
 from livebode.locations import location
-from livebode.records import RunRecord, to_json
 
 _IN_PYTHON = {
     "xarray": "livebode.Run(path).responses.to_xarray(); --to netcdf writes a file that xarray opens",
@@ -36,6 +35,8 @@ def export_command(
 ) -> None:
     """Write the responses or the fitted parameters of a run in a format of other programs."""
     from livebode import export
+    from livebode.core import Responses
+    from livebode.records import RunRecord, to_json
 
     _check(to, at, mean, parameters, tuple(export.TABLES if parameters else export.FORMATS))
     record = RunRecord.open(run, output_only=parameters)

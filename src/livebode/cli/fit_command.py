@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from livebode.cli.band import parsed_band
 from livebode.cli.options import Json
-from livebode.cli.pictures import show_fit, show_poles
-from livebode.configuration import Axis
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.recorded import recorded_configuration
 from livebode.core import UsageError
-from livebode.fitting import POLE_MODELS
-from livebode.fitting.pole_search import Kind
 from livebode.locations import location
-from livebode.records import RunRecord, to_json
+
+if TYPE_CHECKING:
+    from livebode.configuration.fit_section import FitSection
+    from livebode.fitting.pole_search import Kind
 
 _OPTIONS = {"radius_m": "radius", "inertia_ratio": "ratio", "fixed": "fix"}
 
@@ -68,6 +65,9 @@ def fit_command(
     With modal or rational the outputs of several runs have their poles in common. Defaults are from the run's \\[fit]
     section. Exit code 3 if no model fits.
     """
+    from livebode.fitting import POLE_MODELS
+    from livebode.fitting.pole_search import Kind
+
     given: dict[str, Any] = {
         "model": model,
         "output": output,
@@ -89,6 +89,9 @@ def fit_command(
 def _fit_physical(directories: list[Path], specified: dict[str, Any], order: int | None, as_json: bool) -> None:
     from livebode.analysis.averaged import averaged
     from livebode.analysis.fits import fit_averaged, fit_remarks, plain_fit
+    from livebode.cli.pictures import show_fit
+    from livebode.configuration.recorded import recorded_configuration
+    from livebode.records import RunRecord, to_json
 
     if len(directories) > 1 or order is not None:
         what = "several runs" if len(directories) > 1 else "--order"
@@ -121,6 +124,9 @@ def _fit_poles(
     as_json: bool,
 ) -> None:  # fmt: skip
     from livebode.analysis.poles import fit_poles, plain_poles
+    from livebode.cli.pictures import show_poles
+    from livebode.configuration.recorded import recorded_configuration
+    from livebode.records import RunRecord, to_json
 
     if other := sorted(specified.keys() - {"model", "band_hz", "hold"}):
         raise UsageError(
@@ -145,6 +151,8 @@ def _fit_poles(
 
 
 def _section(directory: Path, values: dict[str, Any]) -> FitSection:
+    from livebode.configuration import Axis
+
     data = {"source": {"log": str(directory)}, "signals": {"output": "y"}, "fit": values}
     section = Axis.of(data, "the options").fit
     assert section is not None

@@ -5,19 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.measure import Measurement
-from rich.table import Table
 
 from livebode.cli import terminal
 from livebode.cli.options import Dbc, Excitation, From, Json, Output, Rate, SkipPeriods, Time, To
 from livebode.core import UsageError, counted
-from livebode.estimation.settings import default_hop
-from livebode.excitation.pattern import pattern
 from livebode.locations import location
-from livebode.records import to_json
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from livebode.preparation.inspection import Inspection
     from livebode.preparation.quiet import Quiet
 
@@ -57,6 +53,7 @@ def inspect_command(
     With --lines, search for mains hum in a recording without excitation, or in its longest pause.
     """
     from livebode.preparation.inspection import inspect  # with its statistics half a second to import
+    from livebode.records import to_json
 
     _check(excitation, output, input_, lines, window)
     of_lines = None if lines is None or window is None else (lines, window)
@@ -123,6 +120,9 @@ def _check(
 
 
 def _show_recording(found: Inspection, console: Console) -> None:
+    from rich.measure import Measurement
+    from rich.table import Table
+
     log, contents = found.log, found.contents
     rate = "at an unknown rate" if found.without_rate else f"at {log.rate_hz:.9g} Hz ({log.rate_origin})"
     console.print(f"{log.path}: {log.format}, {contents.samples} samples {rate}", soft_wrap=True)
@@ -174,6 +174,8 @@ def _show_clocks(found: Inspection, console: Console) -> None:
 
 
 def _show_hum(quiet: Quiet, console: Console) -> None:
+    from rich.table import Table
+
     seconds, lines = quiet.samples / quiet.lines.rate_hz, quiet.lines
     where = f"{seconds:.4g} s without excitation, from sample {quiet.first} on"
     if not quiet.found:
@@ -200,6 +202,8 @@ def _show_hum(quiet: Quiet, console: Console) -> None:
 
 def _show_stretches(found: Inspection, console: Console) -> None:
     """What a run takes of the recording, if that is not all of it."""
+    from rich.table import Table
+
     shown, log = found.stretches, found.log
     if all(stretch.taken for stretch in shown):
         return
@@ -218,6 +222,11 @@ def _show_stretches(found: Inspection, console: Console) -> None:
 
 
 def _show_excitation(found: Inspection, console: Console) -> None:
+    from rich.table import Table
+
+    from livebode.estimation.settings import default_hop
+    from livebode.excitation.pattern import pattern
+
     excitation = found.excitation
     assert excitation is not None
     lines, first = excitation.lines, found.log.first

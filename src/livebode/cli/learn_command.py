@@ -8,11 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from livebode.cli import terminal
-from livebode.cli.learned_baseline import check_replaceable, sentences, written
 from livebode.cli.options import Json
 from livebode.core import UsageError, counted
 from livebode.locations import location
-from livebode.records import to_json
 
 
 def learn_command(
@@ -36,6 +34,9 @@ def learn_command(
     as_json: Json = False,
 ) -> None:
     """Learn a baseline from runs of the healthy machine, for `livebode run --baseline`."""
+    from livebode.cli.learned_baseline import check_replaceable, sentences, written
+    from livebode.records import to_json
+
     if history is not None:
         _check_alone(runs, out)
         print(_history(history, as_json=as_json))
@@ -64,6 +65,7 @@ def _check_alone(runs: list[Path] | None, out: Path | None) -> None:
 def _history(path: Path, *, as_json: bool) -> str:
     """The versions of the baseline in a file, the newest first."""
     from livebode.monitoring import Baseline, retained_file
+    from livebode.records import to_json
 
     baseline = Baseline.load(path)
     versions = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,7 +12,6 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli.log_output import log_output
 from livebode.core import LivebodeError
 
 
@@ -27,7 +25,11 @@ class LogLevel(StrEnum):
 
 
 Level = Annotated[
-    LogLevel | None, typer.Option(help="Write a log from this level on.", show_default="info with --log-file")
+    LogLevel | None,
+    typer.Option(
+        metavar="LEVEL",
+        help="Write a log from this level on: debug, info, warning or error. \\[default: info with --log-file]",
+    ),
 ]
 File = Annotated[Path | None, typer.Option(metavar="FILE", help="Write the log there instead of on standard error.")]
 
@@ -42,10 +44,14 @@ class LogOptions:
 
 def with_log(command: Callable[..., None]) -> Callable[..., None]:
     """The command with both options; those behind it replace those before it."""
-    log = logging.getLogger(command.__module__)
 
     @wraps(command)
     def logged(*, context: typer.Context, log_level: LogLevel | None, log_file: Path | None, **given: Any) -> None:
+        import logging  # not for the help of a command
+
+        from livebode.cli.log_output import log_output
+
+        log = logging.getLogger(command.__module__)
         before: LogOptions = context.obj
         with log_output(log_level or before.level, log_file or before.file):
             log.info("livebode %s begins", context.info_name)

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
-from livebode.cli.terminal import visible
+from livebode.cli.visible import visible
 from livebode.core.writing import not_written
 
 FILE_BYTES_MAX = 16 << 20

@@ -5,18 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from livebode.cli.options import Json
-from livebode.cli.pictures import margins_in_short
 from livebode.cli.remote import results_directory
-from livebode.configuration import Axis
 from livebode.core import RecordError
 from livebode.core.writing import writing
 from livebode.locations import location
-from livebode.margins.margins import WORDS
-from livebode.records import to_json
 
 if TYPE_CHECKING:
     from livebode.analysis.loop_report import LoopReport
@@ -41,7 +36,9 @@ def margins_command(
     Writes margins.png to the run directory.
     """
     from livebode.analysis.loop_report import loop_of_run
+    from livebode.configuration import Axis
     from livebode.configuration.fit_section import FitSection
+    from livebode.records import to_json
     from livebode.report import save_loop_picture
 
     given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
@@ -75,6 +72,10 @@ def show_loop(found: LoopReport) -> None:
 
 
 def _show_margins(margins: Margins) -> None:
+    import numpy as np
+
+    from livebode.margins.margins import WORDS
+
     bound = margins.bound()[0]
     for i, (name, unit) in enumerate(zip(margins.names, margins.units)):
         value, f = margins.value[0, i], margins.frequency_hz[0, i]
@@ -107,6 +108,7 @@ def _show_proposal(proposal: Proposal) -> None:
 
 
 def _in_short(margins: Margins) -> str:
+    from livebode.cli.pictures import margins_in_short
     from livebode.margins import worst
 
     least = worst(margins)

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from livebode.core import UsageError
-from livebode.language import available
 
 Excitation = Annotated[
     str | None, typer.Option(metavar="CHANNEL", help="Channel of the excitation w, or an expression.")
@@ -69,6 +68,8 @@ Serve = Annotated[bool, typer.Option("--serve", help="Show the run in a browser 
 
 def known_language(code: str | None) -> str | None:
     """The code of a language; UsageError for another one."""
+    from livebode.language import available
+
     if code is not None and code not in available():
         raise UsageError(
             "not-one-of",

@@ -6,13 +6,15 @@ import os
 import sys
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from livebode.cli.pictures import one_drawing_at_a_time
 from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.core import counted
 from livebode.locations import original
-from livebode.runtime import OutputOnlyOutcome
+
+if TYPE_CHECKING:
+    from livebode.runtime import OutputOnlyOutcome
 
 
 def draw_modes(into: Path, title: str) -> None:

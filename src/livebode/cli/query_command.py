@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +12,6 @@ from livebode.cli import terminal
 from livebode.cli.options import Json
 from livebode.core import UsageError
 from livebode.locations import location
-from livebode.records import RunRecord, to_json
 
 
 def query_command(
@@ -30,6 +28,9 @@ def query_command(
 
     A query has no access to files. DuckDB, pandas and Polars can also read the Parquet files directly.
     """
+    import csv
+
+    from livebode.records import RunRecord, to_json
     from livebode.records.query import query  # with Arrow's data sets
 
     if as_csv and as_json:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from livebode.core import LocationError
-from livebode.locations import Location, Upload, Url, is_copy, local_copy
+from livebode.locations import Location, Url
 
 _COLLAPSED = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:[/\\]")
 """How a URL begins that was taken for a path, which has no empty part."""
@@ -34,6 +34,8 @@ def _here(value: Any, name: str, copies: ExitStack) -> Any:
     if isinstance(value, list):
         return [_here(one, name, copies) for one in value]
     if isinstance(value, Url):
+        from livebode.locations import local_copy
+
         return copies.enter_context(local_copy(value))
     if isinstance(value, Path) and _COLLAPSED.match(str(value)) and not Path(value.parts[0]).exists():
         raise LocationError(
@@ -53,6 +55,8 @@ def _restored(path: Path) -> str:
 
 def results_directory(run: Path) -> Path:
     """Where results about a run are written: its directory, or for one at a URL a directory of its name here."""
+    from livebode.locations import is_copy
+
     if not is_copy(run):
         return run
     own = Path(run.name)
@@ -62,6 +66,8 @@ def results_directory(run: Path) -> Path:
 
 def beside(run: Path) -> Path:
     """What the name of a file beside a run begins with: the run, or for one at a URL its name in this directory."""
+    from livebode.locations import is_copy
+
     return Path(run.name) if is_copy(run) else run.resolve()
 
 
@@ -82,6 +88,8 @@ def recorded_at(place: Location, *, segments: bool) -> Iterator[tuple[Path, Call
             argument="out",
             path=str(place),
         )
+    from livebode.locations import Upload
+
     with Upload(place) as upload:
         yield upload.path, upload.send
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.documents import write_documents
 from livebode.cli.options import Json
 from livebode.cli.remote import results_directory
 from livebode.cli.report_options import (
@@ -75,6 +74,7 @@ def report_command(
     --template, and from the options. An existing report in the run directory is replaced. The PDF needs the extra
     `pdf`. Without --check the exit code does not depend on the limits.
     """
+    from livebode.cli.documents import write_documents
     from livebode.configuration.recorded import recorded_report
     from livebode.core.clock import moments_by
     from livebode.language import in_language

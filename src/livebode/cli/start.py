@@ -9,6 +9,7 @@ import os
 import sys
 
 from livebode.cli.first_page import first_page
+from livebode.cli.frames import has_colours, terminal_width
 from livebode.version import __version__
 
 _USAGE_ERROR, _INTERRUPTED = 2, 130
@@ -34,16 +35,7 @@ def main() -> None:
 
 
 def _help() -> str:
-    terminal = sys.stdout is not None and sys.stdout.isatty()
-    colours = terminal and os.name == "posix" and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
-    return first_page(_width(terminal=terminal), colours=colours)
-
-
-def _width(*, terminal: bool) -> int:
-    columns = os.environ.get("COLUMNS", "")
-    if columns.isdecimal() and int(columns):
-        return int(columns)
-    return (os.get_terminal_size(sys.stdout.fileno()).columns if terminal else 0) or 80
+    return first_page(terminal_width(sys.stdout), colours=has_colours(sys.stdout))
 
 
 def _printed(text: str) -> bool:

@@ -8,26 +8,16 @@ from __future__ import annotations
 import io
 import re
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from typing import Any, TextIO, cast
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from rich.console import Console, ConsoleOptions, RenderableType
-from rich.segment import Segment
-from rich.text import Text
+from livebode.cli.frames import has_colours, printable, terminal_width
+from livebode.cli.visible import visible
 
-# Also characters that change the direction of writing: they can disguise a text.
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+if TYPE_CHECKING:
+    from rich.console import Console
+
 _COLOUR = re.compile("(\x1b\\[[0-9;]*m)")
-
-
-def visible(text: str) -> str:
-    r"""Replace control characters, except new lines and tabs, by JSON escapes.
-
-    >>> visible("belt\x1b[2J\u202e ok")
-    'belt\\u001b[2J\\u202e ok'
-    """
-    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 class VisibleText(io.TextIOWrapper):
@@ -53,22 +43,6 @@ class VisibleText(io.TextIOWrapper):
         return False
 
 
-class SafeConsole(Console):
-    """A Rich console that makes control characters in text visible and passes its own control codes."""
-
-    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Render with control characters made visible."""
-        return _made_visible(super().render(renderable, options))
-
-    def render_str(self, text: str, **options: Any) -> Text:
-        """Render a string; made visible before Rich measures it, so that columns are wide enough."""
-        return super().render_str(visible(text), **options)
-
-    def on_broken_pipe(self) -> None:
-        """Raise, so that `main` handles it; Rich would exit with 1."""
-        raise BrokenPipeError
-
-
 def protect() -> None:
     """Make standard output and standard error print control characters as escapes."""
     for name in ("stdout", "stderr"):
@@ -79,22 +53,17 @@ def protect() -> None:
             setattr(sys, name, VisibleText(stream))
 
 
-@contextmanager
-def unchecked_output() -> Iterator[None]:
-    """Within this context, printed text may control the terminal: only for texts of the program, such as its help."""
-    before = sys.stdout
-    before.flush()
-    sys.stdout = _unchecked()
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-        sys.stdout = before
-
-
 def console(*, stderr: bool = False, **options: Any) -> Console:
     """A Rich console on standard output or standard error."""
+    from livebode.cli.safe_console import SafeConsole  # with Rich, which a completion does without
+
     return SafeConsole(file=_unchecked(stderr=stderr), highlight=False, **options)
+
+
+def print_page(page: Callable[[int, bool], str], *, stderr: bool = False) -> None:
+    """Print a text of the program, such as its help, for the width of the stream and with or without colours."""
+    stream = _unchecked(stderr=stderr)
+    print(printable(page(terminal_width(stream), has_colours(stream)), stream), file=stream, flush=True)
 
 
 def is_terminal() -> bool:
@@ -113,8 +82,3 @@ def print_drawn(text: str) -> None:
 def _unchecked(*, stderr: bool = False) -> TextIO:
     stream = sys.stderr if stderr else sys.stdout
     return stream.unchecked if isinstance(stream, VisibleText) else cast("TextIO", stream)
-
-
-def _made_visible(segments: Iterable[Segment]) -> Iterator[Segment]:
-    for segment in segments:
-        yield segment if segment.control else Segment(visible(segment.text), segment.style)

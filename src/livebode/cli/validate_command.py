@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from livebode.cli.options import Excitation, Json, Output
 from livebode.cli.remote import results_directory
-from livebode.configuration import Axis
 from livebode.core import LivebodeError, RecordError
 from livebode.core.writing import writing
-from livebode.fitting import POLE_MODELS
 from livebode.locations import location
-from livebode.records import RunRecord, to_json
-from livebode.runtime import Destination, run
 
 if TYPE_CHECKING:
+    from livebode.configuration import Axis
     from livebode.configuration.fit_section import FitSection
     from livebode.validation import LineValidation, Validation
 
@@ -62,6 +58,7 @@ def validate_command(
     """
     from livebode.configuration.fit_section import FitSection
     from livebode.configuration.recorded import recorded_configuration
+    from livebode.records import RunRecord, to_json
 
     base = recorded_configuration(RunRecord.open(directory).summary).get("fit", {}) | (
         {} if radius is None else {"radius_m": radius}
@@ -97,6 +94,8 @@ def validate_command(
 
 def _reason(section: FitSection, on: Path, at_lines: bool) -> str:
     """Why a model is judged at the lines from the beginning; empty for one that is simulated."""
+    from livebode.fitting import POLE_MODELS
+
     if at_lines:
         return "--at-lines asks for it"
     if (on / "run.json").exists():
@@ -121,7 +120,10 @@ def _at_lines(
     directory: Path, on: Path, sections: list[tuple[FitSection, str]], drifting: dict[str, str], channels: Channels
 ) -> tuple[list[LineValidation], list[str]]:
     """On another run; a recording is tracked as the run was, in a directory that is removed."""
+    from tempfile import TemporaryDirectory
+
     from livebode.analysis.line_validation import validate_run_at_lines
+    from livebode.runtime import Destination, run
 
     if (on / "run.json").exists():
         return validate_run_at_lines(directory, on, sections, drifting)
@@ -138,7 +140,9 @@ def _at_lines(
 
 def _tracked_alike(directory: Path, on: Path, channels: Channels) -> Axis:
     """The configuration of the run for another recording."""
+    from livebode.configuration import Axis
     from livebode.configuration.recorded import recorded_configuration
+    from livebode.records import RunRecord
 
     own = recorded_configuration(RunRecord.open(directory).summary)
     data = {name: own[name] for name in ("signals", "lines", "tracking", "loop") if name in own}

@@ -6,8 +6,6 @@ import json
 import shutil
 import sys
 from pathlib import Path
-from urllib.parse import urlsplit
-from urllib.request import url2pathname
 
 from livebode.core.errors.extra import ExtraError
 
@@ -46,6 +44,9 @@ def _pip() -> str:
 
 def _clone(direct_url: str | None) -> tuple[Path | None, bool]:
     """The directory that livebode was installed from, if it is there, and whether it is installed editable."""
+    from urllib.parse import urlsplit
+    from urllib.request import url2pathname  # with an HTTP client
+
     if direct_url is None:
         return None, False
     origin = json.loads(direct_url)

@@ -58,7 +58,7 @@ def unlike(blocks: Floats, spectra: Complex, excited: Flags) -> Flags:
     at_lines = np.sqrt(np.mean(away / usual, axis=1))
     size = np.max(np.abs(blocks), axis=1)
     at_samples = np.max(np.abs(blocks - medians(blocks, axis=0)), axis=1)
-    return _far(at_lines, np.zeros(count)) | _far(at_samples, _ROUNDING * np.median(size))
+    return _far(at_lines, np.zeros(count)) | _far(at_samples, _ROUNDING * _median(size))
 
 
 def leading(flags: Flags) -> int:
@@ -69,7 +69,11 @@ def leading(flags: Flags) -> int:
 def _far(distance: Floats, rounding: float | Floats) -> Flags:
     # Equal periods have the distance 0; adding the rounding keeps the logarithm.
     log = np.log(distance + rounding + np.finfo(np.float64).tiny)
-    middle = np.median(log)
-    spread = np.median(np.abs(log - middle)) / _normal(0.75)
+    middle = _median(log)
+    spread = _median(np.abs(log - middle)) / _normal(0.75)
     sigmas = -_normal(FALSE_ALARM / len(log))
     return np.asarray(log > middle + max(sigmas * spread, np.log(_FACTOR_MIN)))
+
+
+def _median(x: Floats) -> np.float64:
+    return np.float64(medians(x[np.newaxis], axis=1)[0])

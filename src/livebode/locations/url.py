@@ -6,8 +6,6 @@ import os
 import re
 from functools import cached_property
 from pathlib import Path, PurePosixPath
-from urllib.parse import urlsplit
-from urllib.request import url2pathname
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")  # two letters or more: C:// is a drive
 _USER = re.compile(r"(?<=://)[^/]*@")
@@ -98,4 +96,11 @@ def location(place: str | os.PathLike[str] | Url) -> Location:
     found = _SCHEME.match(text)
     if found is None:
         return Path(place)
-    return Path(url2pathname(urlsplit(text).path)) if found[1].lower() == "file" else Url(text)
+    return _path_of(text) if found[1].lower() == "file" else Url(text)
+
+
+def _path_of(url: str) -> Path:
+    from urllib.parse import urlsplit
+    from urllib.request import url2pathname  # with an HTTP client
+
+    return Path(url2pathname(urlsplit(url).path))

@@ -95,8 +95,11 @@ def gridded(x: Floats, values: Floats, cells_max: int) -> tuple[Floats, Floats]:
     if len(x) == cells and np.all(np.diff(bounds) == 1):
         return np.asarray(edges), np.asarray(values[order])
     out = np.full((cells, values.shape[1]), np.nan)
-    for i in np.flatnonzero(np.diff(bounds)):
-        out[i] = quantiles(values[order[bounds[i] : bounds[i + 1]]])[1]
+    sizes = np.diff(bounds)
+    for size in np.unique(sizes[sizes > 0]):  # cells of equal size together: those of time have two or three sizes
+        full = np.flatnonzero(sizes == size)
+        rows = order[bounds[full] + np.arange(size)[:, np.newaxis]]
+        out[full] = quantiles(values[rows].reshape(size, -1))[1].reshape(full.size, -1)
     return np.asarray(edges), out
 
 

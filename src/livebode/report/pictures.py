@@ -6,6 +6,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from livebode.core import Model, Responses
 from livebode.core.files import whole_file
 from livebode.report.style import Style, drawing, quiet_about_letters, style
@@ -13,8 +15,8 @@ from livebode.report.style import Style, drawing, quiet_about_letters, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COMPRESSION = 3
-"""Of zlib: two thirds of the time of the default, and a tenth to a sixth more bytes."""
+_RUNS = 3
+"""zlib's strategy for runs of equal bytes, of which these pictures consist: as small as a search, in less time."""
 
 
 def save_pictures(
@@ -49,6 +51,12 @@ def save_pictures(
 
 def save(figure: Figure, path: Path, look: Style) -> Path:
     """Write a figure; the same figure gives the same bytes. OSError, and nothing has changed, if it is not written."""
+    from PIL import Image
+
     with whole_file(path) as partial, drawing(look), quiet_about_letters():
-        figure.savefig(partial, format="png", metadata={"Software": None}, pil_kwargs={"compress_level": _COMPRESSION})
+        figure.canvas.draw()
+        pixels = np.asarray(figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
+        # Without the alpha channel, a quarter of the bytes: the paper is opaque.
+        picture = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
+        picture.save(partial, "png", compress_type=_RUNS, dpi=(figure.dpi, figure.dpi))
     return path

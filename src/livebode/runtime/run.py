@@ -5,7 +5,6 @@ from __future__ import annotations
 from livebode.configuration.axis import Axis
 from livebode.core import ConfigError
 from livebode.runtime.destination import Destination
-from livebode.runtime.live import run_live
 from livebode.runtime.recording import run_recording
 from livebode.runtime.recordings import run_recordings
 from livebode.runtime.run_control import RunControl
@@ -37,6 +36,10 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
             "run its recording alone",
             key="output_only",
         )
+    control = control or RunControl()
+    if axis.source.live:
+        from livebode.runtime.live import run_live
+
+        return run_live(axis, to, control)
     recording = run_recordings if len(axis.source.logs) > 1 else run_recording
-    job = run_live if axis.source.live else recording
-    return job(axis, to, control or RunControl())
+    return recording(axis, to, control)

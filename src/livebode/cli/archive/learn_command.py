@@ -13,7 +13,6 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.archive.options import LakeOf
 from livebode.cli.archive.selection import SelectionOptions, with_selection
-from livebode.cli.learned_baseline import check_replaceable, sentences, written
 from livebode.cli.options import Json
 from livebode.core import ConfigError, LivebodeError, UsageError, counted
 
@@ -62,6 +61,7 @@ def learn_command(
     """
     from livebode.archive.healthy_runs import contents_of, healthy_runs
     from livebode.archive.settings import lake_url
+    from livebode.cli.learned_baseline import check_replaceable
     from livebode.lake import Lake
     from livebode.records import to_json
 
@@ -150,6 +150,7 @@ def _learned(
     lake: Lake, of: HealthyRuns, file: Path, reason: str | None, *, accept: bool, force: bool
 ) -> dict[str, Any]:
     from livebode.archive.learning import learn_of_lake  # with the simulation
+    from livebode.cli.learned_baseline import written
 
     if not accept:
         of.check()
@@ -162,6 +163,8 @@ def _learned(
 
 
 def _print(one: dict[str, Any], *, short: bool) -> None:
+    from livebode.cli.learned_baseline import sentences
+
     read = one["read"]
     text = f"{one['machine']}: {counted(len(one['runs']), 'run')}, {read['responses']:,} responses of the lake"
     if read["recordings"]:

@@ -10,7 +10,6 @@ import typer
 
 from livebode.cli.archive.options import LakeOf
 from livebode.cli.archive.selection import Limit, SelectionOptions, with_selection
-from livebode.cli.documents import write_documents
 from livebode.cli.options import Json
 from livebode.cli.report_options import ReportLanguage
 
@@ -36,6 +35,7 @@ def report_command(
     from livebode.archive.alarms import alarms_of
     from livebode.archive.contents import path_of, quarantine
     from livebode.archive.settings import lake_url
+    from livebode.cli.documents import write_documents
     from livebode.lake import Lake
     from livebode.language import in_language
     from livebode.records import to_json

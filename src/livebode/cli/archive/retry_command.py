@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from livebode.cli.archive.options import Archive
-from livebode.cli.archive.showing import ArchiveProgress, show
 from livebode.cli.options import Json
 
 
@@ -25,6 +24,7 @@ def retry_command(
     """
     from livebode.archive.coordinator import Coordinator
     from livebode.archive.settings import ArchiveSettings
+    from livebode.cli.archive.showing import ArchiveProgress, show
 
     started, settings = time.monotonic(), ArchiveSettings.read(archive)
     with ArchiveProgress(quiet=as_json) as progress:

@@ -7,7 +7,6 @@ import time
 import typer
 
 from livebode.cli.archive.options import Archive
-from livebode.cli.archive.showing import ArchiveProgress, show
 from livebode.cli.options import Json
 
 
@@ -19,6 +18,7 @@ def run_command(archive: Archive, as_json: Json = False) -> None:
     """
     from livebode.archive.coordinator import Coordinator
     from livebode.archive.settings import ArchiveSettings
+    from livebode.cli.archive.showing import ArchiveProgress, show
 
     started, settings = time.monotonic(), ArchiveSettings.read(archive)
     with ArchiveProgress(quiet=as_json) as progress:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-
 from livebode.cli.fleet.options import Fleet
 from livebode.cli.options import Json
 
@@ -13,6 +11,8 @@ def check_command(fleet: Fleet, as_json: Json = False) -> None:
 
     The fleet may run meanwhile. Exit code 2 if a response, parameter or event is missing, doubled or different.
     """
+    import asyncio
+
     from livebode.cli.fleet.verdict import require_exact, verdict
     from livebode.fleet.check import CheckResult, check_results
     from livebode.fleet.log import FleetLog

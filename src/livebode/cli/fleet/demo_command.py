@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from pathlib import Path
 from typing import Annotated
@@ -19,6 +18,8 @@ def demo_command(
     as_json: Json = False,
 ) -> None:
     """Start a log, three workers and 20 simulated axes, kill a worker, and check that nothing is lost."""
+    import tempfile
+
     from livebode.cli.fleet.verdict import require_exact, verdict
     from livebode.fleet.demo import demo
     from livebode.records import to_json

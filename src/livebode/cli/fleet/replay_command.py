@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,6 +28,8 @@ def replay_command(
 
     With [fit] its parameters, derived quantities and margins are in a second one, FILE-parameters.parquet.
     """
+    import asyncio
+
     from livebode.core import nearest_name
     from livebode.core.errors import FleetError
     from livebode.fleet.log import FleetLog

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import threading
 
 from livebode.cli.fleet.options import Fleet
@@ -17,6 +16,8 @@ def run_command(fleet: Fleet, as_json: Json = False) -> None:
 
     Nothing has to be ended in order: what is not stored yet is computed again from the log at the next start.
     """
+    import asyncio
+
     from livebode.fleet.coordinator import FleetCoordinator
     from livebode.fleet.log import FleetLog
     from livebode.fleet.settings import FleetSettings

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Annotated
 
 import typer
@@ -22,6 +21,8 @@ def sink_command(
     The log has them for a limited time, the lake as long as [sink] says. It ends at Ctrl-C or SIGTERM, and may be
     killed: the lake contains the position up to which the log was read.
     """
+    import asyncio
+
     from livebode.fleet.log import FleetLog
     from livebode.fleet.settings import FleetSettings
     from livebode.fleet.sink import Sink

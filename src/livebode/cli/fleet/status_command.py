@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Any
 
 from livebode.cli import terminal
@@ -14,6 +13,8 @@ _SHOWN = 20
 
 def status_command(fleet: Fleet, as_json: Json = False) -> None:
     """Show partitions, axes, backlog and losses of a fleet."""
+    import asyncio
+
     from livebode.fleet.log import FleetLog
     from livebode.fleet.settings import FleetSettings
     from livebode.fleet.status import fleet_status

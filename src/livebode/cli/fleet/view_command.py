@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from livebode.cli.options import Port, ServeFile
-from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
-from livebode.configuration.axis import serve_section
-from livebode.configuration.serve_section import ServeSection
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
@@ -42,6 +38,10 @@ def view_command(
 
     Acknowledgements and shelves are stored in the log of the fleet, so that all pages of it show the same.
     """
+    from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
+    from livebode.configuration.axis import serve_section
+    from livebode.configuration.serve_section import ServeSection
+
     if (fleet is None) == (demo is None):
         raise UsageError(
             "options",
@@ -70,6 +70,8 @@ def _demo(axes: int) -> tuple[StatusFeed, str]:
 
 def _log(fleet: Path) -> tuple[StatusFeed, str]:
     """The feed of a log, and its lake."""
+    import asyncio
+
     from livebode.dashboard.fleet_feed import NatsFeed
     from livebode.fleet.connecting import security
     from livebode.fleet.settings import FleetSettings

@@ -1,0 +1,269 @@
+"""The work of `livebode run`: configurations from the options, and the runs of recordings or live sources."""
+
+from __future__ import annotations
+
+import re
+import signal
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import typer
+
+from livebode.cli import terminal
+from livebode.cli.band import parsed_band
+from livebode.cli.notices import NoticePrinter
+from livebode.cli.pictures import drawing, load_beside, show, tracked_amount
+from livebode.cli.remote import recorded_at
+from livebode.cli.serving import SubscribersOf, served
+from livebode.configuration import Axes, Axis, ConfigurationFile
+from livebode.configuration.serve_section import ServeSection
+from livebode.core import ConfigError, LivebodeError, LocationError, UsageError
+from livebode.locations import Location, Url, local_copy, location, original
+from livebode.records import to_json
+from livebode.runtime import Destination, Document, Draw, Outcome, StoppedError, Subscriber, run
+from livebode.runtime.documents import TrackerResults
+from livebode.sources.formats import read_head
+
+if TYPE_CHECKING:
+    from livebode.runtime import OutputOnlyOutcome
+
+T = TypeVar("T")
+
+
+def run_targets(
+    places: list[Location],
+    over: dict[str, dict[str, Any]],
+    outputs: list[str],
+    *,
+    output_only: bool,
+    band: str | None,
+    out: str | None,
+    force: bool,
+    serve: bool,
+    port: int | None,
+    as_json: bool,
+) -> None:
+    """Run recordings or a configuration, with the sections that the options specify over it; print the result."""
+    target = places[0]
+    over = over | _output_only(target, output_only, outputs, band)
+    if len(places) > 1 and any(place.suffix.lower() == ".toml" for place in places):
+        raise UsageError(
+            "conflict",
+            "a configuration cannot be combined with other arguments",
+            "list the recordings in its source.log",
+            argument="log",
+        )
+    each = [] if output_only else outputs
+    file = _file(target, over)
+    if file is not None and len(each) > 1:
+        raise UsageError(
+            "conflict",
+            "several --output cannot be combined with a configuration",
+            "write an axis for each in [axes]",
+            argument="output",
+        )
+    axes: Axes = _axes(places, over, each) if file is None else file.read()
+    live = any(axis.source.live for axis in axes.values())
+    alone = axes.get("")
+    names = [name or target.stem for name in axes]
+    place = Path("runs") / target.stem if out is None else location(out)
+    segments = live or any(axis.record is not None for axis in axes.values())
+    with recorded_at(place, segments=segments) as (directory, send):
+        if alone is not None and alone.output_only is not None:
+            _run_output_only(alone, directory, force, as_json, serve, send)
+            return
+        with served(serve, _serving(axes), port, names, stays=not live) as subscribers_of:
+            if alone is not None and not live:
+                outcome = _run(alone, directory, force, as_json, subscribers_of(target.stem))
+                send()
+                _show(outcome, as_json)
+            else:
+                _run_axes(axes, directory, force, as_json, file, lambda name: subscribers_of(name or target.stem), send)
+
+
+def _file(target: Location, over: Mapping[str, Mapping[str, Any]]) -> ConfigurationFile | None:
+    """The configuration that is run; None for a recording."""
+    if target.suffix.lower() != ".toml":
+        return None
+    if isinstance(target, Url):
+        raise LocationError(
+            "not-possible",
+            f"the configuration {target} is at a URL",
+            "copy it to this computer; the recordings that it names may be at URLs",
+            path=str(target),
+        )
+    return ConfigurationFile(target, over)
+
+
+def _output_only(target: Location, chosen: bool, outputs: list[str], band: str | None) -> dict[str, Any]:
+    """The section of an output-only run; nothing for another one, and UsageError if that has a band."""
+    if chosen:
+        others = {"others": outputs[1:]} if outputs[1:] else {}
+        return {"output_only": others | ({"band_hz": parsed_band(band)} if band else {})}
+    if band and (file := _file(target, {})) is not None:
+        axes = file.read().values()
+        if all(axis.output_only is not None for axis in axes):
+            return {"output_only": {"band_hz": parsed_band(band)}}
+    if band:
+        raise UsageError(
+            "conflict",
+            "a band belongs to an output-only run",
+            "remove it, or add --output-only",
+            options=["--band"],
+        )
+    return {}
+
+
+def _serving(axes: Axes) -> ServeSection:
+    """The dashboard section, which all axes share; ConfigError if they differ."""
+    name, first = next(iter(axes.items()))
+    for other, axis in axes.items():
+        if axis.serve != first.serve:
+            raise ConfigError(
+                "key-conflict",
+                f"axes {name} and {other} have different [serve] sections, but there is one dashboard",
+                "write [serve] once, outside [axes]",
+                key="serve",
+                axes=[name, other],
+            )
+    return first.serve
+
+
+def _axes(recordings: list[Location], specified: dict[str, dict[str, Any]], outputs: list[str]) -> Axes:
+    """The configuration of recordings; of several outputs one axis for each, with a name that a directory can have."""
+    if len(outputs) < 2:
+        return {"": _axis(recordings, specified)}
+    found: dict[str, Axis] = {}
+    for number, output in enumerate(outputs, 1):
+        name = re.sub(r"[^A-Za-z0-9_]+", "_", output).strip("_")[:48] or "output"
+        if name.casefold() in map(str.casefold, found):
+            name = f"{name}_{number}"
+        signals = specified.get("signals", {}) | {"output": output}
+        found[name] = _axis(recordings, specified | {"signals": signals})
+    return found
+
+
+def _axis(recordings: list[Location], specified: dict[str, dict[str, Any]]) -> Axis:
+    """The configuration of recordings from the options."""
+    if "output" not in specified.get("signals", {}):
+        for recording in recordings:
+            with local_copy(recording) as path:
+                read_head(path)  # a file that is missing or a directory is the first thing to mend
+        raise UsageError(
+            "missing",
+            "the output channel is not named",
+            "give --output CHANNEL (livebode inspect lists the channels, livebode new proposes their roles)",
+            argument="output",
+        )
+    log = recordings if len(recordings) > 1 else recordings[0]
+    return Axis.of(specified | {"source": specified.get("source", {}) | {"log": log}}, "the options")
+
+
+def _run(axis: Axis, directory: Path, force: bool, quiet: bool, subscribers: tuple[Subscriber, ...]) -> Outcome:
+    """Track one recording."""
+    return _with_progress(
+        lambda own: run(axis, Destination(directory, _drawing(axis), force, (*subscribers, *own), prepare=load_beside)),
+        quiet,
+    )
+
+
+def _run_output_only(
+    axis: Axis, directory: Path, force: bool, as_json: bool, serve: bool, send: Callable[[], None]
+) -> None:
+    """Track the modes of one recording, and print the result."""
+    from livebode.cli.output_only import draw_modes, show_modes
+    from livebode.runtime import run_output_only
+
+    if serve:
+        raise UsageError(
+            "conflict",
+            "the dashboard shows responses, and an output-only run has none",
+            "run it without the dashboard",
+            options=["--output-only", "--serve"],
+        )
+    title = f"{axis.source.title}: {axis.signals.output}"
+
+    def job(own: tuple[Subscriber, ...]) -> OutputOnlyOutcome:
+        return run_output_only(axis, directory, lambda into: draw_modes(into, title), force=force, subscribers=own)
+
+    outcome = _with_progress(job, as_json)
+    send()
+    if as_json:
+        print(to_json({"directory": original(str(outcome.directory))} | outcome.summary), flush=True)
+    else:
+        show_modes(outcome)
+
+
+def _with_progress(job: Callable[[tuple[Subscriber, ...]], T], quiet: bool) -> T:
+    """Run a job whose subscribers show a progress bar and notices."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = terminal.console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
+        task = bar.add_task("tracking", total=None)
+
+        def show_progress(document: Document) -> None:
+            if isinstance(document, TrackerResults):
+                bar.update(task, completed=document.samples, total=document.samples_total)
+
+        notices = NoticePrinter(
+            lambda message: bar.console.print(f"livebode: {message}", highlight=False, markup=False)
+        )
+        return job((show_progress, notices))
+
+
+def _run_axes(
+    axes: Axes,
+    directory: Path,
+    force: bool,
+    as_json: bool,
+    file: ConfigurationFile | None,
+    subscribers_of: SubscribersOf,
+    send: Callable[[], None],
+) -> None:
+    """Track live sources or several axes until all have ended."""
+    from livebode.cli.axes_terminal import AxesTerminal, plain
+    from livebode.runtime import Session
+
+    def to(name: str, axis: Axis) -> Destination:
+        subscribers = (*subscribers_of(name), shown.subscriber(name))
+        return Destination(directory / name, _drawing(axis), force, subscribers)
+
+    shown = AxesTerminal(quiet=as_json)
+    session = Session(axes, to, report=shown.print_event, leave=shown.leave, file=file)
+    shown.run(session)
+    send()
+    if session.ended_by and all(thread.ended_early for thread in session.all):
+        raise KeyboardInterrupt if session.ended_by == signal.SIGINT else SystemExit(128 + session.ended_by)
+    if "" in session.threads:
+        _show(session.threads[""].result(), as_json)
+        return
+    if as_json:
+        print(to_json({"axes": plain(session)}))
+    for thread in session.all:
+        if thread.outcome is not None and not as_json:
+            print(
+                f"{thread.name}: {tracked_amount(thread.outcome.summary)}\n{original(str(thread.outcome.directory))}/"
+            )
+    errors = [thread.error for thread in session.all if thread.error is not None and not thread.ended_early]
+    if errors:
+        raise typer.Exit(2 if all(isinstance(error, (LivebodeError, StoppedError)) for error in errors) else 1)
+
+
+def _drawing(axis: Axis) -> Draw:
+    names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
+    return drawing(f"{axis.source.title}: {axis.signals.output}", names)
+
+
+def _show(outcome: Outcome, as_json: bool) -> None:
+    if as_json:
+        print(to_json({"directory": original(str(outcome.directory))} | outcome.summary), flush=True)
+    else:
+        show(outcome)
