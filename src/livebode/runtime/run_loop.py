@@ -183,8 +183,8 @@ class RunLoop:
         responses = self._estimate(block)
         self._record_and_publish(responses)
         self._report_events()
-        self._check_signals(block, ready)
         self._stream.announce(TrackerResults(block, self._follower.counts["samples"], self.source.samples))
+        self._check_signals(block, ready)  # it examines seconds of samples at a time, and no result waits for it
         self._recorder.commit(block)
 
     def _numbered(self) -> Iterator[Block | None]:
@@ -319,7 +319,14 @@ class RunLoop:
         begins = not (counts.judged or counts.valid_lines or self._previous is not None)
         transient = begins and not (axis.tracking.all_periods or axis.motion)
         channels = self.pipeline.channels
-        return LiveChecks(settings, channels, roles=not counts.judged, transient=transient, judged=counts.judge)
+        return LiveChecks(
+            settings,
+            channels,
+            roles=not counts.judged,
+            transient=transient,
+            judged=counts.judge,
+            phase=self._recorder.phase,
+        )
 
     def _source_events(self) -> list[Event]:
         """Events of a live source; a recording has all of them at the start."""

@@ -185,6 +185,10 @@ class SegmentedRecord:
             yield from newest
 
     @property
+    def phase(self) -> float:
+        return self._store.phase
+
+    @property
     def continues(self) -> bool:
         return True
 
