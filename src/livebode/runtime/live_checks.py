@@ -88,15 +88,22 @@ class LiveChecks:
             if self._stretch.add(block, self._channels, self._size):
                 self._transient = False  # the excitation may have begun in samples that are not judged
             if self._stretch.samples >= self._size:
-                self._complete = _CompleteStretch(*self._stretch.hand_out(), self._transient, block.stop + self._delay)
+                start, data = self._stretch.hand_out()
+                judged_at = block.stop + self._delay
+                self._complete = _CompleteStretch(start, _time_s(block, start), data, self._transient, judged_at)
             if self._complete is not None and block.stop >= self._complete.judged_at:
-                judged, self._complete = self._complete, None
-                yield from self._judged(block, judged)
+                yield from self.finish()
         if self._reference is not None:
             yield from self._slipped(block, self._reference)
 
-    def _judged(self, block: Block, stretch: _CompleteStretch) -> Iterator[Event]:
-        settings, start = self._settings, stretch.start
+    def finish(self) -> Iterator[Event]:
+        """Findings in the stretch that is complete, at its turn or at the end of the run."""
+        if self._complete is not None:
+            stretch, self._complete = self._complete, None
+            yield from self._judged(stretch)
+
+    def _judged(self, stretch: _CompleteStretch) -> Iterator[Event]:
+        settings, start, time_s = self._settings, stretch.start, stretch.time_s
         signals = dict(zip(self._channels, stretch.data))
         by_role = {role: signals[name] for role in ROLES if (name := settings.channel(role))}
         spectra = role_spectra(by_role, settings)
@@ -107,10 +114,10 @@ class LiveChecks:
             return
         if self._roles:
             for one in suspicions(by_role, settings):
-                yield Event("roles-doubtful", start, _time_s(block, start), one.sentence)
+                yield Event("roles-doubtful", start, time_s, one.sentence)
         if stretch.transient and (periods := transient_periods(signals, settings)):
             begun = start if self._begun is None else self._begun
-            yield transient_event(periods, settings, first=start, time_s=_time_s(block, start), begun=begun)
+            yield transient_event(periods, settings, first=start, time_s=time_s, begun=begun)
         self._roles = self._transient = False
         self._report_judged()
 
@@ -141,6 +148,7 @@ class _CompleteStretch:
     """Samples from `start` on that are judged at sample `judged_at`; `transient`: they may begin with a transient."""
 
     start: int
+    time_s: float
     data: NDArray[np.float64]
     transient: bool
     judged_at: int

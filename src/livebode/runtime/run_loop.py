@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import nan
@@ -284,9 +284,11 @@ class RunLoop:
 
     def _check_signals(self, block: Block, ready: list[Block]) -> None:
         """Publish findings on the signals of a live run."""
-        if self._checks is None:
-            return
-        for event in self._checks.take_ready(block, ready):
+        if self._checks is not None:
+            self._publish_findings(self._checks.take_ready(block, ready))
+
+    def _publish_findings(self, found: Iterable[Event]) -> None:
+        for event in found:
             self._stream.publish(event)
             if event.kind == "transient":
                 self._counts.left_out_samples = int(event.details["samples"])
@@ -405,6 +407,8 @@ class RunLoop:
     def _judge(self, *, delayed: bool) -> None:
         """Publish delayed results at the end; SignalError if the responses are invalid."""
         follower, counts = self._follower, self._counts
+        if self._checks is not None:
+            self._publish_findings(self._checks.finish())
         counts.check.finish()
         check_length(follower.counts["samples"], follower.settings.lines.window)
         if delayed and counts.handed_out != counts.stop:
