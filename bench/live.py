@@ -4,7 +4,8 @@ Senders in another process send over UDP as drives would: 4 kHz, batches of 25 m
 tracks 21 lines in a window of 400 at 20 responses per second and records them, as `livebode run` does. Latency is from
 the arrival of a datagram (`LiveBlock.arrived_s`) until all its results were published (`Tracked`), for Blocks
 that give a response. The first second is excluded, because a UDP source first collects eight batches to put them in
-order.
+order. What examines seconds of samples (roles, transient, phase slips) follows after that, on the same thread: it
+delays the next Block, whose latency includes it.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "rad/s"))
 BATCH, HOP = 100, 200
 SECONDS = 75.0
 WAKE_S = 0.01
-TARGET_S = 0.020
+TARGET_S, TARGET_ALONE_S = 0.020, 0.003
+"""Of the p99 of sixteen axes, and of one."""
 CORES = 2
 
 
@@ -203,9 +205,10 @@ def report(scenario: Scenario, found: dict[str, float]) -> None:
     print(scenario.name)
     for label, value in found.items():
         print(f"  {label:38}{value:10.4g}")
+    target_s = TARGET_ALONE_S if scenario.axes == 1 else TARGET_S
     whole = not found["samples lost"] and found["cores used"] <= CORES
     for target, reached in (
-        (f"p99 ≤ {1e3 * TARGET_S:g} ms", found["p99, ms"] <= 1e3 * TARGET_S),
+        (f"p99 ≤ {1e3 * target_s:g} ms", found["p99, ms"] <= 1e3 * target_s),
         (f"nothing lost, at most {CORES} cores", whole),
     ):
         print(f"  target {target}: {'met' if reached else 'missed'}", flush=True)

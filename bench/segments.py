@@ -40,7 +40,7 @@ def opened(path: Path) -> SegmentedRecord:
         path, RecordSection(segment_s=1.0), summary={"configuration": {}, "found": FOUND},
         channels=[Channel(name) for name in NAMES], rate_hz=RATE_HZ,
         parts={"tracker": tracker, "counts": RunCounts(ChannelCheck(NAMES, "w"), time.perf_counter())},
-        force=False, again=False, ends=False, publish=lambda _: None,
+        force=False, again=False, ends=lambda: False, publish=lambda _: None,
     )  # fmt: skip
 
 

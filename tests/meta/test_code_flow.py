@@ -25,7 +25,7 @@ def test_the_loop_calls_its_steps_in_the_order_of_the_page() -> None:
     steps = re.findall(r"self\.(?:_recorder\.|_stream\.)?(\w+)\(", inspect.getsource(RunLoop._process))
     assert steps == [
         "write_samples", "_ready_parts", "_monitor_samples", "_estimate", "_record_and_publish", "_report_events",
-        "_check_signals", "announce", "commit",
+        "announce", "_check_signals", "commit",
     ]  # fmt: skip
     order = (
         "Number",

@@ -155,7 +155,7 @@ def _second(store: Store, k: int, limit: int | None, hard: int) -> bool:
     if limit is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
     block = Block(np.arange(100.0)[np.newaxis], (Channel("y"),), RATE_HZ, start=100 * k)
-    store.write("samples", as_rows(block, Y))
+    store.write("samples", as_rows([block], Y))
     store.write_event(Event("mark", block.start, block.start / RATE_HZ, ""))
     return store.commit(block.stop, block.stop / RATE_HZ, {"state": bytes(100)})
 
@@ -180,7 +180,7 @@ def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> No
         for start in range(0, 40 * 50_000, 10_000):
             block = Block(rng.standard_normal((1, 10_000)), (Channel("y"),), RATE_HZ, start=start)
             for table in ("samples", "responses"):
-                store.write(table, as_rows(block, Y))
+                store.write(table, as_rows([block], Y))
             store.write_event(Event("mark", start, start / RATE_HZ, ""))
             store.commit(block.stop, block.stop / RATE_HZ, {"state": bytes(100)})
             used.append(size_of(tmp_path / "run"))

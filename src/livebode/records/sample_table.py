@@ -38,7 +38,9 @@ def channels_of(schema: pa.Schema) -> tuple[Channel, ...]:
     )
 
 
-def as_rows(block: Block, table: ColumnTable) -> pa.RecordBatch:
-    """The samples of a Block whose channels are those of the table."""
-    number = np.arange(block.start, block.stop, dtype=np.int64)
-    return pa.record_batch([from_numpy(c) for c in (number, block.time_s, *block.data)], schema=table.schema)
+def as_rows(blocks: Sequence[Block], table: ColumnTable) -> pa.RecordBatch:
+    """The samples of Blocks whose channels are those of the table."""
+    number = np.concatenate([np.arange(block.start, block.stop, dtype=np.int64) for block in blocks])
+    time_s = np.concatenate([block.time_s for block in blocks])
+    data = np.concatenate([block.data for block in blocks], axis=1)
+    return pa.record_batch([from_numpy(c) for c in (number, time_s, *data)], schema=table.schema)

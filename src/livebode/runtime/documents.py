@@ -72,7 +72,7 @@ class FitResults:
 
 @dataclass(frozen=True, eq=False)
 class TrackerResults:
-    """All results of this Block were published; a LiveBlock contains its time of arrival.
+    """All results of this Block were published, except those of checks; a LiveBlock contains its time of arrival.
 
     `samples` is the number of tracked samples, `samples_total` that of the whole source (None if it is not known).
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,9 @@ class LiveChecks:
         Whether the roles are judged, and whether the run may begin with a transient.
     judged
         Called once, when a stretch was judged.
+    phase
+        Part of an interval by which the axis differs from another one: they do not examine their signals at the same
+        moment.
     """
 
     def __init__(
@@ -44,17 +48,21 @@ class LiveChecks:
         roles: bool,
         transient: bool,
         judged: Callable[[], None] = lambda: None,
+        phase: float = 0.0,
     ) -> None:
         self._settings, self._channels, self._report_judged = settings, channels, judged
         self._roles, self._transient = roles and settings.periodic, transient and settings.periodic
         lines = settings.lines
         self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
         self._stretch = _Stretch()
+        self._complete: _CompleteStretch | None = None
+        self._delay = int(phase * self._size)
         self._begun: int | None = None
         repeats = settings.periodic and settings.method.reference == "excitation"
         self._reference = settings.excitation if repeats else None
         self._slips = SlipSearch(lines.window)
         self._searched = _Stretch()
+        self._search_size = lines.window * round(_SLIP_PERIODS * (1 - phase / 2))
 
     def take_ready(self, block: Block, ready: list[Block]) -> Iterator[Event]:
         """Findings with the parts of this Block in which the machine is ready; others may hide a restart of a phase."""
@@ -80,14 +88,23 @@ class LiveChecks:
             if self._stretch.add(block, self._channels, self._size):
                 self._transient = False  # the excitation may have begun in samples that are not judged
             if self._stretch.samples >= self._size:
-                yield from self._judged(block)
+                start, data = self._stretch.hand_out()
+                judged_at = block.stop + self._delay
+                self._complete = _CompleteStretch(start, _time_s(block, start), data, self._transient, judged_at)
+            if self._complete is not None and block.stop >= self._complete.judged_at:
+                yield from self.finish()
         if self._reference is not None:
             yield from self._slipped(block, self._reference)
 
-    def _judged(self, block: Block) -> Iterator[Event]:
-        settings = self._settings
-        start, data = self._stretch.hand_out()
-        signals = dict(zip(self._channels, data))
+    def finish(self) -> Iterator[Event]:
+        """Findings in the stretch that is complete, at its turn or at the end of the run."""
+        if self._complete is not None:
+            stretch, self._complete = self._complete, None
+            yield from self._judged(stretch)
+
+    def _judged(self, stretch: _CompleteStretch) -> Iterator[Event]:
+        settings, start, time_s = self._settings, stretch.start, stretch.time_s
+        signals = dict(zip(self._channels, stretch.data))
         by_role = {role: signals[name] for role in ROLES if (name := settings.channel(role))}
         spectra = role_spectra(by_role, settings)
         if spectra is None:
@@ -97,10 +114,10 @@ class LiveChecks:
             return
         if self._roles:
             for one in suspicions(by_role, settings):
-                yield Event("roles-doubtful", start, _time_s(block, start), one.sentence)
-        if self._transient and (periods := transient_periods(signals, settings)):
+                yield Event("roles-doubtful", start, time_s, one.sentence)
+        if stretch.transient and (periods := transient_periods(signals, settings)):
             begun = start if self._begun is None else self._begun
-            yield transient_event(periods, settings, first=start, time_s=_time_s(block, start), begun=begun)
+            yield transient_event(periods, settings, first=start, time_s=time_s, begun=begun)
         self._roles = self._transient = False
         self._report_judged()
 
@@ -108,8 +125,9 @@ class LiveChecks:
         size = _SLIP_PERIODS * self._settings.lines.window
         if self._searched.add(block, [name], 2 * size):
             self._slips = SlipSearch(self._settings.lines.window)
-        if self._searched.samples < size:
+        if self._searched.samples < self._search_size:
             return
+        self._search_size = size
         start, data = self._searched.hand_out()
         if self._slips.begins_at is None:
             self._slips.begins_at = start
@@ -123,6 +141,17 @@ class LiveChecks:
             )
             details = {"missing_samples": slip.missing}
             yield Event("phase-slip", slip.sample, _time_s(block, slip.sample), message, details)
+
+
+@dataclass(frozen=True, eq=False)
+class _CompleteStretch:
+    """Samples from `start` on that are judged at sample `judged_at`; `transient`: they may begin with a transient."""
+
+    start: int
+    time_s: float
+    data: NDArray[np.float64]
+    transient: bool
+    judged_at: int
 
 
 class _Stretch:

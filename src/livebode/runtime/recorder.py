@@ -16,6 +16,10 @@ class Recorder(Protocol):
 
     path: Path
 
+    @property
+    def phase(self) -> float:
+        """Part of an interval by which the axis is ahead of another one of the process in what it does at times."""
+
     def __enter__(self) -> Self: ...
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None: ...

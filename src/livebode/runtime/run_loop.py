@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import nan
@@ -183,8 +183,8 @@ class RunLoop:
         responses = self._estimate(block)
         self._record_and_publish(responses)
         self._report_events()
-        self._check_signals(block, ready)
         self._stream.announce(TrackerResults(block, self._follower.counts["samples"], self.source.samples))
+        self._check_signals(block, ready)  # it examines seconds of samples at a time, and no result waits for it
         self._recorder.commit(block)
 
     def _numbered(self) -> Iterator[Block | None]:
@@ -284,9 +284,11 @@ class RunLoop:
 
     def _check_signals(self, block: Block, ready: list[Block]) -> None:
         """Publish findings on the signals of a live run."""
-        if self._checks is None:
-            return
-        for event in self._checks.take_ready(block, ready):
+        if self._checks is not None:
+            self._publish_findings(self._checks.take_ready(block, ready))
+
+    def _publish_findings(self, found: Iterable[Event]) -> None:
+        for event in found:
             self._stream.publish(event)
             if event.kind == "transient":
                 self._counts.left_out_samples = int(event.details["samples"])
@@ -319,7 +321,14 @@ class RunLoop:
         begins = not (counts.judged or counts.valid_lines or self._previous is not None)
         transient = begins and not (axis.tracking.all_periods or axis.motion)
         channels = self.pipeline.channels
-        return LiveChecks(settings, channels, roles=not counts.judged, transient=transient, judged=counts.judge)
+        return LiveChecks(
+            settings,
+            channels,
+            roles=not counts.judged,
+            transient=transient,
+            judged=counts.judge,
+            phase=self._recorder.phase,
+        )
 
     def _source_events(self) -> list[Event]:
         """Events of a live source; a recording has all of them at the start."""
@@ -398,6 +407,8 @@ class RunLoop:
     def _judge(self, *, delayed: bool) -> None:
         """Publish delayed results at the end; SignalError if the responses are invalid."""
         follower, counts = self._follower, self._counts
+        if self._checks is not None:
+            self._publish_findings(self._checks.finish())
         counts.check.finish()
         check_length(follower.counts["samples"], follower.settings.lines.window)
         if delayed and counts.handed_out != counts.stop:

@@ -5,39 +5,56 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
 from livebode.configuration.record_section import RecordSection
-from livebode.core import Block, Channel, Event, RecordError, Responses, Spectra, StateError, Stateful
+from livebode.core import (
+    Block,
+    Channel,
+    Event,
+    LivebodeError,
+    RecordError,
+    Responses,
+    Spectra,
+    StateError,
+    Stateful,
+)
 from livebode.core.clock import RunClock
 from livebode.core.files import whole_files
 from livebode.core.writing import why, writing
-from livebode.records import PARAMETERS, RESPONSES, RunRecord, as_batch, parameter_rows, to_json
+from livebode.records import PARAMETERS, RESPONSES, RunRecord, to_json
 from livebode.records.inside import check_folder
 from livebode.records.removal import check_removable, remove
-from livebode.records.sample_table import as_rows, samples_of
+from livebode.records.sample_table import samples_of
 from livebode.records.segments.journal import FOLDER
 from livebode.records.segments.limits import SegmentLimits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.store import Store
+from livebode.records.segments.writer import Writer
 from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
 from livebode.runtime.documents import Document, FitResults
 from livebode.runtime.run_control import StoppedError
 from livebode.runtime.same_run import check_same_run, earlier_versions
+from livebode.runtime.unwritten import Unwritten
 
 FOUND_ON_THE_WAY = "clock", "left_out_samples", "numbering", "recorded"
 _PICTURES = "pictures"
 _INTERVAL_S = 0.5
-_PIECE_S = 0.25  # with the interval 0.75 s: most data that a kill can cost
+_PIECE_S = 0.25
+_AHEAD_S = 0.75  # tracking may be so far ahead of the record; with a piece 1 s: most data that a kill can cost
 _SEEN_AGAIN_BYTES = 256 << 20  # previous responses for a picture of a continued run, in addition to new ones
 
 
 class SegmentedRecord:
     """Responses, events and, on request, samples of one run; an unfinished run in the directory is continued.
 
-    All committed data remains after an exception.
+    All committed data remains after an exception. A Writer does the work, except at the beginning and the end; tracking
+    waits for it only where a kill could cost more than a second.
 
     Parameters
     ----------
@@ -58,7 +75,7 @@ class SegmentedRecord:
     ends
         Whether the source has reached its end, so that the run is finished; else a stopped run can continue.
     publish
-        Called immediately with events of the record itself.
+        Called with events of the record itself, in the thread of the run.
     waiting
         Events that are not passed to `write_event` yet; they are stored with every commit.
     position
@@ -98,9 +115,12 @@ class SegmentedRecord:
         tables = {"responses": RESPONSES, "parameters": PARAMETERS} | (
             {"samples": self._samples} if self._samples else {}
         )
-        self._store = Store(path, tables, self._limits(section), publish)
+        self._reported: deque[Event] = deque()
+        self._store = Store(path, tables, self._limits(section), self._reported.append)
+        self._writer, self._unwritten = Writer(), Unwritten()
         self._due_from = 0
         self._piece = max(1, round(_PIECE_S * rate_hz))
+        self._ahead_max = round(_AHEAD_S * rate_hz)
 
     def __enter__(self) -> Self:
         if self._force:
@@ -115,7 +135,11 @@ class SegmentedRecord:
                 self._continued = self._new = True  # the continuation is reported as an event
                 self._tracked = self._store.last.sample, self._store.last.time_s
                 self._due_from = self._store.last.sample if self._again else 0
+            undo.callback(self._publish_reported)
+            undo.callback(self._writer.wait)
             self._undo = undo.pop_all()
+        self._begin_interval()
+        self._publish_reported()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
@@ -126,13 +150,11 @@ class SegmentedRecord:
     def take(self, document: Document) -> None:
         match document:
             case Responses() if len(document):
-                self._store.write("responses", as_batch(document))
+                self._unwritten.responses.append(document)
             case FitResults(parts):
-                for parameters in parts:
-                    if len(parameters):
-                        self._store.write("parameters", parameter_rows(parameters))
+                self._unwritten.parameters.extend(part for part in parts if len(part))
             case Event():
-                self._store.write_event(document)
+                self._unwritten.events.append(document)
                 self._new = True
 
     def stopped(self) -> Event:
@@ -163,6 +185,10 @@ class SegmentedRecord:
             yield from newest
 
     @property
+    def phase(self) -> float:
+        return self._store.phase
+
+    @property
     def continues(self) -> bool:
         return True
 
@@ -177,9 +203,9 @@ class SegmentedRecord:
         return list(self._more.get("numbering", ()))
 
     def renew(self, **found: Any) -> None:
-        """Write findings during the run to run.json."""
+        """Write findings during the run to run.json; if the disk is full, they are written at the end of the run."""
         self._more |= found
-        self._store.renew(self._named(self._summary))
+        self._writer.add(partial(self._renew, self._named(self._summary)))
 
     def pieces(self, block: Block) -> Iterator[Block]:
         """The samples of a Block that are not in the record yet, in pieces whose loss by a kill is short."""
@@ -191,27 +217,34 @@ class SegmentedRecord:
     def write_samples(self, block: Block) -> None:
         """Append the samples if they are recorded; the source continues after this Block."""
         if self._samples:
-            self._store.write("samples", as_rows(block, self._samples))
+            self._unwritten.blocks.append(block)
         if self._position is not None:
             self._position.take(block)
 
     def commit(self, block: Block) -> None:
         """Store all results up to the end of this Block if a commit is due."""
         self._tracked, self._new = (block.stop, block.origin_s + block.stop / block.rate_hz), True
-        if self._store.due(block.stop):
+        if self._due(block.stop):
             self._commit(*self._tracked)
+        if block.stop - self._reached >= self._ahead_max:
+            self._writer.wait()
+        self._writer.check()
+        self._publish_reported()
 
     def commit_last(self) -> None:
         """Store the last results; RecordError if they cannot be written."""
         if self._tracked is not None:
             self._commit(*self._tracked)
+        self._wait()
 
     def commit_while_silent(self) -> None:
         """Record the results of the last Block, and later events, while waiting for the next one.
 
         The last Block may be from before the run was continued.
         """
-        if self._tracked is None or not self._store.due(self._tracked[0]):
+        self._publish_reported()
+        # While the disk is slow, the events of a silent machine wait for one commit together.
+        if self._tracked is None or not self._due(self._tracked[0]) or not self._writer.idle:
             return
         if self._new or self._waiting() != self._waited:
             self._commit(*self._tracked)
@@ -221,18 +254,56 @@ class SegmentedRecord:
         check_folder(self.path, f".{_PICTURES}.partial/bode.png")  # rmtree would block at a pipe of that name
         with (
             writing(self.path, RecordError, unchanged=False),
-            whole_files(self.path, _PICTURES, locked=True) as partial,
+            whole_files(self.path, _PICTURES, locked=True) as folder,
         ):
-            draw(partial)
+            draw(folder)
+        self._wait()
         last = self._store.last
         assert last is not None
         # Results that were delayed until the end were written after the last commit, and belong to the present states.
+        self._unwritten.write(self._store, self._samples)
         self._store.commit(last.sample, last.time_s, self._states())
         self._store.finish(self._named(summary), finished=self._ends() or "continued_in" in summary)
 
+    def _begin_interval(self) -> None:
+        """The next commits are due in the phase of this record."""
+        assert self._store.last is not None
+        limits, ahead = self._store.limits, self._store.phase
+        self._reached = self._store.last.sample
+        self._committed = self._reached - int(ahead * limits.interval_samples)
+        self._committed_s = time.monotonic() - ahead * limits.interval_s
+
+    def _due(self, sample: int) -> bool:
+        """Whether a commit is due when the next sample has this number."""
+        limits = self._store.limits
+        long = time.monotonic() - self._committed_s >= limits.interval_s
+        return long or sample - self._committed >= limits.interval_samples
+
     def _commit(self, sample: int, time_s: float) -> None:
+        self._committed, self._committed_s = sample, time.monotonic()
         self._new, self._waited = False, self._waiting()
-        self._store.commit(sample, time_s, self._states(), self._waited)
+        written, self._unwritten = self._unwritten, Unwritten()
+        self._writer.add(partial(self._write, written, sample, time_s, self._states(), self._waited))
+
+    def _write(
+        self, written: Unwritten, sample: int, time_s: float, states: Mapping[str, bytes], waiting: Sequence[Event]
+    ) -> None:
+        written.write(self._store, self._samples)
+        self._store.commit(sample, time_s, states, waiting)
+        self._reached = sample  # also if the record is paused: the store holds it, within its limit
+
+    def _renew(self, summary: dict[str, Any]) -> None:
+        with contextlib.suppress(LivebodeError):
+            self._store.renew(summary)
+
+    def _wait(self) -> None:
+        self._writer.wait()
+        self._writer.check()
+        self._publish_reported()
+
+    def _publish_reported(self) -> None:
+        while self._reported:
+            self._publish(self._reported.popleft())
 
     def _found_damaged(self, damage: Event) -> None:
         if not str(damage.details["file"]).startswith(f"{FOLDER}/"):  # the store reports damaged journals

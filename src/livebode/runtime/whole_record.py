@@ -15,6 +15,7 @@ from livebode.runtime.documents import Document, FitResults
 class RecordInOnePiece:
     """What all records have that are complete or not there."""
 
+    phase = 0.0
     continues = False
     clock = ()
     numbering = ()

@@ -26,6 +26,7 @@ from livebode.records.segments.journal import Commit
 from livebode.records.segments.limits import JOURNALS, SegmentLimits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
+from livebode.records.segments.phase import Phase
 from livebode.records.segments.recovery import EVENTS, UnfinishedRun, recover
 from livebode.records.segments.shelf import Shelf
 from livebode.records.segments.syncing import Syncing
@@ -58,6 +59,8 @@ class Store:
     ----------
     last
         The commit to continue from; None in a new directory, in which `begin` starts a run.
+    phase
+        Part of an interval by which its commits and segments are ahead of those of another record of the process.
 
     Raises
     ------
@@ -71,18 +74,22 @@ class Store:
     ) -> None:
         self.path, self.limits = path, limits
         self.last: Commit | None = None
+        self.phase = 0.0
         self._tables = dict(tables)
         self._waiting = UnsyncedRows(tuple(self._tables))
         self._log = EventLog(path, emit)
         self._pause: Event | None = None
         self._attempts = 0  # failed attempts to close a segment since the last closed one
-        self._committed_s = self._synced_s = 0.0
+        self._synced_s = 0.0
         self._syncing = Syncing()
 
     def __enter__(self) -> Store:
         with self._writing(), contextlib.ExitStack() as files:
             self.path.mkdir(parents=True, exist_ok=True)
             files.callback(Lock(self.path).release)
+            phase = Phase()
+            files.callback(phase.release)
+            self.phase = phase.part
             self._files = files
             found = recover(self.path)
             if found is not None:
@@ -101,6 +108,7 @@ class Store:
             self._open_files(Manifest(), [], 0)
             self._shelf.begin()
             self._open_journal(1, commit)
+            self._shorten_segment()
             self._files.callback(self._close_open_journal)
             self._write_summary(summary, finished=False)
             sync_directory(self.path.parent)
@@ -120,19 +128,13 @@ class Store:
         """Append an event with the next commit."""
         self._log.add(event)
 
-    def due(self, sample: int) -> bool:
-        """Whether a commit is due when the next sample has this number."""
-        assert self.last is not None
-        long = time.monotonic() - self._committed_s >= self.limits.interval_s
-        return long or sample - self._committed >= self.limits.interval_samples
-
     def commit(self, sample: int, time_s: float, states: Mapping[str, bytes], waiting: Sequence[Event] = ()) -> bool:
         """Record everything before this sample, with the states that continue from there.
 
         Events that are `waiting` for a line in events.jsonl are in the record until the next commit. Returns whether
         the commit was written.
         """
-        self._committed_s, self._committed = time.monotonic(), sample
+        committed_s = time.monotonic()
         self._waiting.gather()
         try:
             self._settle(self._syncing.done())
@@ -145,8 +147,8 @@ class Store:
             full = self._full(sample)
             if full:
                 self._sync()
-            elif self._committed_s - self._synced_s >= self.limits.interval_s:
-                self._synced_s = self._committed_s
+            elif committed_s - self._synced_s >= self.limits.interval_s:
+                self._synced_s = committed_s
                 self._syncing.begin(self._journal, parts)
             self.last = commit
         except OSError as error:
@@ -211,7 +213,8 @@ class Store:
         else:
             self._journal = AppendFile(self.path, journal.name_of(found.number), found.length)
             self._number, self._safe_bytes = found.number, found.length
-            self._began = self._committed = found.commit.sample
+            self._began = found.commit.sample
+        self._shorten_segment()
         self._files.callback(self._close_open_journal)
         if found.sealed:
             self._begin_closing()
@@ -255,7 +258,11 @@ class Store:
         write_whole(self.path / name, journal.head(self._tables, commit), locked=True)
         self._journal, self._number = AppendFile(self.path, name), number
         self._safe_bytes = self._journal.length
-        self._began = self._committed = commit.sample
+        self._began = commit.sample
+
+    def _shorten_segment(self) -> None:
+        """Close the first segment earlier than those of another record of the process; later ones follow it."""
+        self._began -= int(self.phase * self.limits.segment_samples)
 
     def _sync(self) -> None:
         """Wait until all written data is safe."""
@@ -308,7 +315,7 @@ class Store:
             self._not_closed(
                 error, f"when the next journal is full, at sample {self._began + self.limits.segment_samples}"
             )
-        elif self._attempts and not self._shelf.sealed and not self._full(self._committed):
+        elif self._attempts and not self._shelf.sealed and self.last is not None and not self._full(self.last.sample):
             self._report_closed()
         return error
 

@@ -1,0 +1,91 @@
+"""The work of records beside their axes: in order, beside each other, and never more than a second behind."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from livebode.records.segments import disk
+from livebode.records.segments.journal import last_commit
+from livebode.records.segments.phase import Phase
+from livebode.records.segments.writer import Writer
+from tests.support.recorded import RATE_HZ, check_whole, machine, record_machine
+
+PATIENCE_S = 60.0
+
+
+def test_jobs_of_a_record_are_done_in_order_while_another_record_waits_for_its_disk() -> None:
+    slow, fast, disk_answers, done = Writer(), Writer(), threading.Event(), list[int]()
+    slow.add(lambda: done.append(-1 if disk_answers.wait(PATIENCE_S) else -2))
+    for number in range(100):
+        fast.add(lambda number=number: done.append(number))
+    fast.wait()
+    assert done == list(range(100))
+    assert not slow.idle
+    disk_answers.set()
+    slow.wait()
+    assert done[100:] == [-1]
+
+
+def test_nothing_is_written_after_a_job_that_failed() -> None:
+    writer, done, begun = Writer(), list[int](), threading.Event()
+
+    def fail() -> None:
+        begun.wait(PATIENCE_S)
+        raise MemoryError
+
+    writer.add(fail)
+    writer.add(lambda: done.append(1))
+    begun.set()
+    writer.wait()
+    with pytest.raises(MemoryError):
+        writer.check()
+    with pytest.raises(MemoryError):
+        writer.add(lambda: done.append(2))
+    assert done == []
+
+
+def test_records_of_a_process_have_phases_of_their_own() -> None:
+    first = [Phase() for _ in range(16)]
+    assert sorted(phase.part for phase in first) == [n / 16 for n in range(16)]
+    first[3].release()
+    again = Phase()
+    assert again.part == first[3].part
+    for phase in (*first, again):
+        phase.release()
+    alone = Phase()
+    assert alone.part == 0.0
+    alone.release()
+
+
+def test_tracking_waits_for_a_disk_that_hangs_before_a_kill_would_cost_more_than_a_second(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, tracked, behind = tmp_path / "run", 0, list[int]()
+    waits, write_all, wait = threading.Event(), disk.write_all, Writer.wait
+
+    def hang(file: int, data: bytes) -> None:
+        """The disk answers when tracking waits for it."""
+        if threading.current_thread().name.startswith("livebode record"):
+            assert waits.wait(PATIENCE_S)
+            committed = last_commit(run)
+            assert committed is not None
+            behind.append(tracked - committed.sample)
+        write_all(file, data)
+
+    def observed(writer: Writer) -> None:
+        waits.set()
+        wait(writer)
+        waits.clear()
+
+    def progress(samples: int, _: int | None) -> None:
+        nonlocal tracked
+        tracked = samples
+
+    monkeypatch.setattr(disk, "write_all", hang)
+    monkeypatch.setattr(Writer, "wait", observed)
+    record_machine(machine(5000), run, progress=progress)
+    check_whole(run, 5000)
+    assert RATE_HZ / 2 < max(behind) <= RATE_HZ
