@@ -1,9 +1,18 @@
 """The sliding DFT, the line stage, the verdicts on lines and the fit in C, and their NumPy twins, the definitions.
 
-The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.estimation.repeating_twin` and
-`livebode.kernel.fit_twin`.
+The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.estimation.repeating_twin`,
+`livebode.kernel.fit_twin` and `livebode.kernel.belt_twin`.
 """
 
+from livebode.kernel._belt import (
+    BeltGrid,
+    BeltNormal,
+    BeltRows,
+    BeltSplines,
+    belt_each,
+    belt_response,
+    belt_together,
+)
 from livebode.kernel._fit import (
     RIGID,
     TWO_MASS,
@@ -72,6 +81,10 @@ __all__ = [
     "SCATTER",
     "TWO_MASS",
     "TWO_MASS_GAIN",
+    "BeltGrid",
+    "BeltNormal",
+    "BeltRows",
+    "BeltSplines",
     "FeedbackSeries",
     "FitFound",
     "FitModel",
@@ -92,6 +105,9 @@ __all__ = [
     "SlidingDFT",
     "Tones",
     "WeightSums",
+    "belt_each",
+    "belt_response",
+    "belt_together",
     "fft_is_cheaper",
     "fit",
     "fit_epsilon",

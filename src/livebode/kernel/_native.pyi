@@ -43,6 +43,24 @@ def fit_margins(
     out: tuple[Any, ...],
     /,
 ) -> None: ...
+def belt_response(
+    grid: tuple[Any, ...], parameters: npt.NDArray[np.float64], out: npt.NDArray[np.complex128], /
+) -> None: ...
+def belt_each(
+    grid: tuple[Any, ...],
+    rows: tuple[Any, ...],
+    parameters: npt.NDArray[np.float64],
+    out: tuple[Any, ...],
+    /,
+) -> None: ...
+def belt_together(
+    grid: tuple[Any, ...],
+    rows: tuple[Any, ...],
+    splines: tuple[Any, ...],
+    unknowns: npt.NDArray[np.float64],
+    out: tuple[Any, ...],
+    /,
+) -> None: ...
 def judge_periods(
     plan: RepeatingPlan, state: tuple[Any, ...], periods: tuple[Any, ...], out: tuple[Any, ...], /
 ) -> tuple[float, float]: ...
