@@ -13,6 +13,7 @@ from livebode.kernel._belt import (
     belt_response,
     belt_together,
 )
+from livebode.kernel._curve import CurveShape, curve_at, curve_splines
 from livebode.kernel._fit import (
     RIGID,
     TWO_MASS,
@@ -85,6 +86,7 @@ __all__ = [
     "BeltNormal",
     "BeltRows",
     "BeltSplines",
+    "CurveShape",
     "FeedbackSeries",
     "FitFound",
     "FitModel",
@@ -108,6 +110,8 @@ __all__ = [
     "belt_each",
     "belt_response",
     "belt_together",
+    "curve_at",
+    "curve_splines",
     "fft_is_cheaper",
     "fit",
     "fit_epsilon",

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "livebode/belt.h"
+#include "livebode/curve.h"
 #include "native_array.h"
 
 namespace {
@@ -79,6 +80,44 @@ void together(nb::tuple grid, nb::tuple rows, nb::tuple splines, nb::handle unkn
          [&] { return lb_belt_together(&g.grid, &in, &places, known, &found, work); });
 }
 
+// CurveShape: knots, weights, reach, and slopes before and beyond the ends.
+struct Knots {
+    size_t splines;
+    Array table;
+    lb_curve_knots knots;
+
+    explicit Knots(nb::handle of)
+        : splines(splines_of(of)), table(of, REAL, {splines + LB_CURVE_DEGREE + 1}), knots{splines, table}
+    {
+    }
+
+  private:
+    static size_t splines_of(nb::handle of)
+    {
+        const size_t length = length_of(of, 0);
+        if (length < 2 * (LB_CURVE_DEGREE + 1)) throw nb::value_error("a cubic spline needs eight knots");
+        return length - LB_CURVE_DEGREE - 1;
+    }
+};
+
+void curve_at(nb::tuple shape, nb::handle x, nb::handle out)
+{
+    const Knots k(shape[0]);
+    const size_t count = length_of(x, 0);
+    const Array weights(shape[1], REAL, {k.splines}), at(x, REAL, {count}), found(out, REAL, {count}, WRITE);
+    const lb_curve_shape of = {weights, nb::cast<double>(shape[2]), nb::cast<double>(shape[3]),
+                               nb::cast<double>(shape[4])};
+    call(count, [&] { return lb_curve_at(&k.knots, &of, count, at, found); });
+}
+
+void curve_splines(nb::handle knots, nb::handle x, nb::handle out)
+{
+    const Knots k(knots);
+    const size_t count = length_of(x, 0);
+    const Array at(x, REAL, {count}), found(out, REAL, {count, k.splines}, WRITE);
+    call(count, [&] { return lb_curve_splines(&k.knots, count, at, found); });
+}
+
 } // namespace
 
 void bind_belt(nb::module_ &m)
@@ -86,4 +125,6 @@ void bind_belt(nb::module_ &m)
     m.def("belt_response", &respond);
     m.def("belt_each", &each);
     m.def("belt_together", &together);
+    m.def("curve_at", &curve_at);
+    m.def("curve_splines", &curve_splines);
 }
