@@ -240,7 +240,9 @@ class MotionCorrection(StatefulBase):
         chunk = self._recorded.chunk(self._from, stop, end)
         self._from = stop
         self._recorded.drop(stop - self._lead)
-        return self._correct(tracked, chunk) if len(tracked) else tracked
+        if not len(tracked):
+            return tracked
+        return self._correct(tracked, chunk.at_rows(self.settings.lines, tracked.sample))
 
     def _correct(self, tracked: Responses, chunk: Chunk) -> Responses:
         def replay(model: MovingModel) -> Replayed:
@@ -267,9 +269,8 @@ class MotionCorrection(StatefulBase):
         scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
         if not aside:
             self._ripple.take(left, chunk, now.model)
-        torque = chunk.torque(self.settings.lines, tracked.sample)
         with np.errstate(invalid="ignore", divide="ignore"):
-            ripple = np.abs(value) * np.sqrt(self._ripple.power(chunk, tracked.sample)) / torque
+            ripple = np.abs(value) * np.sqrt(self._ripple.power(chunk, tracked.sample)) / chunk.torque
         return replace(
             tracked,
             value=np.where(valid, value, complex(np.nan, np.nan)),
