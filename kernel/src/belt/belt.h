@@ -21,8 +21,8 @@ typedef struct {
     double theta[LB_LANES];
 } lb_belt_tile;
 
-/* α·T/w + β·g·w/(w² − sum·w + product), and slopes: of α and β by both inertias, of the rest by δ and Ω, of these by the
- * parameters. */
+/* α·T/w + β·g·w/(w² − sum·w + product), and slopes: of α and β by both inertias, of the rest by δ and Ω, of these by
+ * the parameters. */
 typedef struct {
     double alpha, beta, g, sum, product;
     double alpha_by[2], beta_by[2];

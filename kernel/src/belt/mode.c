@@ -1,8 +1,8 @@
 /* The response of two masses, and its slopes.
  *
  * (14) is α/s + β·s/(s² + 2δ·s + Ω) with α = 1/(J + m), β = 1/J − α, δ = b/2μ, Ω = k/μ, μ = J·m·α. Behind a zero-order
- * hold, and with e = E − 1 of the poles E = e^(pT), it is α·T/w + β·g·w/((w − e1)(w − e2)) with g = (e1 − e2)/(p1 − p2):
- * nothing cancels where lines and poles are near 1. */
+ * hold, and with e = E − 1 of the poles E = e^(pT), it is α·T/w + β·g·w/((w − e1)(w − e2)) with g = (e1 − e2)/(p1 −
+ * p2): nothing cancels where lines and poles are near 1. */
 #include "belt.h"
 
 /* Sum, product and difference over p1 − p2 of e1 and e2. */
@@ -117,10 +117,10 @@ void lb_belt_slopes(const lb_mode *m, const lb_belt_tile *at, lb_lanes *response
         const double delta_by = m->beta * m->delta_by[i], omega_by = m->beta * m->omega_by[i];
         const double alpha_by = i < 2u ? m->alpha_by[i] : 0.0, beta_by = i < 2u ? m->beta_by[i] * m->g : 0.0;
         for (size_t k = 0; k < LB_LANES; ++k) {
-            slope[i].re[k] = (alpha_by * at->rigid.re[k] + beta_by * q.re[k]) +
-                             (delta_by * by[0].re[k] + omega_by * by[1].re[k]);
-            slope[i].im[k] = (alpha_by * at->rigid.im[k] + beta_by * q.im[k]) +
-                             (delta_by * by[0].im[k] + omega_by * by[1].im[k]);
+            slope[i].re[k] =
+                (alpha_by * at->rigid.re[k] + beta_by * q.re[k]) + (delta_by * by[0].re[k] + omega_by * by[1].re[k]);
+            slope[i].im[k] =
+                (alpha_by * at->rigid.im[k] + beta_by * q.im[k]) + (delta_by * by[0].im[k] + omega_by * by[1].im[k]);
         }
     }
     for (size_t k = 0; k < LB_LANES; ++k) { /* −jθ·G, before it is turned by the delay */

@@ -30,8 +30,8 @@ lb_status lb_belt_response(const lb_belt_grid *grid, size_t rows, const double *
 }
 
 /* Measured values, turned by `turn` where there is one, and squares of their weights. */
-static void load(const lb_belt_rows *rows, size_t row, size_t lines, size_t first, const lb_lanes *turn, lb_lanes *value,
-                 double *square)
+static void load(const lb_belt_rows *rows, size_t row, size_t lines, size_t first, const lb_lanes *turn,
+                 lb_lanes *value, double *square)
 {
     for (size_t k = 0; k < LB_LANES; ++k) {
         const int is_line = first + k < lines;
@@ -63,8 +63,7 @@ static void add_row(const lb_mode *m, const lb_belt_tile *tiles, const lb_belt_r
         for (size_t i = 0; i <= count; ++i) {
             for (size_t j = 0; j <= i; ++j, ++terms) {
                 for (size_t k = 0; k < LB_LANES; ++k) {
-                    sum[terms][k] +=
-                        square[k] * (curve[i].re[k] * curve[j].re[k] + curve[i].im[k] * curve[j].im[k]);
+                    sum[terms][k] += square[k] * (curve[i].re[k] * curve[j].re[k] + curve[i].im[k] * curve[j].im[k]);
                 }
             }
         }
