@@ -60,6 +60,22 @@ lb_status lb_belt_each(const lb_belt_grid *grid, const lb_belt_rows *rows, const
 lb_status lb_belt_together(const lb_belt_grid *grid, const lb_belt_rows *rows, const lb_belt_splines *splines,
                            const double *unknowns, const lb_belt_normal *out, double *work);
 
+/* A motor, kg m², and a cart, kg, on a pulley of this radius, m. */
+typedef struct {
+    double inertia, load, radius;
+} lb_belt_masses;
+
+/* Constant within a tick: stiffness of the belt, N/m; damping, N s/m; torque of the motor, N m. */
+typedef struct {
+    size_t ticks;
+    double rate_hz;
+    const double *stiffness, *damping, *torque; /* [ticks] */
+} lb_belt_course;
+
+/* Velocities at the beginning of each tick, from rest: motor, rad/s, and cart, m/s, [ticks] each. Without control and
+ * friction; if it diverges, the last values are not finite. */
+lb_status lb_belt_replay(const lb_belt_masses *masses, const lb_belt_course *course, double *motor, double *cart);
+
 #ifdef __cplusplus
 }
 #endif

@@ -5,11 +5,14 @@ The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.est
 """
 
 from livebode.kernel._belt import (
+    BeltCourse,
     BeltGrid,
+    BeltMasses,
     BeltNormal,
     BeltRows,
     BeltSplines,
     belt_each,
+    belt_replay,
     belt_response,
     belt_together,
 )
@@ -82,7 +85,9 @@ __all__ = [
     "SCATTER",
     "TWO_MASS",
     "TWO_MASS_GAIN",
+    "BeltCourse",
     "BeltGrid",
+    "BeltMasses",
     "BeltNormal",
     "BeltRows",
     "BeltSplines",
@@ -108,6 +113,7 @@ __all__ = [
     "Tones",
     "WeightSums",
     "belt_each",
+    "belt_replay",
     "belt_response",
     "belt_together",
     "curve_at",

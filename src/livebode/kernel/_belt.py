@@ -65,6 +65,23 @@ class BeltNormal(NamedTuple):
         return cls(np.empty(problems), np.empty((problems, unknowns)), np.empty((problems, unknowns, unknowns)))
 
 
+class BeltMasses(NamedTuple):
+    """Inertia of the motor, load of the cart, and radius of the pulley."""
+
+    inertia_kg_m2: float
+    load_kg: float
+    radius_m: float
+
+
+class BeltCourse(NamedTuple):
+    """Stiffness and damping of the belt and torque of the motor, constant within each tick, shape (ticks,) each."""
+
+    rate_hz: float
+    stiffness_n_per_m: Floats
+    damping_n_s_per_m: Floats
+    torque_n_m: Floats
+
+
 def belt_response(grid: BeltGrid, parameters: Floats) -> Complex:
     """Sampled response from torque to motor velocity of each row of parameters, shape (rows, lines)."""
     found = np.empty((len(parameters), len(grid.step)), np.complex128)
@@ -87,4 +104,14 @@ def belt_together(grid: BeltGrid, rows: BeltRows, splines: BeltSplines, unknowns
     """
     found = BeltNormal.empty(1, len(unknowns))
     _native.belt_together(grid, rows, splines, unknowns, found)
+    return found
+
+
+def belt_replay(masses: BeltMasses, course: BeltCourse) -> tuple[Floats, Floats]:
+    """Velocities of motor, rad/s, and cart, m/s, at the beginning of each tick, from rest, shape (ticks,) each.
+
+    Without control and friction. If the belt diverges, the last values are not finite.
+    """
+    found = np.empty(len(course.torque_n_m)), np.empty(len(course.torque_n_m))
+    _native.belt_replay(masses, course, found)
     return found

@@ -43,6 +43,12 @@ def fit_margins(
     out: tuple[Any, ...],
     /,
 ) -> None: ...
+def belt_replay(
+    masses: tuple[Any, ...],
+    course: tuple[Any, ...],
+    out: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]],
+    /,
+) -> None: ...
 def curve_at(
     shape: tuple[Any, ...], x: npt.NDArray[np.float64], out: npt.NDArray[np.float64], /
 ) -> None: ...

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from livebode.kernel import elementary_twin as elementary
-from livebode.kernel._belt import BeltGrid, BeltNormal, BeltRows, BeltSplines
+from livebode.kernel._belt import BeltCourse, BeltGrid, BeltMasses, BeltNormal, BeltRows, BeltSplines
 
 Floats = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -21,6 +21,7 @@ Pair = tuple[Floats, Floats]
 """Real and imaginary part."""
 
 _LANES = 8
+_ORDER = 8
 _exp, _expm1 = (np.vectorize(f, otypes=[np.float64]) for f in (elementary.exp, elementary.expm1))
 
 
@@ -87,6 +88,44 @@ def together(grid: BeltGrid, rows: BeltRows, splines: BeltSplines, unknowns: Flo
     low = np.tril(found.matrix[0])
     found.matrix[0] = low + np.tril(low, -1).T
     return found
+
+
+def replay(masses: BeltMasses, course: BeltCourse) -> tuple[Floats, Floats]:
+    """As `belt_replay`.
+
+    The momentum J·ω + r·m·v is the sum of the torque alone. What is left is an oscillator of the belt's elongation and
+    its rate ω·r − v, whose transition over a tick (a Taylor series of order 8) does not depend on the state.
+    """
+    inertia, load, radius = masses
+    arm, tick = radius * load, 1.0 / course.rate_hz
+    share = radius * radius / inertia + 1.0 / load
+    whole, push = 1.0 / (inertia + radius * arm), radius / inertia
+    stiffness, damping = share * course.stiffness_n_per_m, share * course.damping_n_s_per_m
+    torque = course.torque_n_m
+    rates, momenta = np.empty(torque.size), np.empty(torque.size)
+    e = rate = momentum = np.float64(0.0)
+    with np.errstate(all="ignore"):
+        of_e, of_rate, pushed = _transition(tick, stiffness, damping)
+        for n in range(torque.size):
+            rates[n], momenta[n] = rate, momentum
+            pull = push * torque[n] - stiffness[n] * e
+            e, rate = e + (of_e[n] * rate + pushed[n] * pull), of_rate[n] * rate + of_e[n] * pull
+            momentum = momentum + tick * torque[n]
+        motor = (momenta + arm * rates) * whole
+        return motor, radius * motor - rates
+
+
+def _transition(tick: float, stiffness: Floats, damping: Floats) -> tuple[Floats, Floats, Floats]:
+    """After a tick: elongation and rate from a rate of 1, and elongation from an acceleration of 1."""
+    e, rate = np.zeros_like(stiffness), np.ones_like(stiffness)
+    of_e, of_rate, of_push = e, rate, e
+    for order in range(1, _ORDER + 1):
+        share = tick / order
+        pushed = share * e
+        e = share * rate
+        rate = -(stiffness * pushed + damping * e)
+        of_e, of_rate, of_push = of_e + e, of_rate + rate, of_push + pushed
+    return of_e, of_rate, of_push
 
 
 class _Places:

@@ -80,6 +80,17 @@ void together(nb::tuple grid, nb::tuple rows, nb::tuple splines, nb::handle unkn
          [&] { return lb_belt_together(&g.grid, &in, &places, known, &found, work); });
 }
 
+void replay(nb::tuple masses, nb::tuple course, nb::tuple out)
+{
+    const size_t ticks = length_of(course[1], 0);
+    const Array stiffness(course[1], REAL, {ticks}), damping(course[2], REAL, {ticks}),
+        torque(course[3], REAL, {ticks});
+    const Array motor(out[0], REAL, {ticks}, WRITE), cart(out[1], REAL, {ticks}, WRITE);
+    const lb_belt_masses of = {nb::cast<double>(masses[0]), nb::cast<double>(masses[1]), nb::cast<double>(masses[2])};
+    const lb_belt_course along = {ticks, nb::cast<double>(course[0]), stiffness, damping, torque};
+    call(ticks, [&] { return lb_belt_replay(&of, &along, motor, cart); });
+}
+
 // CurveShape: knots, weights, reach, and slopes before and beyond the ends.
 struct Knots {
     size_t splines;
@@ -125,6 +136,7 @@ void bind_belt(nb::module_ &m)
     m.def("belt_response", &respond);
     m.def("belt_each", &each);
     m.def("belt_together", &together);
+    m.def("belt_replay", &replay);
     m.def("curve_at", &curve_at);
     m.def("curve_splines", &curve_splines);
 }
