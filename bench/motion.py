@@ -3,9 +3,9 @@
     python -m bench.motion [--minutes 10]
 
 The simulated axis strokes with 0.38 m/s: four signals at 4 kHz, 7 lines, window 400, chunks of 4 s. The correction is
-computed at the end of a chunk, so each figure is a mean over a whole run: processor time of the thread in microseconds a
-sample, the least of several rounds, with the scan of the first chunk. `adds` is the difference to a tracker that
-receives the same blocks. The parts are those of one chunk; the last column is how much faster C is.
+computed at the end of a chunk, so each figure is a mean over a whole run: processor time of the thread in microseconds
+a sample, the least of several rounds, with all scans. `adds` is the difference to a tracker that receives the same
+blocks. The parts are those of one chunk; the last column is how much faster C is.
 """
 
 from __future__ import annotations

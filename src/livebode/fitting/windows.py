@@ -36,8 +36,7 @@ def scan(value: Complex, weight: Floats, z: Complex, rate_hz: float) -> tuple[Fl
     f_hz = np.abs(np.angle(z)) * rate_hz / (2 * np.pi)
     resonances = 2 * np.pi * np.geomspace(f_hz.min() / 2, f_hz.max() * 2, _SCANNED)
     start = np.concatenate([_with_resonance(omega, value, weight, z, rate_hz) for omega in resonances])
-    every, every_weight = (np.tile(array, (_SCANNED, 1)) for array in (value, weight))
-    found, cost = fit_windows(every, every_weight, z, rate_hz, start)
+    found, cost = fit_windows(np.tile(value, (_SCANNED, 1)), np.tile(weight, (_SCANNED, 1)), z, rate_hz, start)
     costs = cost.reshape(_SCANNED, -1)
     best, rows = np.argmin(costs, axis=0), np.arange(len(value))
     return found.reshape(_SCANNED, -1, 4)[best, rows], costs[best, rows]

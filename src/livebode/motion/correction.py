@@ -191,13 +191,15 @@ class MotionCorrection(StatefulBase):
             done.append(self._finished())
         if not self._recorded:
             self._from = block.start
-        self._waiting.append(tracked)
-        at = 0
+        at, rows = 0, 0
         while at < len(block):
             required = self._from + self._chunk + self.settings.lines.window
             piece = block.cut(at, required - block.start)
             self._recorded.append(piece)
             at += len(piece)
+            until = int(np.searchsorted(tracked.sample, piece.stop))
+            self._waiting.append(tracked[rows:until])
+            rows = until
             if self._recorded.stop == required:
                 done.append(self._corrected(self._from + self._chunk))
         hand_over(self._events, emit)

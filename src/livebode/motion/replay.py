@@ -32,9 +32,7 @@ def by_torque(model: MovingModel, rate_hz: float, u: Floats, position_m: Floats)
     machine. Effects that are not in u or not in the model, such as friction, make it drift slowly; see `without_drift`.
     """
     masses = BeltMasses(model.inertia_kg_m2, model.load_kg, model.radius_m)
-    course = BeltCourse(
-        rate_hz, model.stiffness_at(position_m), model.damping_at(position_m), np.ascontiguousarray(u)
-    )
+    course = BeltCourse(rate_hz, model.stiffness_at(position_m), model.damping_at(position_m), np.ascontiguousarray(u))
     motor, cart = belt_replay(masses, course)
     if not np.isfinite(cart[-1]):  # what is not finite remains so until the end
         raise SimulationError(
