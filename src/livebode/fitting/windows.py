@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from livebode.fitting import two_masses
 from livebode.fitting.least_squares import minimise
+from livebode.kernel import BeltGrid, BeltRows, belt_each
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -21,15 +22,8 @@ def fit_windows(value: Complex, weight: Floats, z: Complex, rate_hz: float, star
     `weight` (rows, lines) is one over the standard deviation, up to a factor; start (rows, 4).
     """
 
-    def normal(parameters: Floats) -> tuple[Floats, Floats, Floats]:
-        residual = weight * (two_masses.sampled(parameters, z, rate_hz) - value)
-        slope = weight[..., np.newaxis] * two_masses.slopes(parameters, z, rate_hz)
-        left = np.concatenate([slope.real, slope.imag], axis=-2)
-        right = np.concatenate([residual.real, residual.imag], axis=-1)
-        transposed = left.swapaxes(-1, -2)
-        return np.sum(right**2, axis=-1), (transposed @ right[..., np.newaxis])[..., 0], transposed @ left
-
-    found = minimise(normal, start)
+    grid, rows = BeltGrid.of(z, rate_hz), BeltRows(np.ascontiguousarray(value), np.ascontiguousarray(weight))
+    found = minimise(lambda parameters: belt_each(grid, rows, parameters), start)
     return found.parameters, found.cost
 
 
@@ -40,14 +34,12 @@ def scan(value: Complex, weight: Floats, z: Complex, rate_hz: float) -> tuple[Fl
     resonance the response is linear in 1/(Js + m) and 1/Js − 1/(Js + m), which gives its two inertias.
     """
     f_hz = np.abs(np.angle(z)) * rate_hz / (2 * np.pi)
-    found = [
-        fit_windows(value, weight, z, rate_hz, _with_resonance(omega, value, weight, z, rate_hz))
-        for omega in 2 * np.pi * np.geomspace(f_hz.min() / 2, f_hz.max() * 2, _SCANNED)
-    ]
-    cost = np.array([c for _, c in found])
-    best = np.argmin(cost, axis=0)
-    rows = np.arange(len(value))
-    return np.array([p for p, _ in found])[best, rows], cost[best, rows]
+    resonances = 2 * np.pi * np.geomspace(f_hz.min() / 2, f_hz.max() * 2, _SCANNED)
+    start = np.concatenate([_with_resonance(omega, value, weight, z, rate_hz) for omega in resonances])
+    found, cost = fit_windows(np.tile(value, (_SCANNED, 1)), np.tile(weight, (_SCANNED, 1)), z, rate_hz, start)
+    costs = cost.reshape(_SCANNED, -1)
+    best, rows = np.argmin(costs, axis=0), np.arange(len(value))
+    return found.reshape(_SCANNED, -1, 4)[best, rows], costs[best, rows]
 
 
 def _with_resonance(omega: float, value: Complex, weight: Floats, z: Complex, rate_hz: float) -> Floats:

@@ -1,9 +1,22 @@
 """The sliding DFT, the line stage, the verdicts on lines and the fit in C, and their NumPy twins, the definitions.
 
-The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.estimation.repeating_twin` and
-`livebode.kernel.fit_twin`.
+The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.estimation.repeating_twin`,
+`livebode.kernel.fit_twin` and `livebode.kernel.belt_twin`.
 """
 
+from livebode.kernel._belt import (
+    BeltCourse,
+    BeltGrid,
+    BeltMasses,
+    BeltNormal,
+    BeltRows,
+    BeltSplines,
+    belt_each,
+    belt_replay,
+    belt_response,
+    belt_together,
+)
+from livebode.kernel._curve import CurveShape, curve_at, curve_splines
 from livebode.kernel._fit import (
     RIGID,
     TWO_MASS,
@@ -74,6 +87,13 @@ __all__ = [
     "SCATTER",
     "TWO_MASS",
     "TWO_MASS_GAIN",
+    "BeltCourse",
+    "BeltGrid",
+    "BeltMasses",
+    "BeltNormal",
+    "BeltRows",
+    "BeltSplines",
+    "CurveShape",
     "FeedbackSeries",
     "FitFound",
     "FitModel",
@@ -94,7 +114,13 @@ __all__ = [
     "SlidingDFT",
     "Tones",
     "WeightSums",
+    "belt_each",
+    "belt_replay",
+    "belt_response",
+    "belt_together",
     "chosen_instruction_set",
+    "curve_at",
+    "curve_splines",
     "fft_is_cheaper",
     "fit",
     "fit_epsilon",

@@ -46,6 +46,34 @@ def fit_margins(
     out: tuple[Any, ...],
     /,
 ) -> None: ...
+def belt_replay(
+    masses: tuple[Any, ...],
+    course: tuple[Any, ...],
+    out: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]],
+    /,
+) -> None: ...
+def curve_at(shape: tuple[Any, ...], x: npt.NDArray[np.float64], out: npt.NDArray[np.float64], /) -> None: ...
+def curve_splines(
+    knots: npt.NDArray[np.float64], x: npt.NDArray[np.float64], out: npt.NDArray[np.float64], /
+) -> None: ...
+def belt_response(
+    grid: tuple[Any, ...], parameters: npt.NDArray[np.float64], out: npt.NDArray[np.complex128], /
+) -> None: ...
+def belt_each(
+    grid: tuple[Any, ...],
+    rows: tuple[Any, ...],
+    parameters: npt.NDArray[np.float64],
+    out: tuple[Any, ...],
+    /,
+) -> None: ...
+def belt_together(
+    grid: tuple[Any, ...],
+    rows: tuple[Any, ...],
+    splines: tuple[Any, ...],
+    unknowns: npt.NDArray[np.float64],
+    out: tuple[Any, ...],
+    /,
+) -> None: ...
 def judge_periods(
     plan: RepeatingPlan, state: tuple[Any, ...], periods: tuple[Any, ...], out: tuple[Any, ...], /
 ) -> tuple[float, float]: ...

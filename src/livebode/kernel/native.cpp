@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "livebode/sdft.h"
+#include "native_belt.h"
 #include "native_fit.h"
 #include "native_lines.h"
 #include "native_repeating.h"
@@ -354,6 +355,7 @@ NB_MODULE(_native, m)
     bind_lines(m);
     bind_fit(m);
     bind_repeating(m);
+    bind_belt(m);
     nb::class_<Engine>(m, "Engine")
         .def(nb::init<uint32_t, const std::vector<uint32_t> &, uint32_t, bool, int, double, int>())
         .def_prop_ro("window", &Engine::window)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Lines, Stage, StatefulBase
 from livebode.estimation.implausible import PlausibleRange
+from livebode.kernel import SlidingDFT
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ class Chunk:
     `start` is the number of the first one, `first` that of the first new one; the samples before it are the lead, in
     which the model reaches the machine's state. `stop` is the number after the last new one; one more window may
     follow. `missing` (samples,) is True where a sample was not finite or implausibly large; it then has the value of
-    the previous one.
+    the previous one. `torque` (rows, lines) is |U| at the lines of each of the chunk's responses.
     """
 
     start: int
@@ -33,11 +34,17 @@ class Chunk:
     x: Floats
     missing: NDArray[np.bool_]
     rate_hz: float
+    torque: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
-    def torque(self, lines: Lines, sample: NDArray[np.int64]) -> Floats:
-        """|U| at the lines over the windows that end at these samples, (rows, lines)."""
-        wave = np.exp(-2j * np.pi * np.outer(np.arange(lines.window), lines.bins) / lines.window)
-        return np.asarray(np.abs(self._windows(self.u, lines.window, sample) @ wave))
+    def at_rows(self, lines: Lines, sample: NDArray[np.int64]) -> Chunk:
+        """The same with the torque of the responses whose windows end at these samples, at least one."""
+        apart = int(np.gcd.reduce(np.append(np.diff(sample), lines.window)))
+        dft = SlidingDFT(lines.window, lines.bins)
+        # Zeros in front, so that a row is due at each of the samples.
+        before = (self.start - int(sample[0]) - 1) % apart
+        dft.advance(np.zeros(before))
+        rows = dft.process(self.u[: int(sample[-1]) + 1 - self.start], hop=apart)
+        return replace(self, torque=np.abs(rows[(sample + 1 - self.start + before) // apart - 1]))
 
     def drag(self, window: int, sample: NDArray[np.int64], inertia_kg_m2: float) -> Floats:
         """Drag torque in the direction of motion, without acceleration, over two windows up to each sample, (rows,)."""

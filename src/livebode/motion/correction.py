@@ -191,13 +191,15 @@ class MotionCorrection(StatefulBase):
             done.append(self._finished())
         if not self._recorded:
             self._from = block.start
-        self._waiting.append(tracked)
-        at = 0
+        at, rows = 0, 0
         while at < len(block):
             required = self._from + self._chunk + self.settings.lines.window
             piece = block.cut(at, required - block.start)
             self._recorded.append(piece)
             at += len(piece)
+            until = int(np.searchsorted(tracked.sample, piece.stop))
+            self._waiting.append(tracked[rows:until])
+            rows = until
             if self._recorded.stop == required:
                 done.append(self._corrected(self._from + self._chunk))
         hand_over(self._events, emit)
@@ -240,7 +242,9 @@ class MotionCorrection(StatefulBase):
         chunk = self._recorded.chunk(self._from, stop, end)
         self._from = stop
         self._recorded.drop(stop - self._lead)
-        return self._correct(tracked, chunk) if len(tracked) else tracked
+        if not len(tracked):
+            return tracked
+        return self._correct(tracked, chunk.at_rows(self.settings.lines, tracked.sample))
 
     def _correct(self, tracked: Responses, chunk: Chunk) -> Responses:
         def replay(model: MovingModel) -> Replayed:
@@ -267,9 +271,8 @@ class MotionCorrection(StatefulBase):
         scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
         if not aside:
             self._ripple.take(left, chunk, now.model)
-        torque = chunk.torque(self.settings.lines, tracked.sample)
         with np.errstate(invalid="ignore", divide="ignore"):
-            ripple = np.abs(value) * np.sqrt(self._ripple.power(chunk, tracked.sample)) / torque
+            ripple = np.abs(value) * np.sqrt(self._ripple.power(chunk, tracked.sample)) / chunk.torque
         return replace(
             tracked,
             value=np.where(valid, value, complex(np.nan, np.nan)),

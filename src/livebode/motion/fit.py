@@ -12,6 +12,7 @@ from livebode.core import FitError
 from livebode.fitting import two_masses
 from livebode.fitting.least_squares import minimise
 from livebode.fitting.windows import scan
+from livebode.kernel import BeltGrid, BeltRows, BeltSplines, belt_together
 from livebode.motion.model import MovingModel, PositionCurve, basis
 
 Floats = NDArray[np.float64]
@@ -102,34 +103,21 @@ class MotionFitOptions:
         low, high = model.low_m, model.high_m
         known = self._unknowns(model)
         free = slice(2 if masses_known else 0, None if self.delayed and not masses_known else -1)
-        design = self._design(rows.position_m, low, high)
+        grid = BeltGrid.of(self.z, self.rate_hz)
+        measured = BeltRows(rows.value, rows.weight)
+        splines = BeltSplines(
+            *(basis(rows.position_m, low, high, n) for n in (self.stiffness_splines, self.damping_splines))
+        )
         pull = _SMOOTH * self._smoothness(rows)
 
         def normal(unknowns: Floats) -> tuple[Floats, Floats, Floats]:
             known[free] = unknowns[0]
-            parameters, late = design @ known, self.z ** -known[-1]
-            value = late * two_masses.sampled(parameters, self.z, self.rate_hz)
-            residual = (rows.weight * (value - rows.value)).ravel()
-            slope = late[:, np.newaxis] * two_masses.slopes(parameters, self.z, self.rate_hz) @ design
-            slope[..., -1] = -np.log(self.z) * value
-            left = (rows.weight[..., np.newaxis] * slope[..., free]).reshape(residual.size, -1)
-            matrix = (left.conj().T @ left).real + pull[free, free]
-            gradient = (left.conj().T @ residual).real + (pull @ known)[free]
-            cost = np.sum(np.abs(residual) ** 2) + known @ pull @ known
-            return np.atleast_1d(cost), gradient[np.newaxis], matrix[np.newaxis]
+            cost, gradient, matrix = belt_together(grid, measured, splines, known)
+            gradient, matrix = gradient + pull @ known, matrix + pull
+            return cost + known @ pull @ known, gradient[:, free], matrix[:, free, free]
 
         known[free] = minimise(normal, known[free][np.newaxis].copy())[0][0]
         return self._model(known, low, high)
-
-    def _design(self, position_m: Floats, low: float, high: float) -> Floats:
-        """From the unknowns to the four logarithms of each row, shape (rows, 4, unknowns)."""
-        stiffness = basis(position_m, low, high, self.stiffness_splines)
-        damping = basis(position_m, low, high, self.damping_splines)
-        design = np.zeros((position_m.size, 4, 3 + self.stiffness_splines + self.damping_splines))
-        design[:, 0, 0] = design[:, 1, 1] = 1.0
-        design[:, 2, 2 : 2 + self.stiffness_splines] = stiffness
-        design[:, 3, 2 + self.stiffness_splines : -1] = damping
-        return design
 
     def _smoothness(self, rows: WeightedResponses) -> Floats:
         n, k = 2 + self.stiffness_splines + self.damping_splines, 2 + self.stiffness_splines

@@ -104,7 +104,7 @@ class Learner(StatefulBase):
             model = fit.follow(self.model, float(at.min()), float(at.max()))
             best = self._refined(fit, replay(model), tracked, rows, chunk, replay, max(self._passes - 2, 1))
         if best is None or best[1] > _WORSE * self._misfit:
-            raw = WeightedResponses(tracked.value[rows], chunk.torque(self._settings.lines, tracked.sample[rows]), at)
+            raw = WeightedResponses(tracked.value[rows], chunk.torque[rows], at)
             first = fit.refine(raw, fit.start(raw))
             if self._sound(first):
                 anew = self._refined(fit, replay(first), tracked, rows, chunk, replay, self._passes - 1)
@@ -146,7 +146,7 @@ class Learner(StatefulBase):
 
     def _rows(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> WeightedResponses:
         # The error of a response is n/|U|: white noise on y divided by the torque at the line.
-        weight = chunk.torque(self._settings.lines, tracked.sample[used])
+        weight = chunk.torque[used]
         value = np.where(np.isfinite(now.value[used]), now.value[used], tracked.value[used])
         return WeightedResponses(value, weight, tracked.schedule[used])
 

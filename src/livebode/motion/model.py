@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline
+
+from livebode.kernel import CurveShape, curve_at, curve_splines
 
 Floats = NDArray[np.float64]
 
@@ -39,10 +40,9 @@ class PositionCurve:
         if len(self.weights) == 1:
             return np.full(at.shape, self.weights[0])
         knots, slope, reach = _knots(self.low, self.high, len(self.weights))
-        value = BSpline(knots, self.weights, _DEGREE)(at.clip(self.low, self.high))
-        before, beyond = (at - self.low).clip(-reach, 0.0), (at - self.high).clip(0.0, reach)
         rise, fall = slope * (self.weights[1] - self.weights[0]), slope * (self.weights[-1] - self.weights[-2])
-        return np.asarray(value + before * rise + beyond * fall)
+        shape = CurveShape(knots, self.weights, reach, float(rise), float(fall))
+        return curve_at(shape, np.ascontiguousarray(at.ravel())).reshape(at.shape)
 
 
 def _knots(low: float, high: float, splines: int) -> tuple[Floats, float, float]:
@@ -57,7 +57,7 @@ def basis(position_m: Floats, low: float, high: float, splines: int) -> Floats:
     if splines == 1:
         return np.ones((position_m.size, 1))
     knots, rise, reach = _knots(low, high, splines)
-    value = np.asarray(BSpline.design_matrix(position_m.clip(low, high), knots, _DEGREE).toarray())
+    value = curve_splines(knots, np.ascontiguousarray(position_m))
     slope = rise * np.array([-1.0, 1.0])
     value[:, :2] += np.outer((position_m - low).clip(-reach, 0.0), slope)
     value[:, -2:] += np.outer((position_m - high).clip(0.0, reach), slope)

@@ -123,11 +123,14 @@ class OrderSpectrum(StatefulBase):
     def found(self) -> Floats:
         """Orders in cycles a metre, the strongest first, at most eight."""
         enough = self._count >= _STROKES_MIN
+        if not enough.any():
+            return np.zeros(0)
         strength = np.where(enough, self._whole / np.maximum(self._count, 1), 0.0)
         mean = np.where(enough, self._sum / np.maximum(self._count, 1), 1.0)
         # Components that move with the speed, such as an eccentric pulley's sidebands, raise whole ranges.
         around = np.maximum(median_filter(mean, 2 * _FLOOR * _PADDED + 1), 1.0)
-        chance = np.where(enough, gamma.logsf(self._sum / around, np.maximum(self._count, 1)), 0.0)
+        chance = np.zeros(self._sum.size)
+        chance[enough] = gamma.logsf(self._sum[enough] / around[enough], self._count[enough])
         limit = np.log(_FALSE / max(np.count_nonzero(enough) / _PADDED, 1))
         orders, apart = list[float](), round(_APART * _PADDED)
         left = chance < limit

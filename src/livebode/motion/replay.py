@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import SimulationError
+from livebode.kernel import BeltCourse, BeltMasses, belt_replay
 from livebode.motion.model import MovingModel
 from livebode.simulation._axis import Engine
 from livebode.simulation._axis import late as _late
 from livebode.simulation.configuration import BeltAxis, engine_settings
 from livebode.simulation.mechanics import Mechanics
 from livebode.simulation.motion import Standstill
-from livebode.simulation.open_belt import Pair, open_belt
 from livebode.simulation.settings import Drive
 
 Floats = NDArray[np.float64]
@@ -31,10 +31,17 @@ def by_torque(model: MovingModel, rate_hz: float, u: Floats, position_m: Floats)
     Torque of any origin (excitation, motion, the controllers' response to noise) moves the model as it moved the
     machine. Effects that are not in u or not in the model, such as friction, make it drift slowly; see `without_drift`.
     """
-    pair, radius_m = Pair(model.inertia_kg_m2, model.load_kg), model.radius_m
-    stiffness, damping = model.stiffness_at(position_m), model.damping_at(position_m)
-    motor, cart = open_belt([pair], u, stiffness, damping, rate_hz=rate_hz, radius_m=radius_m)
-    return late(motor[0], model.delay_s * rate_hz), cart[0]
+    masses = BeltMasses(model.inertia_kg_m2, model.load_kg, model.radius_m)
+    course = BeltCourse(rate_hz, model.stiffness_at(position_m), model.damping_at(position_m), np.ascontiguousarray(u))
+    motor, cart = belt_replay(masses, course)
+    if not np.isfinite(cart[-1]):  # what is not finite remains so until the end
+        raise SimulationError(
+            "diverged",
+            "the fitted model diverges under the measured torque",
+            "check the signals and their units, and the radius",
+            sample=int(np.argmin(np.isfinite(cart))),
+        )
+    return late(motor, model.delay_s * rate_hz), cart
 
 
 def by_excitation(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats]:

@@ -75,7 +75,7 @@ class StandstillDetector(StatefulBase):
         """
         rows = np.flatnonzero(tracked.valid.all(axis=1))
         rows = rows[np.unique(tracked.sample[rows] // max(self._window // 4, 1), return_index=True)[1]]
-        torque = chunk.torque(self._settings.lines, tracked.sample[rows])
+        torque = chunk.torque[rows]
         rest = np.sum(np.abs(seen.value[rows] * torque) ** 2, axis=1)
         output = np.sum(np.abs(tracked.value[rows] * torque) ** 2, axis=1)
         newest = tracked.sample[rows]
