@@ -31,11 +31,12 @@ class ChangeRequest:
 
     def request(self, control: RunControl) -> None:
         """Send the request; the event goes to the current record."""
-        control.report(_KIND, self.event.message, **self.event.details)
         if self.record is not None:
             control.limit_record(self.record)
         if self.pipeline is not None:
-            control.change(self.pipeline)
+            control.change(self.pipeline, self.event)
+        else:
+            control.report(_KIND, self.event.message, **self.event.details)
 
 
 def change_of(old: Axis, new: Axis, source: LiveSource | None) -> ChangeRequest | None:

@@ -65,9 +65,13 @@ class RunControl:
         with self._lock:
             self._record_section = section
 
-    def change(self, pipeline: Pipeline) -> None:
-        """Finish the run after the present Block, and continue in another one; the newest request is used."""
-        with self._lock:
+    def change(self, pipeline: Pipeline, event: Event) -> None:
+        """Finish the run after the present Block, with this event at its end, and continue in another one.
+
+        The newest request is used.
+        """
+        with self._lock:  # at once: a Block between the two would follow the event
+            self._messages.append((event.kind, event.message, dict(event.details)))
             self._next = pipeline
 
     @property

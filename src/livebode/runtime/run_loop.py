@@ -35,6 +35,7 @@ from livebode.runtime.run_counts import RunCounts
 from livebode.runtime.sender_numbers import SenderNumbers
 from livebode.runtime.shedding import LoadShedding
 from livebode.runtime.stream import Stream
+from livebode.runtime.turns import Turn
 from livebode.runtime.whole_record import WholeRecord
 from livebode.sources.live import LiveBlock, LiveSource
 
@@ -124,8 +125,9 @@ class RunLoop:
         self._live = isinstance(source, LiveSource)
         self._shedding = LoadShedding(source, lambda: self._control.ended) if isinstance(source, LiveSource) else None
         self._follower, settings = pipeline.follower, pipeline.follower.settings
+        self._turn = Turn()
         self._blocks: Iterator[Block | None] = (
-            source.stream(pipeline.channels)
+            source.stream(pipeline.channels, self._turn.begin)
             if isinstance(source, LiveSource)
             else source.blocks(pipeline.channels, **delivery)
         )
@@ -163,14 +165,16 @@ class RunLoop:
     def follow(self) -> None:
         """Process every Block until the source ends or another configuration follows; SignalError if there is none."""
         self._begin()
-        for block in self._numbered():
-            if block is None:
-                self._report_in_silence()
-            else:
-                for piece in self._recorder.pieces(block):
-                    self._process(piece)
-            if self._control.changing:
-                break
+        with self._turn:
+            for block in self._numbered():
+                if block is None:
+                    self._report_in_silence()
+                else:
+                    for piece in self._recorder.pieces(block):
+                        self._process(piece)
+                self._turn.end()
+                if self._control.changing:
+                    break
         self._recorder.commit_last()
         if not self._counts.stop:
             raise SignalError("empty", "the recording has no samples", "choose another one")
@@ -185,6 +189,7 @@ class RunLoop:
         self._report_events()
         self._stream.announce(TrackerResults(block, self._follower.counts["samples"], self.source.samples))
         self._check_signals(block, ready)  # it examines seconds of samples at a time, and no result waits for it
+        self._turn.end()  # a commit waits for the disk
         self._recorder.commit(block)
 
     def _numbered(self) -> Iterator[Block | None]:

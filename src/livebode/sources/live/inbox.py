@@ -72,6 +72,12 @@ class Inbox:
         self._seconds = self._seconds + sign * _seconds(batch) if self._batches else 0.0  # no rounding error remains
         self._changed.notify_all()
 
+    def wait(self, timeout_s: float) -> bool:
+        """Whether a batch waits, or arrived in time."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or self._batches, timeout_s)
+            return bool(self._batches)
+
     def get(self, timeout_s: float) -> AnyBatch | None:
         """The oldest batch; None if none arrived in time or the queue is closed."""
         with self._changed:

@@ -21,6 +21,7 @@ from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
 from livebode.sources.live.inbox import Inbox
+from livebode.sources.live.joined import joined
 from livebode.sources.live.pauses import Pauses
 from livebode.sources.live.position import Position
 from livebode.sources.live.sequencer import Sequencer
@@ -31,6 +32,8 @@ from livebode.sources.live.unconfirmed import CONFIRMED
 
 TICK_S = 0.1
 """Longest time until a request to end is detected."""
+TOGETHER_S = 0.25
+"""Longest machine time that is taken from the queue at once: what waits is cheaper together than batch by batch."""
 
 
 class LiveSource(ABC):
@@ -198,8 +201,14 @@ class LiveSource(ABC):
         """
         return (block for block in self.stream(channels) if block is not None)
 
-    def stream(self, channels: Sequence[str] | None = None) -> Iterator[LiveBlock | None]:
-        """The same, and None at least ten times a second while the machine sends nothing."""
+    def stream(
+        self, channels: Sequence[str] | None = None, turn: Callable[[], None] = lambda: None
+    ) -> Iterator[LiveBlock | None]:
+        """The same, and None at least ten times a second while the machine sends nothing.
+
+        `turn` is called, and may wait, before batches are taken from the queue: what arrives meanwhile is in the same
+        Block.
+        """
         names = [channel.name for channel in self.channels]
         for name in channels or ():
             if name not in names:
@@ -207,8 +216,8 @@ class LiveSource(ABC):
         rows = [names.index(name) for name in (names if channels is None else channels)]
         labels = tuple(self.channels[row] for row in rows)
         if rows == list(range(len(names))):
-            return self._stream()
-        return (None if block is None else _rows(block, rows, labels) for block in self._stream())
+            return self._stream(turn)
+        return (None if block is None else _rows(block, rows, labels) for block in self._stream(turn))
 
     def take_events(self) -> list[Event]:
         """Events since the last call, of the kinds in `livebode.sources.live.KINDS`."""
@@ -231,14 +240,18 @@ class LiveSource(ABC):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _stream(self) -> Iterator[LiveBlock | None]:
+    def _stream(self, turn: Callable[[], None]) -> Iterator[LiveBlock | None]:
         while self._ready or not self._inbox.ended:
             if self._ready:
                 yield self._ready.popleft()
-            else:
-                self._take(TICK_S)
-                if not self._ready:
-                    yield None
+                continue
+            if self._inbox.wait(TICK_S):
+                turn()
+            self._take(0.0)
+            if self.paced and not self.waits:
+                self._take_waiting()
+            if not self._ready:
+                yield None
         yield from self._sequencer.finish()
         self._raise_failure()
 
@@ -248,6 +261,15 @@ class LiveSource(ABC):
             self._ready += self._sequencer.poll(time.monotonic())
         else:
             self._ready += self._sequencer.push(batch)
+
+    def _take_waiting(self) -> None:
+        """Take what else waits, and join the Blocks that follow each other."""
+        while self._ready and self._ready[-1].stop - self._ready[0].start < TOGETHER_S * self.rate_hz:
+            batch = self._inbox.get(0.0)
+            if batch is None:
+                break
+            self._ready += self._sequencer.push(batch)
+        self._ready = deque(joined(list(self._ready)))
 
     def _check_kinds(self) -> None:
         """SourceError if a kind is declared for a channel that the stream does not have."""

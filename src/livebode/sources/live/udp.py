@@ -8,11 +8,13 @@ from typing import ClassVar
 
 from livebode.core import ConfigError, LivebodeError
 from livebode.sources.live.address import Address
+from livebode.sources.live.datagrams import receiver
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.settings import SourceSettings
-from livebode.sources.live.source import TICK_S, LiveSource
+from livebode.sources.live.source import LiveSource
 
-_DATAGRAM_BYTES_MAX = 65535
+_CHECK_S = 1.0
+"""Interval of checks of a port that failed."""
 BUFFER_BYTES = 4 << 20
 """Asked of the system; it may grant less (`livebode doctor` reports it)."""
 
@@ -25,6 +27,7 @@ class UdpSource(LiveSource):
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         super().__init__(settings, address)
+        self._decoder = FrameDecoder()
         try:
             self._sender = None if settings.sender is None else plain_address(settings.sender)
         except ValueError:
@@ -37,30 +40,30 @@ class UdpSource(LiveSource):
             ) from None
 
     def _receive(self) -> bool:
-        decoder, sender = FrameDecoder(), self._sender
         family = socket.AF_INET6 if ":" in self.address.host else socket.AF_INET
         with socket.socket(family, socket.SOCK_DGRAM) as port:
             port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
             port.bind((self.address.host, self.address.port))
-            port.settimeout(TICK_S)
             self._established()
-            while not self._stop.is_set():
-                try:
-                    datagram, (host, *_) = port.recvfrom(_DATAGRAM_BYTES_MAX)
-                except TimeoutError:
-                    continue
-                if sender is not None and (other := plain_address(host)) != sender:
-                    self._events.report("foreign", f"a datagram from {other} was dropped; source.sender is {sender}")
-                    self._trouble = f"datagrams come from {other}, and source.sender is {sender}"
-                    continue
-                try:
-                    batch = decoder.decode(datagram)
-                except LivebodeError as error:
-                    self._malformed(error)
-                    continue
-                if batch is not None:
-                    self._deliver(batch)
+            self._decoder = FrameDecoder()
+            with receiver().receiving(port, self._take_datagram) as check:
+                while not self._stop.wait(_CHECK_S):
+                    check()
         return False
+
+    def _take_datagram(self, datagram: bytes, host: str) -> None:
+        sender = self._sender
+        if sender is not None and (other := plain_address(host)) != sender:
+            self._events.report("foreign", f"a datagram from {other} was dropped; source.sender is {sender}")
+            self._trouble = f"datagrams come from {other}, and source.sender is {sender}"
+            return
+        try:
+            batch = self._decoder.decode(datagram)
+        except LivebodeError as error:
+            self._malformed(error)
+            return
+        if batch is not None:
+            self._deliver(batch)
 
 
 def plain_address(host: str) -> IPv4Address | IPv6Address:
