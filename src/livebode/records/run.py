@@ -282,6 +282,15 @@ class RunRecord:
             raise _unreadable(self.path, error) from None
         return {name: files for name, files in found.items() if files.paths or files.rows}
 
+    def parts(self) -> tuple[list[Segment], reading.Rows] | None:
+        """The closed segments of all tables, by age, and later rows of each; None of a run in one piece."""
+        try:
+            if reading.in_segments(self.path):
+                return reading.parts(self.path, self.report, finished=self.finished)
+        except (OSError, pa.ArrowException) as error:
+            raise _unreadable(self.path, error) from None
+        return None
+
     def events(self) -> list[Event]:
         """Recorded events; each damaged line is replaced by an event of kind "record-damaged".
 

@@ -16,17 +16,18 @@ from livebode.records.segments import journal
 from livebode.records.segments.damage import Damage, event_of
 from livebode.records.segments.journal import Journal
 from livebode.records.segments.json_lines import in_line, to_line
-from livebode.records.versions import check_version, format_of
+from livebode.records.versions import VERSIONS, check_version, format_of
 
 NAME = "manifest.jsonl"
 TABLES = ("responses", "parameters", "samples")
 _SHA256 = re.compile("[0-9a-f]{64}")
+_NUMBERS = re.compile(r"[a-z0-9_]+/(\d{6,9})(?:-(\d{6,9}))?\.parquet")
 _COUNTS = ("rows", "first_sample", "last_sample", "size_bytes")
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A closed segment: one table's rows from one journal, as a Parquet file.
+    """A closed segment: one table's rows from one journal, or from several that were merged, as a Parquet file.
 
     `name` is its path in the run's directory; `first_s` and `last_s` are the times of its first and last row.
     """
@@ -41,14 +42,21 @@ class Segment:
     size_bytes: int
     sha256: str
 
+    @property
+    def numbers(self) -> tuple[int, int]:
+        """The first and the last journal that its rows can be from."""
+        found = _NUMBERS.fullmatch(self.name)
+        assert found is not None
+        return int(found[1]), int(found[2] or found[1])
+
     @classmethod
-    def of(cls, number: int, values: Mapping[str, Any]) -> Segment:
-        """The segment in a line; ValueError if a run cannot have written it."""
+    def of(cls, first: int, last: int, values: Mapping[str, Any]) -> Segment:
+        """The segment of these journals in a line; ValueError if a run cannot have written it."""
         found = cls(**values)
         numbers = [*(getattr(found, name) for name in _COUNTS), found.first_s, found.last_s]
         sound = (
             found.table in TABLES
-            and found.name == name_of(found.table, number)
+            and found.name == name_of(found.table, first, last)
             and all(type(value) is int for value in numbers[:4])
             and all(type(value) in (int, float) and math.isfinite(value) for value in numbers)
             and _SHA256.fullmatch(found.sha256)
@@ -87,20 +95,22 @@ class Retained:
 class Manifest:
     """Content of manifest.jsonl.
 
-    `segments` are the recorded ones, by age, `gone` those removed for the budget, `closed` the numbers of the journals
-    that they are from, `retained` the damaged journals. `length` is that of its complete lines, `torn` the bytes after
-    them, and `broken` the numbers of the damaged lines.
+    `segments` are the recorded ones, by age, `gone` those removed for the budget or merged, `closed` the numbers of the
+    journals that they are from, `retained` the damaged journals. `merged` has, for the name of a segment that was merged,
+    the new segment and the number of its rows before those of the old one. `version` is that of the file, `length` that of
+    its complete lines, `torn` the bytes after them, and `broken` the numbers of the damaged lines.
     """
 
     segments: list[Segment] = field(default_factory=list)
     gone: list[Segment] = field(default_factory=list)
     closed: set[int] = field(default_factory=set)
     retained: list[Retained] = field(default_factory=list)
+    merged: dict[str, tuple[Segment, int]] = field(default_factory=dict)
+    version: int = VERSIONS["manifest"]
     length: int = 0
     torn: bytes = b""
     broken: list[int] = field(default_factory=list)
     _removed: set[str] = field(default_factory=set)
-    _version: int = 1
 
     @classmethod
     def read(cls, run: Path) -> Manifest:
@@ -112,10 +122,17 @@ class Manifest:
             if line != before:  # each is written twice
                 found._take(line, number)
             before = line
-        check_version(run / NAME, "manifest", found._version)
-        found.gone = [segment for segment in found.segments if segment.name in found._removed]
+        check_version(run / NAME, "manifest", found.version)
+        found.gone += [segment for segment in found.segments if segment.name in found._removed]
         found.segments = [segment for segment in found.segments if segment.name not in found._removed]
         return found
+
+    def place(self, name: str) -> tuple[Segment, int] | None:
+        """The segment that has the rows of a merged one now, and the number of its rows before them."""
+        before, found = 0, None
+        while (step := self.merged.get(name)) is not None:
+            found, name, before = step[0], step[0].name, before + step[1]
+        return None if found is None or found.name in self._removed else (found, before)
 
     def _take(self, line: bytes, number: int) -> None:
         for value in in_line(line):
@@ -129,20 +146,39 @@ class Manifest:
 
     def _add(self, value: Mapping[str, Any]) -> None:
         if "format" in value:
-            self._version = int(value["version"])
+            self.version = int(value["version"])
             return
         if "removed" in value:
             self._removed |= set(value["removed"])
             return
+        if "merged" in value:
+            self._merge(value["merged"], value["segment"])
+            return
         number = value["closed"]
         if type(number) is not int or not 0 < number < 10**9:
             raise ValueError
-        segments = [Segment.of(number, segment) for segment in value["segments"]]
+        segments = [Segment.of(number, number, segment) for segment in value["segments"]]
         retained = [Retained.of(number, value["retained"])] if "retained" in value else []
         if number not in self.closed:
             self.closed.add(number)
             self.segments += segments
             self.retained += retained
+
+    def _merge(self, names: Sequence[str], values: Mapping[str, Any]) -> None:
+        at = {segment.name: number for number, segment in enumerate(self.segments)}
+        parts = [self.segments[at[name]] for name in names]
+        segment = Segment.of(parts[0].numbers[0], parts[-1].numbers[1], values)
+        if len(parts) < 2 or {part.table for part in parts} != {segment.table}:
+            raise ValueError
+        before = 0
+        for part in parts:
+            self.merged[part.name] = segment, before
+            before += part.rows
+        if before != segment.rows:
+            raise ValueError
+        self.segments[at[names[0]]] = segment
+        self.gone += parts
+        self.segments = [one for one in self.segments if one.name not in self.merged]
 
     @property
     def missing(self) -> list[tuple[int, int]]:
@@ -165,9 +201,13 @@ class Manifest:
             )
 
 
-def name_of(table: str, number: int) -> str:
-    """Path of the file of a table's rows from a journal, in the run's directory."""
-    return f"{table}/{number:06d}.parquet"
+def name_of(table: str, first: int, last: int) -> str:
+    """Path of the file of a table's rows from one journal, or from the first to the last one, in the run's directory.
+
+    >>> name_of("responses", 7, 7), name_of("responses", 1, 32)
+    ('responses/000007.parquet', 'responses/000001-000032.parquet')
+    """
+    return f"{table}/{first:06d}.parquet" if first == last else f"{table}/{first:06d}-{last:06d}.parquet"
 
 
 def first_line() -> bytes:
@@ -182,6 +222,11 @@ def closing_line(number: int, segments: Iterable[Segment], retained: Retained | 
         places = [place.to_json() for place in retained.damages]
         line["retained"] = {"size_bytes": retained.size_bytes, "places": places}
     return to_line(line) * 2
+
+
+def merge_line(parts: Iterable[Segment], segment: Segment) -> bytes:
+    """Line: the rows of these segments are now in another one; written twice, because it is the only reference."""
+    return to_line({"merged": [part.name for part in parts], "segment": asdict(segment)}) * 2
 
 
 def removal_line(segments: Iterable[Segment]) -> bytes:

@@ -15,7 +15,7 @@ from livebode.records.segments import journal
 from livebode.records.segments.damage import KIND, event_of
 from livebode.records.segments.journal import Journal, last_commit
 from livebode.records.segments.manifest import NAME, Manifest, Segment
-from livebode.records.segments.segment_file import open_segment
+from livebode.records.segments.segment_file import segment_content
 
 _ROWS = 1 << 14
 Report = Callable[[Event], None]
@@ -106,10 +106,19 @@ def _joined(run: Path, segments: list[Segment], report: Report) -> Iterator[pa.T
 
 def whole(run: Path, segment: Segment, report: Report) -> pq.ParquetFile | None:
     """The file of a segment; None if it is damaged, which is reported, or was removed to meet the budget."""
+    data = content(run, segment, report)
+    return None if data is None else pq.ParquetFile(pa.BufferReader(data))
+
+
+def content(run: Path, segment: Segment, report: Report) -> bytes | None:
+    """The bytes of the file; of a segment that was merged in the meantime the same rows as a file."""
     try:
-        return open_segment(run, segment)
+        return segment_content(run, segment)
     except FileNotFoundError:
-        if segment not in Manifest.read(run).segments:
+        now = Manifest.read(run)
+        if (place := now.place(segment.name)) is not None:
+            return _part(run, segment, *place, report)
+        if segment not in now.segments:
             return None  # it was removed in the meantime
         why = "the file is missing"
     except RecordError as error:
@@ -124,6 +133,14 @@ def whole(run: Path, segment: Segment, report: Report) -> pq.ParquetFile | None:
     message = f"{segment.name} is damaged: {why}; {lost} ({details['seconds']:.4g} s) are not read"
     report(Event(KIND, segment.first_sample, segment.first_s, message, details))
     return None
+
+
+def _part(run: Path, segment: Segment, merged: Segment, before: int, report: Report) -> bytes | None:
+    if (file := whole(run, merged, report)) is None:
+        return None
+    sink = pa.BufferOutputStream()
+    pq.write_table(file.read(use_threads=False).slice(before, segment.rows), sink)
+    return sink.getvalue().to_pybytes()
 
 
 def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:

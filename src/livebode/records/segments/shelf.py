@@ -18,7 +18,9 @@ from livebode.records.inside import check_folder, is_folder
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.manifest import Manifest, Retained, Segment
+from livebode.records.segments.merging import groups_to_merge, rows_to_merge, unlisted
 from livebode.records.table_file import ColumnTable
+from livebode.records.versions import VERSIONS
 
 FIRST_TO_GO = "samples"
 _logger = logging.getLogger(__name__)
@@ -47,6 +49,7 @@ class Shelf:
         self._file = AppendFile(run, manifest.NAME, found.length)
         self._segments = list(found.segments)
         self._retained = list(found.retained)
+        self._version = found.version
         self._sealed = list(sealed)
         self._unwanted: list[str] = []
 
@@ -97,6 +100,37 @@ class Shelf:
             self.discard(*(segment.name for segment in gone))
         return gone
 
+    def merge(self, bytes_max: int) -> None:
+        """Merge one group of small consecutive segments into one of at most `bytes_max`, if there is such a group.
+
+        Each closed journal adds a segment and each merge removes 31, so that one for each is enough, and short.
+
+        The same steps as elsewhere: the new file, its line, and only then the removal of the old files. A group with a
+        damaged file remains as it is.
+
+        Raises
+        ------
+        OSError
+            If the disk fails; the segments are then as before, or merged.
+        """
+        for parts in groups_to_merge(self._segments, bytes_max):
+            if (rows := rows_to_merge(self._run, parts)) is not None:
+                self._replace(parts, rows)
+                return
+
+    def _replace(self, parts: list[Segment], rows: pa.Table) -> None:
+        name = manifest.name_of(parts[0].table, parts[0].numbers[0], parts[-1].numbers[1])
+        segment = self._put(name, parts[0].table, rows)
+        lines = manifest.merge_line(parts, segment)
+        if self._version < VERSIONS["manifest"]:
+            lines = manifest.first_line() + lines
+        self._file.append_synced(lines)
+        self._version = VERSIONS["manifest"]
+        self._segments[self._segments.index(parts[0])] = segment
+        self._segments = [one for one in self._segments if one not in parts]
+        _logger.info("%s: %d segments merged into %s", self._run, len(parts), segment.name)
+        self.discard(*(part.name for part in parts))
+
     def discard(self, *names: str) -> None:
         """Remove files without an entry; those that cannot be removed now are tried again next time."""
         self._unwanted = [name for name in (*self._unwanted, *names) if not _removed(self._run, name)]
@@ -107,7 +141,10 @@ class Shelf:
 
     def _turn(self, number: int) -> None:
         read = journal.read_sealed(self._run, number)
-        segments = [self._put(number, table, pa.Table.from_batches(batches)) for table, batches in read.rows.items()]
+        segments = [
+            self._put(manifest.name_of(table, number, number), table, pa.Table.from_batches(batches))
+            for table, batches in read.rows.items()
+        ]
         retained = Retained.of_journal(self._run, number, read)
         self._file.append_synced(manifest.closing_line(number, segments, retained))
         self._segments += segments
@@ -120,7 +157,7 @@ class Shelf:
             with contextlib.suppress(OSError):  # it is then done when the run is continued
                 journal.set_aside(self._run, number)
 
-    def _put(self, number: int, table: str, rows: pa.Table) -> Segment:
+    def _put(self, name: str, table: str, rows: pa.Table) -> Segment:
         folder = self._run / table
         if not is_folder(folder):
             os.mkdir(folder)
@@ -128,7 +165,6 @@ class Shelf:
         sink = pa.BufferOutputStream()
         pq.write_table(rows, sink, compression="lz4", use_dictionary=list(self._tables[table].repeating))
         data = memoryview(sink.getvalue())
-        name = manifest.name_of(table, number)
         write_whole(self._run / name, data, locked=True)
         sample, time_s = rows["sample"], rows["time_s"]
         return Segment(
@@ -145,12 +181,15 @@ class Shelf:
 
 
 def sweep(run: Path, found: Manifest) -> None:
-    """Remove what a kill left between two steps: segments with a line on their removal, and closed journals.
+    """Remove what a kill left between two steps: segments with a line on their removal or merging, merged ones without
+    a line, and closed journals.
 
     Other remainders of a kill are written again with the same name.
     """
     for segment in found.gone:
         _removed(run, segment.name)
+    for name in unlisted(run, found):
+        _removed(run, name)
     retained = {one.number for one in found.retained}
     for number in journal.numbers(run):
         if number in retained:
