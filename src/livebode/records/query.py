@@ -17,9 +17,10 @@ from livebode.core.installing import not_installed
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, RunRecord
+from livebode.records.segments.manifest import TIERS
 from livebode.records.segments.verified_files import segment_groups
 
-_TABLES = ("responses", "parameters", "samples")
+_TABLES = ("responses", "parameters", "samples", *TIERS)
 _SINGLE_EVENTS = pa.schema(
     [
         ("kind", pa.string()),
@@ -53,7 +54,7 @@ class QueryResult:
 
 
 def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
-    """The first rows of a query on the tables responses, parameters, samples, events and single_events.
+    """The first rows of a query on the tables responses, parameters, samples, events, single_events and the tiers.
 
     Parameters
     ----------

@@ -20,7 +20,8 @@ _SEGMENT = re.compile(r"\d{6,9}(-\d{6,9})?\.parquet|\.\d{6,9}(-\d{6,9})?\.parque
 _JOURNAL = re.compile(r"\d{6,9}\.journal|\.\d{6,9}\.journal\.partial")
 _PICTURE = re.compile(rf"[a-z]+\.png|\.[a-z]+\.png{_PARTIAL}")
 _FOLDERS = {
-    "responses": _SEGMENT, "parameters": _SEGMENT, "samples": _SEGMENT, "open": _JOURNAL, "damaged": _JOURNAL,
+    "responses": _SEGMENT, "parameters": _SEGMENT, "samples": _SEGMENT, "responses_1s": _SEGMENT,
+    "responses_1min": _SEGMENT, "responses_1h": _SEGMENT, "open": _JOURNAL, "damaged": _JOURNAL,
     ".pictures.partial": _PICTURE,
 }  # fmt: skip
 

@@ -19,7 +19,8 @@ from livebode.records.segments.json_lines import in_line, to_line
 from livebode.records.versions import VERSIONS, check_version, format_of
 
 NAME = "manifest.jsonl"
-TABLES = ("responses", "parameters", "samples")
+TIERS = ("responses_1s", "responses_1min", "responses_1h")
+TABLES = ("responses", "parameters", "samples", *TIERS)
 _SHA256 = re.compile("[0-9a-f]{64}")
 _NUMBERS = re.compile(r"[a-z0-9_]+/(\d{6,9})(?:-(\d{6,9}))?\.parquet")
 _COUNTS = ("rows", "first_sample", "last_sample", "size_bytes")
@@ -96,9 +97,9 @@ class Manifest:
     """Content of manifest.jsonl.
 
     `segments` are the recorded ones, by age, `gone` those removed for the budget or merged, `closed` the numbers of the
-    journals that they are from, `retained` the damaged journals. `merged` has, for the name of a segment that was merged,
-    the new segment and the number of its rows before those of the old one. `version` is that of the file, `length` that of
-    its complete lines, `torn` the bytes after them, and `broken` the numbers of the damaged lines.
+    journals that they are from, `retained` the damaged journals. `merged` has, for the name of a segment that was
+    merged, the new segment and the number of its rows before those of the old one. `version` is that of the file,
+    `length` that of its complete lines, `torn` the bytes after them, and `broken` the numbers of the damaged lines.
     """
 
     segments: list[Segment] = field(default_factory=list)

@@ -1,7 +1,8 @@
 """Merging: small segments become larger ones as a run ages, so that a year of them is opened as fast as a day.
 
-32 consecutive segments become one, 32 of those again, and so on up to 16 MiB: each row is written at most three times
-more, and the number of files grows with the logarithm of the length until they have that size.
+16 consecutive segments become one, 16 of those again, and so on up to 4 MiB: a row is written a few times more at most,
+and the number of files grows with the logarithm of the length until they have that size. Larger ones would make reading
+an hour slower: the checksum is that of a whole file.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from livebode.records.inside import is_folder
 from livebode.records.segments.manifest import TABLES, Manifest, Segment
 from livebode.records.segments.segment_file import open_segment
 
-_MERGED_MAX = 16 << 20
+_MERGED_MAX = 4 << 20
 _BUDGET_SHARE = 32  # the budget removes whole segments
-_FAN_IN = 32
+_FAN_IN = 16
+_GROUP_ROWS = 1 << 15
 _MERGED = re.compile(r"\d{6,9}-\d{6,9}\.parquet")
 
 
@@ -29,7 +31,7 @@ def merged_bytes_max(budget_bytes: int | None) -> int:
 
 
 def groups_to_merge(segments: list[Segment], bytes_max: int) -> Iterator[list[Segment]]:
-    """Groups of 32 consecutive segments of a table, of one level, that together have at most this size."""
+    """Groups of 16 consecutive segments of a table, of one level, that together have at most this size."""
     for table in TABLES:
         of_table = [segment for segment in segments if segment.table == table]
         begin = 0
@@ -43,8 +45,8 @@ def groups_to_merge(segments: list[Segment], bytes_max: int) -> Iterator[list[Se
             begin += _FAN_IN
 
 
-def rows_to_merge(run: Path, parts: list[Segment]) -> pa.Table | None:
-    """The rows of these segments; None if one is missing, damaged, or of an earlier version with other columns."""
+def rows_to_merge(run: Path, parts: list[Segment]) -> list[pa.Table] | None:
+    """The rows of each segment; None if one is missing, damaged, or of an earlier version with other columns."""
     tables = []
     for part in parts:
         try:
@@ -53,7 +55,19 @@ def rows_to_merge(run: Path, parts: list[Segment]) -> pa.Table | None:
             return None
         if tables[-1].schema != tables[0].schema:
             return None
-    return pa.concat_tables(tables)
+    return tables
+
+
+def row_groups(tables: list[pa.Table]) -> Iterator[pa.Table]:
+    """The rows in few parts that end with the end of a table, and so with a whole response."""
+    waiting: list[pa.Table] = []
+    for table in tables:
+        waiting.append(table)
+        if sum(one.num_rows for one in waiting) >= _GROUP_ROWS:
+            yield pa.concat_tables(waiting)
+            waiting = []
+    if waiting:
+        yield pa.concat_tables(waiting)
 
 
 def unlisted(run: Path, found: Manifest) -> list[str]:

@@ -84,24 +84,39 @@ def tables(
     segments = [segment for segment in segments if segment.table == table]
     if span_s is not None:
         segments = [segment for segment in segments if segment.first_s <= span_s[1] and segment.last_s >= span_s[0]]
-    yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), report)
+    yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), report, span_s)
     if table in rows:
         yield pa.Table.from_batches(rows[table])
 
 
-def _joined(run: Path, segments: list[Segment], report: Report) -> Iterator[pa.Table]:
+def _joined(
+    run: Path, segments: list[Segment], report: Report, span_s: tuple[float, float] | None
+) -> Iterator[pa.Table]:
     """The rows of segments, small ones combined, because the overhead per part is larger than that of its rows."""
     held: list[pa.Table] = []
     for segment in segments:
         if (file := whole(run, segment, report)) is None:
             continue
         # Without Arrow's threads, which can fail at the end of a short process.
-        held.append(file.read(use_threads=False))
+        held.append(file.read_row_groups(_groups_in(file, span_s), use_threads=False))
         if sum(table.num_rows for table in held) >= _ROWS:
             yield pa.concat_tables(held)
             held = []
     if held:
         yield pa.concat_tables(held)
+
+
+def _groups_in(file: pq.ParquetFile, span_s: tuple[float, float] | None) -> list[int]:
+    """The row groups of a merged segment with rows in this span of time."""
+    about = file.metadata
+    every = list(range(about.num_row_groups))
+    if span_s is None or len(every) == 1:
+        return every
+    time_s = [about.row_group(group).column(about.schema.names.index("time_s")).statistics for group in every]
+    return [
+        group for group, one in zip(every, time_s)
+        if one is None or not one.has_min_max or (one.min <= span_s[1] and one.max >= span_s[0])
+    ]  # fmt: skip
 
 
 def whole(run: Path, segment: Segment, report: Report) -> pq.ParquetFile | None:
@@ -140,7 +155,7 @@ def _part(run: Path, segment: Segment, merged: Segment, before: int, report: Rep
         return None
     sink = pa.BufferOutputStream()
     pq.write_table(file.read(use_threads=False).slice(before, segment.rows), sink)
-    return sink.getvalue().to_pybytes()
+    return bytes(sink.getvalue())
 
 
 def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:

@@ -7,7 +7,7 @@ import errno
 import hashlib
 import logging
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pyarrow as pa
@@ -18,12 +18,17 @@ from livebode.records.inside import check_folder, is_folder
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.manifest import Manifest, Retained, Segment
-from livebode.records.segments.merging import groups_to_merge, rows_to_merge, unlisted
+from livebode.records.segments.merging import groups_to_merge, row_groups, rows_to_merge, unlisted
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
 
 FIRST_TO_GO = "samples"
+Tiers = Callable[[Mapping[str, pa.Table]], Mapping[str, pa.Table]]
 _logger = logging.getLogger(__name__)
+
+
+def no_tiers(_: Mapping[str, pa.Table]) -> Mapping[str, pa.Table]:
+    return {}
 
 
 class Shelf:
@@ -42,10 +47,14 @@ class Shelf:
         Its manifest.
     sealed
         Numbers of journals that are complete and not closed yet.
+    tiers
+        The tables of means of the rows of a journal.
     """
 
-    def __init__(self, run: Path, tables: Mapping[str, ColumnTable], found: Manifest, sealed: list[int]) -> None:
-        self._run, self._tables = run, tables
+    def __init__(
+        self, run: Path, tables: Mapping[str, ColumnTable], found: Manifest, sealed: list[int], tiers: Tiers = no_tiers
+    ) -> None:
+        self._run, self._tables, self._tiers = run, tables, tiers
         self._file = AppendFile(run, manifest.NAME, found.length)
         self._segments = list(found.segments)
         self._retained = list(found.retained)
@@ -85,10 +94,13 @@ class Shelf:
             del self._sealed[0]
 
     def make_room(self, bytes_max: int) -> list[Segment]:
-        """Remove the oldest segments until at most this is used: first those of samples, then all others equally."""
+        """Remove the oldest segments until at most this is used.
+
+        First those of samples, then all others equally, and last the means of old responses, which are small.
+        """
         gone: list[Segment] = []
         excess = self.used_bytes - bytes_max
-        order = sorted(self._segments, key=lambda segment: segment.table != FIRST_TO_GO)
+        order = sorted(self._segments, key=lambda one: (one.table != FIRST_TO_GO) + (one.table in manifest.TIERS))
         for segment in order:
             if excess <= 0:
                 break
@@ -103,7 +115,7 @@ class Shelf:
     def merge(self, bytes_max: int) -> None:
         """Merge one group of small consecutive segments into one of at most `bytes_max`, if there is such a group.
 
-        Each closed journal adds a segment and each merge removes 31, so that one for each is enough, and short.
+        Each closed journal adds a segment and each merge removes 15, so that one for each is enough, and short.
 
         The same steps as elsewhere: the new file, its line, and only then the removal of the old files. A group with a
         damaged file remains as it is.
@@ -118,9 +130,9 @@ class Shelf:
                 self._replace(parts, rows)
                 return
 
-    def _replace(self, parts: list[Segment], rows: pa.Table) -> None:
+    def _replace(self, parts: list[Segment], rows: list[pa.Table]) -> None:
         name = manifest.name_of(parts[0].table, parts[0].numbers[0], parts[-1].numbers[1])
-        segment = self._put(name, parts[0].table, rows)
+        segment = self._put(name, parts[0].table, *row_groups(rows))
         lines = manifest.merge_line(parts, segment)
         if self._version < VERSIONS["manifest"]:
             lines = manifest.first_line() + lines
@@ -141,10 +153,11 @@ class Shelf:
 
     def _turn(self, number: int) -> None:
         read = journal.read_sealed(self._run, number)
+        tables = {table: pa.Table.from_batches(batches) for table, batches in read.rows.items()}
+        tables |= self._tiers(tables)
         segments = [
-            self._put(manifest.name_of(table, number, number), table, pa.Table.from_batches(batches))
-            for table, batches in read.rows.items()
-        ]
+            self._put(manifest.name_of(table, number, number), table, rows) for table, rows in tables.items()
+        ]  # fmt: skip
         retained = Retained.of_journal(self._run, number, read)
         self._file.append_synced(manifest.closing_line(number, segments, retained))
         self._segments += segments
@@ -157,24 +170,27 @@ class Shelf:
             with contextlib.suppress(OSError):  # it is then done when the run is continued
                 journal.set_aside(self._run, number)
 
-    def _put(self, name: str, table: str, rows: pa.Table) -> Segment:
+    def _put(self, name: str, table: str, *groups: pa.Table) -> Segment:
         folder = self._run / table
         if not is_folder(folder):
             os.mkdir(folder)
             sync_directory(self._run)
         sink = pa.BufferOutputStream()
-        pq.write_table(rows, sink, compression="lz4", use_dictionary=list(self._tables[table].repeating))
+        repeating = list(self._tables["responses" if table in manifest.TIERS else table].repeating)
+        with pq.ParquetWriter(sink, groups[0].schema, compression="lz4", use_dictionary=repeating) as file:
+            for group in groups:
+                file.write_table(group, row_group_size=group.num_rows)
         data = memoryview(sink.getvalue())
         write_whole(self._run / name, data, locked=True)
-        sample, time_s = rows["sample"], rows["time_s"]
+        first, last = groups[0], groups[-1]
         return Segment(
             name=name,
             table=table,
-            rows=rows.num_rows,
-            first_sample=sample[0].as_py(),
-            last_sample=sample[-1].as_py(),
-            first_s=time_s[0].as_py(),
-            last_s=time_s[-1].as_py(),
+            rows=sum(group.num_rows for group in groups),
+            first_sample=first["sample"][0].as_py(),
+            last_sample=last["sample"][-1].as_py(),
+            first_s=first["time_s"][0].as_py(),
+            last_s=last["time_s"][-1].as_py(),
             size_bytes=len(data),
             sha256=hashlib.sha256(data).hexdigest(),
         )

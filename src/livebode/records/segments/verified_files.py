@@ -60,7 +60,7 @@ def _within(segment: Segment) -> ds.Expression:
     return of_samples & (time_s >= segment.first_s) & (time_s <= segment.last_s)
 
 
-class _VerifiedFiles(FileSystemHandler):
+class _VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
     """Reads the files of these segments, and nothing else."""
 
     def __init__(self, run: Path, segments: list[Segment], schema: pa.Schema, damages: list[Event]) -> None:
