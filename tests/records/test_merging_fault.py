@@ -22,6 +22,8 @@ RESPONSES = noisy_responses(SECONDS, seed=4)
 @pytest.fixture(autouse=True)
 def _merge_four(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("livebode.records.segments.merging._FAN_IN", 4)
+    monkeypatch.setattr("livebode.records.segments.shelf._LONG_BYTES", 4096)
+    monkeypatch.setattr("livebode.records.segments.shelf._SHORTER", 1.2)
 
 
 def names(run: Path) -> list[str]:

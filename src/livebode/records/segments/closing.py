@@ -61,6 +61,7 @@ class Closing:
     def _merge(self, bytes_max: int | None) -> None:
         try:
             self._shelf.merge(merged_bytes_max(bytes_max))
+            self._shelf.shorten()
         except OSError as error:  # everything is recorded, and merging is tried again when the next journal is closed
             _logger.warning("segments could not be merged: %s", error)
 

@@ -46,9 +46,7 @@ class Segment:
     @property
     def numbers(self) -> tuple[int, int]:
         """The first and the last journal that its rows can be from."""
-        found = _NUMBERS.fullmatch(self.name)
-        assert found is not None
-        return int(found[1]), int(found[2] or found[1])
+        return segment_numbers(self.name)
 
     @classmethod
     def of(cls, first: int, last: int, values: Mapping[str, Any]) -> Segment:
@@ -97,7 +95,7 @@ class Manifest:
     """Content of manifest.jsonl.
 
     `segments` are the recorded ones, by age, `gone` those removed for the budget or merged, `closed` the numbers of the
-    journals that they are from, `retained` the damaged journals. `merged` has, for the name of a segment that was
+    journals that they are from, and `until` one to which all are closed; `retained` the damaged journals. `merged` has, for the name of a segment that was
     merged, the new segment and the number of its rows before those of the old one. `version` is that of the file,
     `length` that of its complete lines, `torn` the bytes after them, and `broken` the numbers of the damaged lines.
     """
@@ -105,6 +103,7 @@ class Manifest:
     segments: list[Segment] = field(default_factory=list)
     gone: list[Segment] = field(default_factory=list)
     closed: set[int] = field(default_factory=set)
+    until: int = 0
     retained: list[Retained] = field(default_factory=list)
     merged: dict[str, tuple[Segment, int]] = field(default_factory=dict)
     version: int = VERSIONS["manifest"]
@@ -127,6 +126,15 @@ class Manifest:
         found.gone += [segment for segment in found.segments if segment.name in found._removed]
         found.segments = [segment for segment in found.segments if segment.name not in found._removed]
         return found
+
+    def is_closed(self, number: int) -> bool:
+        """Whether this journal has become segments."""
+        return number in self.closed or 0 < number <= self.until
+
+    @property
+    def last_closed(self) -> int:
+        """The newest journal that has become segments; 0 before the first."""
+        return max(self.closed, default=self.until)
 
     def place(self, name: str) -> tuple[Segment, int] | None:
         """The segment that has the rows of a merged one now, and the number of its rows before them."""
@@ -152,6 +160,9 @@ class Manifest:
         if "removed" in value:
             self._removed |= set(value["removed"])
             return
+        if "closed_until" in value:
+            self._shorten(value)
+            return
         if "merged" in value:
             self._merge(value["merged"], value["segment"])
             return
@@ -160,10 +171,22 @@ class Manifest:
             raise ValueError
         segments = [Segment.of(number, number, segment) for segment in value["segments"]]
         retained = [Retained.of(number, value["retained"])] if "retained" in value else []
-        if number not in self.closed:
+        if not self.is_closed(number):
             self.closed.add(number)
             self.segments += segments
             self.retained += retained
+
+    def _shorten(self, value: Mapping[str, Any]) -> None:
+        """Take the line that replaces all earlier ones."""
+        until = value["closed_until"]
+        if type(until) is not int or not 0 <= until < 10**9:
+            raise ValueError
+        segments = [Segment.of(*segment_numbers(one["name"]), one) for one in value["segments"]]
+        retained = [Retained.of(int(one["number"]), one) for one in value["retained"]]
+        by_name = {segment.name: segment for segment in segments}
+        for new, name, rows in value["places"]:
+            self.merged[str(name)] = by_name[new], int(rows)
+        self.segments, self.retained, self.until, self.closed = segments, retained, until, set()
 
     def _merge(self, names: Sequence[str], values: Mapping[str, Any]) -> None:
         at = {segment.name: number for number, segment in enumerate(self.segments)}
@@ -184,7 +207,7 @@ class Manifest:
     @property
     def missing(self) -> list[tuple[int, int]]:
         """First and last numbers of closed journals whose line is damaged, so that their segments are not known."""
-        known = [0, *sorted(self.closed)] if self.broken else []
+        known = [self.until, *sorted(self.closed)] if self.broken else []
         return [(a + 1, b - 1) for a, b in pairwise(known) if b > a + 1]
 
     def check(self, run: Path, journals: Sequence[int]) -> None:
@@ -192,7 +215,7 @@ class Manifest:
 
         `journals` are the numbers of the existing ones.
         """
-        if not self.broken and min(journals, default=0) > max(self.closed, default=0) + 1:
+        if not self.broken and min(journals, default=0) > self.last_closed + 1:
             raise RecordError(
                 "damaged",
                 f"{str(run / NAME)!r} is damaged after byte {self.length}",
@@ -211,6 +234,29 @@ def name_of(table: str, first: int, last: int) -> str:
     return f"{table}/{first:06d}.parquet" if first == last else f"{table}/{first:06d}-{last:06d}.parquet"
 
 
+def segment_numbers(name: str) -> tuple[int, int]:
+    """The numbers in `name_of`; ValueError for another name."""
+    found = _NUMBERS.fullmatch(name)
+    if found is None:
+        raise ValueError(f"{name!r} is not the name of a segment")
+    return int(found[1]), int(found[2] or found[1])
+
+
+def short_line(
+    until: int,
+    segments: Iterable[Segment],
+    retained: Iterable[Retained],
+    places: Iterable[tuple[str, str, int]],
+) -> bytes:
+    """Line: all journals up to this number are closed, and these are their segments; it replaces all earlier lines.
+
+    `places` are those of `Manifest.merged` that a reader may still need: new name, old name, number of rows before.
+    """
+    damaged = [{"number": one.number} | _to_json(one) for one in retained]
+    line = {"closed_until": until, "segments": [asdict(segment) for segment in segments]}
+    return to_line(line | {"retained": damaged, "places": list(places)}) * 2
+
+
 def first_line() -> bytes:
     """Line: the format of the file; written twice."""
     return to_line(format_of("manifest")) * 2
@@ -220,9 +266,12 @@ def closing_line(number: int, segments: Iterable[Segment], retained: Retained | 
     """Line: a journal's rows are now in these segments; written twice, because it is the only reference to them."""
     line: dict[str, Any] = {"closed": number, "segments": [asdict(segment) for segment in segments]}
     if retained is not None:
-        places = [place.to_json() for place in retained.damages]
-        line["retained"] = {"size_bytes": retained.size_bytes, "places": places}
+        line["retained"] = _to_json(retained)
     return to_line(line) * 2
+
+
+def _to_json(retained: Retained) -> dict[str, Any]:
+    return {"size_bytes": retained.size_bytes, "places": [place.to_json() for place in retained.damages]}
 
 
 def merge_line(parts: Iterable[Segment], segment: Segment) -> bytes:

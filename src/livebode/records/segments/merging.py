@@ -15,14 +15,14 @@ import pyarrow as pa
 
 from livebode.core import RecordError
 from livebode.records.inside import is_folder
-from livebode.records.segments.manifest import TABLES, Manifest, Segment
+from livebode.records.segments.manifest import TABLES, Manifest, Segment, segment_numbers
 from livebode.records.segments.segment_file import open_segment
 
 _MERGED_MAX = 4 << 20
 _BUDGET_SHARE = 32  # the budget removes whole segments
 _FAN_IN = 16
 _GROUP_ROWS = 1 << 15
-_MERGED = re.compile(r"\d{6,9}-\d{6,9}\.parquet")
+_SEGMENT = re.compile(r"\d{6,9}(-\d{6,9})?\.parquet")
 
 
 def merged_bytes_max(budget_bytes: int | None) -> int:
@@ -71,16 +71,16 @@ def row_groups(tables: list[pa.Table]) -> Iterator[pa.Table]:
 
 
 def unlisted(run: Path, found: Manifest) -> list[str]:
-    """Merged segments that a kill left before their line was written."""
+    """Files that a kill left before their line was written, or after the line on their removal; none if lines of the
+    manifest are damaged, which may have listed them.
+    """
+    if found.broken:
+        return []
     listed = {segment.name for segment in found.segments}
-    names = [
-        f"{table}/{path.name}"
-        for table in TABLES
-        if is_folder(run / table)
-        for path in (run / table).iterdir()
-        if _MERGED.fullmatch(path.name)
-    ]
-    return [name for name in names if name not in listed]
+    folders = [table for table in TABLES if is_folder(run / table)]
+    names = [f"{table}/{path.name}" for table in folders for path in (run / table).iterdir()]
+    names = [name for name in names if name not in listed and _SEGMENT.fullmatch(name.rpartition("/")[2])]
+    return [name for name in names if found.is_closed(segment_numbers(name)[1])]
 
 
 def _level(segment: Segment) -> int:

@@ -41,7 +41,7 @@ def parts(run: Path, report: Report, *, finished: bool) -> tuple[list[Segment], 
     found = Manifest.read(run)
     found.check(run, list(journals))
     _tell_of(found, finished, report)
-    left = [number for number in sorted(journals) if number not in found.closed]
+    left = [number for number in sorted(journals) if not found.is_closed(number)]
     for number in left:
         if places := journals[number].damages:
             report(event_of(journal.name_of(number), places, None))

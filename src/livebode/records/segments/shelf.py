@@ -23,6 +23,8 @@ from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
 
 FIRST_TO_GO = "samples"
+_LONG_BYTES, _SHORTER = 128 << 10, 3
+_PLACES_MAX = 512
 Tiers = Callable[[Mapping[str, pa.Table]], Mapping[str, pa.Table]]
 _logger = logging.getLogger(__name__)
 
@@ -59,6 +61,9 @@ class Shelf:
         self._segments = list(found.segments)
         self._retained = list(found.retained)
         self._version = found.version
+        self._closed, self._sound = found.last_closed, not found.broken
+        places = [(found.place(name), name) for name in found.merged]
+        self._places = [(place[0].name, name, place[1]) for place, name in places if place is not None]
         self._sealed = list(sealed)
         self._unwanted: list[str] = []
 
@@ -130,6 +135,29 @@ class Shelf:
                 self._replace(parts, rows)
                 return
 
+    def shorten(self) -> None:
+        """Write a long manifest again without the lines on segments that were merged or removed since.
+
+        What a reader needs that listed segments before they were merged remains, for the newest 512.
+
+        Raises
+        ------
+        OSError
+            If the disk fails; the manifest is then unchanged.
+        """
+        if self._file.length < _LONG_BYTES or not self._sound:
+            return
+        present = {segment.name for segment in self._segments}
+        self._places = [place for place in self._places[-_PLACES_MAX:] if place[0] in present]
+        line = manifest.short_line(self._closed, self._segments, self._retained, self._places)
+        data = manifest.first_line() + line
+        if self._file.length < _SHORTER * len(data):
+            return
+        write_whole(self._run / manifest.NAME, data, locked=True)
+        before, self._file = self._file, AppendFile(self._run, manifest.NAME)
+        before.close()
+        self._version = VERSIONS["manifest"]
+
     def _replace(self, parts: list[Segment], rows: list[pa.Table]) -> None:
         name = manifest.name_of(parts[0].table, parts[0].numbers[0], parts[-1].numbers[1])
         segment = self._put(name, parts[0].table, *row_groups(rows))
@@ -140,6 +168,14 @@ class Shelf:
         self._version = VERSIONS["manifest"]
         self._segments[self._segments.index(parts[0])] = segment
         self._segments = [one for one in self._segments if one not in parts]
+        before = 0
+        for part in parts:
+            self._places = [
+                (segment.name, name, rows + before) if new == part.name else (new, name, rows)
+                for new, name, rows in self._places
+            ]
+            self._places.append((segment.name, part.name, before))
+            before += part.rows
         _logger.info("%s: %d segments merged into %s", self._run, len(parts), segment.name)
         self.discard(*(part.name for part in parts))
 
@@ -161,6 +197,7 @@ class Shelf:
         retained = Retained.of_journal(self._run, number, read)
         self._file.append_synced(manifest.closing_line(number, segments, retained))
         self._segments += segments
+        self._closed = max(self._closed, number)
         size_bytes = sum(segment.size_bytes for segment in segments)
         _logger.info("%s: journal %d closed: %d segments, %d bytes", self._run, number, len(segments), size_bytes)
         if retained is None:
@@ -210,7 +247,7 @@ def sweep(run: Path, found: Manifest) -> None:
     for number in journal.numbers(run):
         if number in retained:
             journal.set_aside(run, number)
-        elif number in found.closed:
+        elif found.is_closed(number):
             _removed(run, journal.name_of(number))
 
 
