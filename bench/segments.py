@@ -1,9 +1,9 @@
 """A year in one run directory: 5,000 segments of 1 h 45 min, by an accelerated clock.
 
 `python -m bench.segments` records runs of 500 and 5,000 segments, each with 30 responses at the bench's lines. It opens
-each of them, reads and queries an hour, shows it until the first page has answered (view), and computes the trend of the
-middle half of it (half). Each is in a process of its own: wall time, processor time, and the growth of the peak of
-memory, without the start of Python and the imports above; the least of three. The target is 0.5 s, and memory that is
+each of them, reads and queries an hour, shows it until the first page has answered (view), and computes the trend of
+its middle half (half). Each is in a process of its own: wall time, processor time, and growth of the peak of memory,
+without the start of Python and the imports above; the least of three. The target is 0.5 s, and memory that is
 independent of the length. `--segments 500 5000 20000` records others, `--plain` without merging and without means, as
 earlier versions did.
 """

@@ -82,14 +82,14 @@ class Past:
         recorded = self._recorded(from_s, to_s, rows)
         if recorded is None:
             return _thinned(newest if len(newest) else within, rows)
-        behind = newest[np.flatnonzero(newest.time_s > recorded.time_s[-1])]  # of a segment that is being written
+        behind = newest[np.flatnonzero(newest.sample > recorded.sample[-1])]  # of a segment that is being written
         return _thinned(Responses.join([recorded, replace(behind, unit=recorded.unit)]), rows)
 
     def _recorded(self, from_s: float, to_s: float, rows: int) -> Responses | None:
         run = RunRecord.open(self.directory)
         within = [one for one in run.segments if one.table == "responses" and from_s <= one.last_s <= to_s]
         if sum(one.size_bytes for one in within) > _READ_BYTES:
-            means = thinned(run, (to_s - from_s) / rows, (from_s, to_s))
+            means = thinned(run, (to_s - from_s) / max(1, rows - 1), (from_s, to_s))
             if means is not None:
                 return means
         found, number = Overview(), 0

@@ -95,9 +95,10 @@ class Manifest:
     """Content of manifest.jsonl.
 
     `segments` are the recorded ones, by age, `gone` those removed for the budget or merged, `closed` the numbers of the
-    journals that they are from, and `until` one to which all are closed; `retained` the damaged journals. `merged` has, for the name of a segment that was
-    merged, the new segment and the number of its rows before those of the old one. `version` is that of the file,
-    `length` that of its complete lines, `torn` the bytes after them, and `broken` the numbers of the damaged lines.
+    journals that they are from, and `until` one to which all are closed; `retained` the damaged journals. `merged` has,
+    for the name of a segment that was merged, the new segment and the number of its rows before those of the old one.
+    `version` is that of the file, `length` that of its complete lines, `torn` the bytes after them, and `broken` the
+    numbers of the damaged lines.
     """
 
     segments: list[Segment] = field(default_factory=list)
