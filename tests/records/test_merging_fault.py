@@ -12,7 +12,7 @@ import pytest
 from livebode.records import RunRecord
 from livebode.records.query import query
 from livebode.records.segments import reading
-from tests.records.test_every_call_fault import cut, disk_that
+from tests.support.failing_disk import cut, disk_that
 from tests.support.long_runs import noisy_responses, record_long
 
 SECONDS, SEGMENT_S = 40, 2.0

@@ -75,7 +75,7 @@ def binned_means(responses: Responses, bin_s: float) -> BinnedMeans:
     >>> import livebode
     >>> found = binned_means(livebode.example_responses(), 1.0)
     >>> len(found), int(found.responses.sum())
-    (4, 40)
+    (2, 40)
     """
     starts = _starts(responses.time_s, bin_s)
     if not len(starts):
