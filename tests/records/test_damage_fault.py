@@ -22,6 +22,7 @@ from livebode.records.segments.damage import total
 from livebode.records.segments.frames import COMMIT, ROWS, frames, to_frame
 from livebode.records.segments.journal import Commit, Journal, head, name_of, read_sealed
 from livebode.records.segments.json_lines import in_line, to_line
+from livebode.records.segments.manifest import TIERS
 from livebode.records.table_file import ColumnTable
 from tests.support.errors import refused
 from tests.support.recorded import check_beginning, expected, machine, record_machine, same
@@ -250,6 +251,8 @@ def test_a_changed_file_of_a_finished_run_is_reported_and_the_rest_is_read(finis
         warnings.simplefilter("ignore", DamageWarning)
         run = RunRecord.open(other)
         found = run.responses(), run.events(), list(run.tables("samples"))
+        for tier in TIERS:
+            list(run.tables(tier))
     reported = [str(damage.details["file"]) for damage in run.damages]
     assert reported == ([] if name.name == "run-copy.json" else [str(name)] * len(reported))
     assert reported or name.name == "run-copy.json"

@@ -18,7 +18,7 @@ from livebode.records.segments.journal import last_commit
 from livebode.records.segments.json_lines import to_line
 from livebode.records.segments.recovery import recover
 from livebode.records.summary_file import COPY, RUN, read_summary, to_document
-from livebode.records.versions import format_of
+from livebode.records.versions import VERSIONS, format_of
 from tests.support import stored
 from tests.support.errors import refused
 from tests.support.recorded import NAMES
@@ -88,7 +88,7 @@ def test_a_run_of_a_newer_livebode_is_refused_in_one_sentence(name: str, tmp_pat
     run = Path(shutil.copytree(STORED[-1] / "segments", tmp_path / "run"))
     newer(run, name)
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    with refused(RecordError, "newer-version", format=name, found=2, readable=1):
+    with refused(RecordError, "newer-version", format=name, found=VERSIONS[name] + 1, readable=VERSIONS[name]):
         RunRecord.open(run).responses()
     with refused(RecordError, "newer-version", format=name):
         recover(run)
@@ -97,13 +97,13 @@ def test_a_run_of_a_newer_livebode_is_refused_in_one_sentence(name: str, tmp_pat
 
 def newer(run: Path, name: str) -> None:
     """Give this part of the record the next version."""
-    newest = format_of(name) | {"version": 2}
+    newest = format_of(name) | {"version": VERSIONS[name] + 1}
     if name == "run":
         for file in (RUN, COPY):
             (run / file).write_bytes(to_document(read_summary(run)[0] | newest))
     elif name == "manifest":
         file = run / "manifest.jsonl"
-        file.write_bytes(file.read_bytes().replace(to_line(format_of(name)), to_line(newest)))
+        file.write_bytes(file.read_bytes().replace(to_line(format_of(name) | {"version": 1}), to_line(newest)))
     else:
         file = run / "open/000002.journal"
         old, new = (to_frame(FORMAT, json.dumps(text).encode()) for text in (format_of(name), newest))

@@ -12,8 +12,10 @@ from livebode.analysis.overview import Overview
 from livebode.core import Responses, ServerError
 from livebode.dashboard.state import State
 from livebode.records import RunRecord
+from livebode.records.tiers import thinned
 
 ROWS_MAX = 2000
+_READ_BYTES = 8 << 20
 _WHOLE = 0.95  # of the run: for longer spans the thinned copy in memory is equivalent
 
 
@@ -59,7 +61,10 @@ class Past:
         )
 
     def between(self, from_s: float, to_s: float, rows: int) -> Responses:
-        """Every n-th response of a span, at most `rows`; ServerError before the first response."""
+        """Every n-th response of a span, at most `rows`, or means; ServerError before the first response.
+
+        Means are used where the record has them, for spans with very many responses.
+        """
         if self.overview is None:
             raise ServerError("not-begun", "there is no response yet", "wait for the first window")
         rows = max(1, min(rows, ROWS_MAX))
@@ -74,18 +79,24 @@ class Past:
                 return _thinned(newest, rows)
         if not self.readable:
             return _thinned(within, rows)
-        recorded = self._recorded(from_s, to_s)
+        recorded = self._recorded(from_s, to_s, rows)
         if recorded is None:
             return _thinned(newest if len(newest) else within, rows)
-        behind = newest[np.flatnonzero(newest.time_s > recorded.time_s[-1])]  # of a segment that is being written
+        behind = newest[np.flatnonzero(newest.sample > recorded.sample[-1])]  # of a segment that is being written
         return _thinned(Responses.join([recorded, replace(behind, unit=recorded.unit)]), rows)
 
-    def _recorded(self, from_s: float, to_s: float) -> Responses | None:
-        found, rows = Overview(), 0
-        for part in RunRecord.open(self.directory).between(from_s, to_s):
+    def _recorded(self, from_s: float, to_s: float, rows: int) -> Responses | None:
+        run = RunRecord.open(self.directory)
+        within = [one for one in run.segments if one.table == "responses" and from_s <= one.last_s <= to_s]
+        if sum(one.size_bytes for one in within) > _READ_BYTES:
+            means = thinned(run, (to_s - from_s) / max(1, rows - 1), (from_s, to_s))
+            if means is not None:
+                return means
+        found, number = Overview(), 0
+        for part in run.between(from_s, to_s):
             found.add(part)
-            rows += len(part)
-        return found.responses() if rows else None
+            number += len(part)
+        return found.responses() if number else None
 
     def all_between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """All responses of a span, in parts: from the record if it can be read, otherwise those in memory."""

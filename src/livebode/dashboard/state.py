@@ -163,13 +163,23 @@ class State:
             else:
                 self.trends.take(item)
 
+    def take_past(self, first: Responses, means: Responses, newest: Responses, count: int) -> None:
+        """Take a long run: its first responses, means of the whole run, the newest responses, the number of all."""
+        self.overview.add(means)
+        self._take_times(first)
+        self._seen += count - len(newest)
+        self._take_newest(newest)
+
     def _take_responses(self, responses: Responses) -> None:
         if not len(responses):
             return
-        self._seen += len(responses)
-        self._grew = time.monotonic()
         if self._shared is None:
             self.overview.add(responses)
+        self._take_newest(responses)
+
+    def _take_newest(self, responses: Responses) -> None:
+        self._seen += len(responses)
+        self._grew = time.monotonic()
         self.recent.add(responses)
         use = np.flatnonzero(responses.valid.any(axis=1))
         at = int(use[-1]) if use.size else len(responses) - 1

@@ -16,6 +16,11 @@ from livebode.dashboard.state import State
 from livebode.dashboard.trends import TrendRows
 from livebode.records import RunRecord
 from livebode.records.grouped_events import still_waiting
+from livebode.records.tiers import thinned
+
+_LONG_BYTES = 16 << 20  # larger tables are not read whole
+_MEANS = 2000
+_RECENT_S = 600.0
 
 
 class Viewed:
@@ -37,9 +42,27 @@ class Viewed:
     def fill(self, state: State) -> None:
         """Pass all data to the state."""
         state.begin(self.directory, self._run.summary)
-        for part in self._run.batches():
-            self._responses(state, part)
+        if not self._fill_from_means(state):
+            for part in self._run.batches():
+                self._responses(state, part)
         self._rest(state)
+
+    def _fill_from_means(self, state: State) -> bool:
+        """Pass the means of a long run and its newest responses; False if the run is short, or has no means."""
+        segments = [segment for segment in self._run.segments if segment.table == "responses"]
+        if sum(segment.size_bytes for segment in segments) < _LONG_BYTES:
+            return False
+        newest_s = segments[-1].last_s
+        means = thinned(self._run, (newest_s - segments[0].first_s) / _MEANS)
+        if means is None:
+            return False
+        first = next(self._run.between(-inf, segments[0].first_s))
+        newest = Responses.join(list(self._run.between(newest_s - _RECENT_S, inf)))
+        count = sum(segment.rows for segment in segments) // len(self._run.lines)
+        count += int(np.count_nonzero(newest.time_s > newest_s))
+        self._sample, self._last_s = int(newest.sample[-1]), float(newest.time_s[-1])
+        state.take_past(first, means, newest, count)
+        return True
 
     def more(self) -> tuple[list[Item], list[tuple[str, str, str, TrendRows]], dict[str, Any], bool]:
         """Pass new data: responses and events, rows of parameters, run.json, and whether the run has ended."""

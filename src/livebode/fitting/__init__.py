@@ -1,5 +1,6 @@
 """From responses to models of the machine: physical parameters and rational models, with covariance."""
 
+from livebode.fitting.binned_mean import BinnedMeans, binned_means, combined
 from livebode.fitting.chains import Rigid, TwoMass
 from livebode.fitting.common_poles import POLE_MODELS, CommonPoles, fit_common_poles
 from livebode.fitting.fitter import Fitter
@@ -18,6 +19,7 @@ __all__ = [
     "MODELS",
     "POLE_MODELS",
     "Between",
+    "BinnedMeans",
     "CommonPoles",
     "EvaluationGrid",
     "Fit",
@@ -32,6 +34,8 @@ __all__ = [
     "TwoMass",
     "TwoMassGain",
     "best_of",
+    "binned_means",
+    "combined",
     "fit",
     "fit_common_poles",
     "fit_each",

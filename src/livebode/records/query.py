@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from math import nan
 from typing import Any
 
 import pyarrow as pa
@@ -16,8 +17,10 @@ from livebode.core.installing import not_installed
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, RunRecord
+from livebode.records.segments.manifest import TIERS
+from livebode.records.segments.verified_files import segment_groups
 
-_TABLES = ("responses", "parameters", "samples")
+_TABLES = ("responses", "parameters", "samples", *TIERS)
 _SINGLE_EVENTS = pa.schema(
     [
         ("kind", pa.string()),
@@ -28,6 +31,7 @@ _SINGLE_EVENTS = pa.schema(
         ("details", pa.string()),
     ]
 )
+_NEVER_MISSING = ("time_s", "frequency_hz")  # as plain columns, so that conditions on them reach the files
 _COUNTS = [("count", pa.int64()), ("first_s", pa.float64()), ("last_s", pa.float64())]
 _EVENTS = pa.schema([*_SINGLE_EVENTS, *_COUNTS])
 # It reads only the given tables and writes nothing, so that an untrusted query can be run.
@@ -50,7 +54,7 @@ class QueryResult:
 
 
 def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
-    """The first rows of a query on the tables responses, parameters, samples, events and single_events.
+    """The first rows of a query on the tables responses, parameters, samples, events, single_events and the tiers.
 
     Parameters
     ----------
@@ -79,7 +83,8 @@ def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
             asked = {str(name).lower() for name in database.get_table_names(sql)} or set(_TABLES)
         except duckdb.Error:
             asked = set(_TABLES)  # it is not a SELECT, and is rejected below
-        _show(run, database, asked)
+        damages: list[Event] = []  # found in Arrow's threads
+        _show(run, database, asked, damages)
         for setting in _CONFINED:
             database.execute(setting)
         try:
@@ -96,6 +101,9 @@ def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
                 reason=sentence,
                 tables=tables,
             ) from None
+        finally:
+            for damage in damages:
+                run.report(damage)
     if found is None:
         tables = _known(run)
         raise UsageError(
@@ -125,25 +133,56 @@ def _answered(database: Any, sql: str, rows_max: int) -> QueryResult | None:
 
 
 def _known(run: RunRecord) -> list[str]:
-    return ["events", "single_events", *run.files(_TABLES)]
+    in_segments = run.parts()
+    if in_segments is None:
+        return ["events", "single_events", *run.files(_TABLES)]
+    found = {segment.table for segment in in_segments[0]} | in_segments[1].keys()
+    return ["events", "single_events", *(table for table in _TABLES if table in found)]
 
 
-def _show(run: RunRecord, database: Any, asked: set[str]) -> None:
+def _show(run: RunRecord, database: Any, asked: set[str], damages: list[Event]) -> None:
     """Register the requested tables of the run, and its events, in the database."""
-    found = run.files([table for table in _TABLES if table in asked])
-    for table, files in found.items():
-        parts = ([_dataset(files)] if files.paths else []) + [pa.Table.from_batches([rows]) for rows in files.rows]
+    tables = [table for table in _TABLES if table in asked]
+    if asked & {"events", "single_events"}:
+        run.files(tables)  # so that these have the damage of the requested tables
+    for table, parts in _parts_of(run, tables, damages).items():
+        selected = []
         for number, part in enumerate(parts):
-            database.register(f"_{table}_{number}", part)
-        columns = "*" if table == "samples" else _nan_as_null(parts[0].schema)
-        united = " UNION ALL ".join(f"SELECT {columns} FROM _{table}_{number}" for number in range(len(parts)))
-        database.execute(f"CREATE VIEW {table} AS {united}")
+            database.register(f"_{table}_{number}", part.rows)
+            columns = "*" if table == "samples" else _nan_as_null(part.rows.schema)
+            # A condition on the time that contradicts this one excludes the part before its files are opened.
+            span = f" WHERE time_s BETWEEN {part.first_s!r} AND {part.last_s!r}" if part.first_s <= part.last_s else ""
+            selected.append(f"SELECT {columns} FROM _{table}_{number}{span}")
+        database.execute(f"CREATE VIEW {table} AS {' UNION ALL '.join(selected)}")
     lines = list(run.each_event_and_damage())
     clock = run.clock
     rows = [_plain(row.newest, clock) | vars(row) for row in event_rows(lines)]
     database.register("events", pa.Table.from_pylist(rows, schema=_EVENTS))
     each = [_plain(one, clock) for event in lines for one in each_event(event)]
     database.register("single_events", pa.Table.from_pylist(each, schema=_SINGLE_EVENTS))
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A part of a table, and its span of time; NaN: not known."""
+
+    rows: ds.Dataset | pa.Table
+    first_s: float = nan
+    last_s: float = nan
+
+
+def _parts_of(run: RunRecord, tables: list[str], damages: list[Event]) -> dict[str, list[_Part]]:
+    """The recorded ones of these tables in parts."""
+    in_segments = run.parts()
+    if in_segments is None:
+        return {table: [_Part(_dataset(files))] for table, files in run.files(tables).items()}
+    segments, rows = in_segments
+    found: dict[str, list[_Part]] = {}
+    for table in tables:
+        groups = segment_groups(run.path, [one for one in segments if one.table == table], damages)
+        found[table] = [_Part(group.rows, group.first_s, group.last_s) for group in groups]
+        found[table] += [_Part(pa.Table.from_batches([batch])) for batch in rows.get(table, ())]
+    return {table: parts for table, parts in found.items() if parts}
 
 
 def _plain(event: Event, clock: RunClock) -> dict[str, Any]:
@@ -153,7 +192,7 @@ def _plain(event: Event, clock: RunClock) -> dict[str, Any]:
 
 def _nan_as_null(schema: pa.Schema) -> str:
     """All columns, with null for missing values, which SQL's averages ignore."""
-    numbers = [field.name for field in schema if pa.types.is_float64(field.type)]
+    numbers = [field.name for field in schema if pa.types.is_float64(field.type) and field.name not in _NEVER_MISSING]
     return "* REPLACE (" + ", ".join(f"CASE WHEN isnan({n}) THEN NULL ELSE {n} END AS {n}" for n in numbers) + ")"
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import pyarrow as pa
 
-from livebode.arrow import from_numpy
-from livebode.core import Responses
+from livebode.arrow import from_numpy, to_numpy
+from livebode.core import PER_LINE, PER_RESPONSE, Lines, Responses
 from livebode.records.table_file import ColumnTable
 
 SCHEMA = pa.schema(
@@ -61,3 +64,18 @@ def as_batch(responses: Responses) -> pa.RecordBatch:
         np.repeat(responses.ready, lines),
     ]
     return pa.record_batch([from_numpy(c) for c in columns], schema=SCHEMA)
+
+
+def responses_in(table: pa.Table, lines: Lines, found: Mapping[str, Any]) -> Responses:
+    """The responses in complete rows of this table; `found` of run.json has quantity and unit."""
+    shape = table.num_rows // len(lines), len(lines)
+    names = [name for name in SCHEMA.names if name in table.column_names]
+    column: dict[str, Any] = {name: to_numpy(table[name].combine_chunks()).reshape(shape) for name in names}
+    value = np.empty(shape, dtype=np.complex128)
+    value.real, value.imag = column["re"], column["im"]
+    per_line = {name: column[name] for name in PER_LINE if name in column}
+    per_line["weight"] = np.empty(shape, dtype=np.complex128)
+    per_line["weight"].real, per_line["weight"].imag = column["weight_re"], column["weight_im"]
+    per_row = {name: column[name][:, 0] for name in PER_RESPONSE if name in column}
+    named = {"quantity": found["quantity"], "unit": found["unit"]}
+    return Responses(lines=lines, value=value, **per_line, **per_row, **named)

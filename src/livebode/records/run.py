@@ -16,10 +16,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from livebode.arrow import to_numpy
 from livebode.core import (
-    PER_LINE,
-    PER_RESPONSE,
     DamageWarning,
     Event,
     Lines,
@@ -33,7 +30,7 @@ from livebode.locations import original
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import StoredTable
-from livebode.records.response_table import EARLIER, SCHEMA
+from livebode.records.response_table import EARLIER, SCHEMA, responses_in
 from livebode.records.segments import reading
 from livebode.records.segments.damage import KIND
 from livebode.records.segments.manifest import Manifest, Segment
@@ -184,7 +181,7 @@ class RunRecord:
 
     def responses(self) -> Responses:
         """All responses, as written; an empty batch before the first."""
-        return Responses.join(list(self.batches()) or [self._responses(SCHEMA.empty_table(), self.lines)])
+        return Responses.join(list(self.batches()) or [responses_in(SCHEMA.empty_table(), self.lines, self.found)])
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
         """All readable responses in order, in parts of bounded size; or the newest, from files up to this size."""
@@ -221,7 +218,7 @@ class RunRecord:
                 whole = table.num_rows // len(lines) * len(lines)
                 rest = table.slice(whole)
                 if whole:
-                    yield self._responses(table.slice(0, whole), lines)
+                    yield responses_in(table.slice(0, whole), lines, self.found)
         if rest is not None and rest.num_rows:
             raise RecordError(
                 "unexpected-content",
@@ -282,6 +279,15 @@ class RunRecord:
             raise _unreadable(self.path, error) from None
         return {name: files for name, files in found.items() if files.paths or files.rows}
 
+    def parts(self) -> tuple[list[Segment], reading.Rows] | None:
+        """The closed segments of all tables, by age, and later rows of each; None of a run in one piece."""
+        try:
+            if reading.in_segments(self.path):
+                return reading.parts(self.path, self.report, finished=self.finished)
+        except (OSError, pa.ArrowException) as error:
+            raise _unreadable(self.path, error) from None
+        return None
+
     def events(self) -> list[Event]:
         """Recorded events; each damaged line is replaced by an event of kind "record-damaged".
 
@@ -311,20 +317,6 @@ class RunRecord:
         """The same, followed by other damage found so far."""
         yield from self.each_event()
         yield from (damage for damage in self.damages if damage.details.get("file") != event_lines.NAME)
-
-    def _responses(self, table: pa.Table, lines: Lines) -> Responses:
-        shape = table.num_rows // len(lines), len(lines)
-        column: dict[str, Any] = {
-            name: to_numpy(table[name].combine_chunks()).reshape(shape) for name in table.column_names
-        }
-        value = np.empty(shape, dtype=np.complex128)
-        value.real, value.imag = column["re"], column["im"]
-        per_line = {name: column[name] for name in PER_LINE if name in column}
-        per_line["weight"] = np.empty(shape, dtype=np.complex128)
-        per_line["weight"].real, per_line["weight"].imag = column["weight_re"], column["weight_im"]
-        per_row = {name: column[name][:, 0] for name in PER_RESPONSE if name in column}
-        named = {"quantity": self.found["quantity"], "unit": self.found["unit"]}
-        return Responses(lines=lines, value=value, **per_line, **per_row, **named)
 
 
 def _unreadable(path: Path, error: Exception) -> RecordError:

@@ -7,7 +7,7 @@ from typing import Any
 
 from livebode.core import RecordError
 
-VERSIONS = {"run": 1, "manifest": 1, "journal": 1, "references": 1, "notes": 1}
+VERSIONS = {"run": 1, "manifest": 2, "journal": 1, "references": 1, "notes": 1}
 """Newest readable versions: layout of a run directory, manifest.jsonl, journal, references.json and notes.json."""
 
 

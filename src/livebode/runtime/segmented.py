@@ -34,8 +34,10 @@ from livebode.records.sample_table import samples_of
 from livebode.records.segments.journal import FOLDER
 from livebode.records.segments.limits import SegmentLimits
 from livebode.records.segments.lock import Lock
+from livebode.records.segments.shelf import Tiers, no_tiers
 from livebode.records.segments.store import Store
 from livebode.records.segments.writer import Writer
+from livebode.records.tiers import Thinning
 from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
 from livebode.runtime.documents import Document, FitResults
 from livebode.runtime.run_control import StoppedError
@@ -116,7 +118,7 @@ class SegmentedRecord:
             {"samples": self._samples} if self._samples else {}
         )
         self._reported: deque[Event] = deque()
-        self._store = Store(path, tables, self._limits(section), self._reported.append)
+        self._store = Store(path, tables, self._limits(section), self._reported.append, _tiers(self._summary))
         self._writer, self._unwritten = Writer(), Unwritten()
         self._due_from = 0
         self._piece = max(1, round(_PIECE_S * rate_hz))
@@ -328,6 +330,13 @@ class SegmentedRecord:
 
     def _named(self, summary: dict[str, Any]) -> dict[str, Any]:
         return self._more | summary
+
+
+def _tiers(summary: Mapping[str, Any]) -> Tiers:
+    """Means of old responses; none of responses that are averages already, which contain each other."""
+    averages = (summary.get("configuration", {}).get("tracking") or {}).get("average")
+    found = summary.get("found") or {}
+    return no_tiers if averages or "bins" not in found else Thinning(found).tables
 
 
 def make_way(path: Path) -> None:

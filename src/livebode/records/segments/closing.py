@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import threading
 
 from livebode.core import LivebodeError
 from livebode.records.segments.manifest import Segment
+from livebode.records.segments.merging import merged_bytes_max
 from livebode.records.segments.shelf import Shelf
 
 # One for all records of the process: sixteen axes that close a segment in the same second would use every core.
 _ONE_AT_A_TIME = threading.Lock()
+_logger = logging.getLogger(__name__)
 
 
 class Closing:
@@ -55,12 +58,20 @@ class Closing:
             self._thread.join()
             self._thread = None
 
+    def _merge(self, bytes_max: int | None) -> None:
+        try:
+            self._shelf.merge(merged_bytes_max(bytes_max))
+            self._shelf.shorten()
+        except OSError as error:  # everything is recorded, and merging is tried again when the next journal is closed
+            _logger.warning("segments could not be merged: %s", error)
+
     def _work(self, bytes_max: int | None) -> None:
         try:
             with _ONE_AT_A_TIME:
                 if bytes_max is not None:
                     self._gone = self._shelf.make_room(bytes_max)
                 self._shelf.close_journals()
+                self._merge(bytes_max)
         except MemoryError:
             self._error = OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
         except BaseException as error:  # it must not be lost with the thread

@@ -16,17 +16,19 @@ from livebode.records.segments import journal
 from livebode.records.segments.damage import Damage, event_of
 from livebode.records.segments.journal import Journal
 from livebode.records.segments.json_lines import in_line, to_line
-from livebode.records.versions import check_version, format_of
+from livebode.records.versions import VERSIONS, check_version, format_of
 
 NAME = "manifest.jsonl"
-TABLES = ("responses", "parameters", "samples")
+TIERS = ("responses_1s", "responses_1min", "responses_1h")
+TABLES = ("responses", "parameters", "samples", *TIERS)
 _SHA256 = re.compile("[0-9a-f]{64}")
+_NUMBERS = re.compile(r"[a-z0-9_]+/(\d{6,9})(?:-(\d{6,9}))?\.parquet")
 _COUNTS = ("rows", "first_sample", "last_sample", "size_bytes")
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A closed segment: one table's rows from one journal, as a Parquet file.
+    """A closed segment: one table's rows from one journal, or from several that were merged, as a Parquet file.
 
     `name` is its path in the run's directory; `first_s` and `last_s` are the times of its first and last row.
     """
@@ -41,14 +43,19 @@ class Segment:
     size_bytes: int
     sha256: str
 
+    @property
+    def numbers(self) -> tuple[int, int]:
+        """The first and the last journal that its rows can be from."""
+        return segment_numbers(self.name)
+
     @classmethod
-    def of(cls, number: int, values: Mapping[str, Any]) -> Segment:
-        """The segment in a line; ValueError if a run cannot have written it."""
+    def of(cls, first: int, last: int, values: Mapping[str, Any]) -> Segment:
+        """The segment of these journals in a line; ValueError if a run cannot have written it."""
         found = cls(**values)
         numbers = [*(getattr(found, name) for name in _COUNTS), found.first_s, found.last_s]
         sound = (
             found.table in TABLES
-            and found.name == name_of(found.table, number)
+            and found.name == name_of(found.table, first, last)
             and all(type(value) is int for value in numbers[:4])
             and all(type(value) in (int, float) and math.isfinite(value) for value in numbers)
             and _SHA256.fullmatch(found.sha256)
@@ -87,20 +94,24 @@ class Retained:
 class Manifest:
     """Content of manifest.jsonl.
 
-    `segments` are the recorded ones, by age, `gone` those removed for the budget, `closed` the numbers of the journals
-    that they are from, `retained` the damaged journals. `length` is that of its complete lines, `torn` the bytes after
-    them, and `broken` the numbers of the damaged lines.
+    `segments` are the recorded ones, by age, `gone` those removed for the budget or merged, `closed` the numbers of the
+    journals that they are from, and `until` one to which all are closed; `retained` the damaged journals. `merged` has,
+    for the name of a segment that was merged, the new segment and the number of its rows before those of the old one.
+    `version` is that of the file, `length` that of its complete lines, `torn` the bytes after them, and `broken` the
+    numbers of the damaged lines.
     """
 
     segments: list[Segment] = field(default_factory=list)
     gone: list[Segment] = field(default_factory=list)
     closed: set[int] = field(default_factory=set)
+    until: int = 0
     retained: list[Retained] = field(default_factory=list)
+    merged: dict[str, tuple[Segment, int]] = field(default_factory=dict)
+    version: int = VERSIONS["manifest"]
     length: int = 0
     torn: bytes = b""
     broken: list[int] = field(default_factory=list)
     _removed: set[str] = field(default_factory=set)
-    _version: int = 1
 
     @classmethod
     def read(cls, run: Path) -> Manifest:
@@ -112,10 +123,26 @@ class Manifest:
             if line != before:  # each is written twice
                 found._take(line, number)
             before = line
-        check_version(run / NAME, "manifest", found._version)
-        found.gone = [segment for segment in found.segments if segment.name in found._removed]
+        check_version(run / NAME, "manifest", found.version)
+        found.gone += [segment for segment in found.segments if segment.name in found._removed]
         found.segments = [segment for segment in found.segments if segment.name not in found._removed]
         return found
+
+    def is_closed(self, number: int) -> bool:
+        """Whether this journal has become segments."""
+        return number in self.closed or 0 < number <= self.until
+
+    @property
+    def last_closed(self) -> int:
+        """The newest journal that has become segments; 0 before the first."""
+        return max(self.closed, default=self.until)
+
+    def place(self, name: str) -> tuple[Segment, int] | None:
+        """The segment that has the rows of a merged one now, and the number of its rows before them."""
+        before, found = 0, None
+        while (step := self.merged.get(name)) is not None:
+            found, name, before = step[0], step[0].name, before + step[1]
+        return None if found is None or found.name in self._removed else (found, before)
 
     def _take(self, line: bytes, number: int) -> None:
         for value in in_line(line):
@@ -129,25 +156,59 @@ class Manifest:
 
     def _add(self, value: Mapping[str, Any]) -> None:
         if "format" in value:
-            self._version = int(value["version"])
+            self.version = int(value["version"])
             return
         if "removed" in value:
             self._removed |= set(value["removed"])
             return
+        if "closed_until" in value:
+            self._shorten(value)
+            return
+        if "merged" in value:
+            self._merge(value["merged"], value["segment"])
+            return
         number = value["closed"]
         if type(number) is not int or not 0 < number < 10**9:
             raise ValueError
-        segments = [Segment.of(number, segment) for segment in value["segments"]]
+        segments = [Segment.of(number, number, segment) for segment in value["segments"]]
         retained = [Retained.of(number, value["retained"])] if "retained" in value else []
-        if number not in self.closed:
+        if not self.is_closed(number):
             self.closed.add(number)
             self.segments += segments
             self.retained += retained
 
+    def _shorten(self, value: Mapping[str, Any]) -> None:
+        """Take the line that replaces all earlier ones."""
+        until = value["closed_until"]
+        if type(until) is not int or not 0 <= until < 10**9:
+            raise ValueError
+        segments = [Segment.of(*segment_numbers(one["name"]), one) for one in value["segments"]]
+        retained = [Retained.of(int(one["number"]), one) for one in value["retained"]]
+        by_name = {segment.name: segment for segment in segments}
+        for new, name, rows in value["places"]:
+            self.merged[str(name)] = by_name[new], int(rows)
+        self.segments, self.retained, self.until, self.closed = segments, retained, until, set()
+
+    def _merge(self, names: Sequence[str], values: Mapping[str, Any]) -> None:
+        at = {segment.name: number for number, segment in enumerate(self.segments)}
+        parts = [self.segments[at[name]] for name in names]
+        segment = Segment.of(parts[0].numbers[0], parts[-1].numbers[1], values)
+        if len(parts) < 2 or {part.table for part in parts} != {segment.table}:
+            raise ValueError
+        before = 0
+        for part in parts:
+            self.merged[part.name] = segment, before
+            before += part.rows
+        if before != segment.rows:
+            raise ValueError
+        self.segments[at[names[0]]] = segment
+        self.gone += parts
+        self.segments = [one for one in self.segments if one.name not in self.merged]
+
     @property
     def missing(self) -> list[tuple[int, int]]:
         """First and last numbers of closed journals whose line is damaged, so that their segments are not known."""
-        known = [0, *sorted(self.closed)] if self.broken else []
+        known = [self.until, *sorted(self.closed)] if self.broken else []
         return [(a + 1, b - 1) for a, b in pairwise(known) if b > a + 1]
 
     def check(self, run: Path, journals: Sequence[int]) -> None:
@@ -155,7 +216,7 @@ class Manifest:
 
         `journals` are the numbers of the existing ones.
         """
-        if not self.broken and min(journals, default=0) > max(self.closed, default=0) + 1:
+        if not self.broken and min(journals, default=0) > self.last_closed + 1:
             raise RecordError(
                 "damaged",
                 f"{str(run / NAME)!r} is damaged after byte {self.length}",
@@ -165,9 +226,36 @@ class Manifest:
             )
 
 
-def name_of(table: str, number: int) -> str:
-    """Path of the file of a table's rows from a journal, in the run's directory."""
-    return f"{table}/{number:06d}.parquet"
+def name_of(table: str, first: int, last: int) -> str:
+    """Path of the file of a table's rows from one journal, or from the first to the last one, in the run's directory.
+
+    >>> name_of("responses", 7, 7), name_of("responses", 1, 32)
+    ('responses/000007.parquet', 'responses/000001-000032.parquet')
+    """
+    return f"{table}/{first:06d}.parquet" if first == last else f"{table}/{first:06d}-{last:06d}.parquet"
+
+
+def segment_numbers(name: str) -> tuple[int, int]:
+    """The numbers in `name_of`; ValueError for another name."""
+    found = _NUMBERS.fullmatch(name)
+    if found is None:
+        raise ValueError(f"{name!r} is not the name of a segment")
+    return int(found[1]), int(found[2] or found[1])
+
+
+def short_line(
+    until: int,
+    segments: Iterable[Segment],
+    retained: Iterable[Retained],
+    places: Iterable[tuple[str, str, int]],
+) -> bytes:
+    """Line: all journals up to this number are closed, and these are their segments; it replaces all earlier lines.
+
+    `places` are those of `Manifest.merged` that a reader may still need: new name, old name, number of rows before.
+    """
+    damaged = [{"number": one.number} | _to_json(one) for one in retained]
+    line = {"closed_until": until, "segments": [asdict(segment) for segment in segments]}
+    return to_line(line | {"retained": damaged, "places": list(places)}) * 2
 
 
 def first_line() -> bytes:
@@ -179,9 +267,17 @@ def closing_line(number: int, segments: Iterable[Segment], retained: Retained | 
     """Line: a journal's rows are now in these segments; written twice, because it is the only reference to them."""
     line: dict[str, Any] = {"closed": number, "segments": [asdict(segment) for segment in segments]}
     if retained is not None:
-        places = [place.to_json() for place in retained.damages]
-        line["retained"] = {"size_bytes": retained.size_bytes, "places": places}
+        line["retained"] = _to_json(retained)
     return to_line(line) * 2
+
+
+def _to_json(retained: Retained) -> dict[str, Any]:
+    return {"size_bytes": retained.size_bytes, "places": [place.to_json() for place in retained.damages]}
+
+
+def merge_line(parts: Iterable[Segment], segment: Segment) -> bytes:
+    """Line: the rows of these segments are now in another one; written twice, because it is the only reference."""
+    return to_line({"merged": [part.name for part in parts], "segment": asdict(segment)}) * 2
 
 
 def removal_line(segments: Iterable[Segment]) -> bytes:

@@ -15,7 +15,7 @@ from livebode.records.segments import journal
 from livebode.records.segments.damage import KIND, event_of
 from livebode.records.segments.journal import Journal, last_commit
 from livebode.records.segments.manifest import NAME, Manifest, Segment
-from livebode.records.segments.segment_file import open_segment
+from livebode.records.segments.segment_file import segment_content
 
 _ROWS = 1 << 14
 Report = Callable[[Event], None]
@@ -41,7 +41,7 @@ def parts(run: Path, report: Report, *, finished: bool) -> tuple[list[Segment], 
     found = Manifest.read(run)
     found.check(run, list(journals))
     _tell_of(found, finished, report)
-    left = [number for number in sorted(journals) if number not in found.closed]
+    left = [number for number in sorted(journals) if not found.is_closed(number)]
     for number in left:
         if places := journals[number].damages:
             report(event_of(journal.name_of(number), places, None))
@@ -84,19 +84,21 @@ def tables(
     segments = [segment for segment in segments if segment.table == table]
     if span_s is not None:
         segments = [segment for segment in segments if segment.first_s <= span_s[1] and segment.last_s >= span_s[0]]
-    yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), report)
+    yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), report, span_s)
     if table in rows:
         yield pa.Table.from_batches(rows[table])
 
 
-def _joined(run: Path, segments: list[Segment], report: Report) -> Iterator[pa.Table]:
+def _joined(
+    run: Path, segments: list[Segment], report: Report, span_s: tuple[float, float] | None
+) -> Iterator[pa.Table]:
     """The rows of segments, small ones combined, because the overhead per part is larger than that of its rows."""
     held: list[pa.Table] = []
     for segment in segments:
         if (file := whole(run, segment, report)) is None:
             continue
         # Without Arrow's threads, which can fail at the end of a short process.
-        held.append(file.read(use_threads=False))
+        held.append(file.read_row_groups(_groups_in(file, span_s), use_threads=False))
         if sum(table.num_rows for table in held) >= _ROWS:
             yield pa.concat_tables(held)
             held = []
@@ -104,12 +106,34 @@ def _joined(run: Path, segments: list[Segment], report: Report) -> Iterator[pa.T
         yield pa.concat_tables(held)
 
 
+def _groups_in(file: pq.ParquetFile, span_s: tuple[float, float] | None) -> list[int]:
+    """The row groups of a merged segment with rows in this span of time."""
+    about = file.metadata
+    every = list(range(about.num_row_groups))
+    if span_s is None or len(every) == 1:
+        return every
+    time_s = [about.row_group(group).column(about.schema.names.index("time_s")).statistics for group in every]
+    return [
+        group for group, one in zip(every, time_s)
+        if one is None or not one.has_min_max or (one.min <= span_s[1] and one.max >= span_s[0])
+    ]  # fmt: skip
+
+
 def whole(run: Path, segment: Segment, report: Report) -> pq.ParquetFile | None:
     """The file of a segment; None if it is damaged, which is reported, or was removed to meet the budget."""
+    data = content(run, segment, report)
+    return None if data is None else pq.ParquetFile(pa.BufferReader(data))
+
+
+def content(run: Path, segment: Segment, report: Report) -> bytes | None:
+    """The bytes of the file; of a segment that was merged in the meantime the same rows as a file."""
     try:
-        return open_segment(run, segment)
+        return segment_content(run, segment)
     except FileNotFoundError:
-        if segment not in Manifest.read(run).segments:
+        now = Manifest.read(run)
+        if (place := now.place(segment.name)) is not None:
+            return _part(run, segment, *place, report)
+        if segment not in now.segments:
             return None  # it was removed in the meantime
         why = "the file is missing"
     except RecordError as error:
@@ -124,6 +148,14 @@ def whole(run: Path, segment: Segment, report: Report) -> pq.ParquetFile | None:
     message = f"{segment.name} is damaged: {why}; {lost} ({details['seconds']:.4g} s) are not read"
     report(Event(KIND, segment.first_sample, segment.first_s, message, details))
     return None
+
+
+def _part(run: Path, segment: Segment, merged: Segment, before: int, report: Report) -> bytes | None:
+    if (file := whole(run, merged, report)) is None:
+        return None
+    sink = pa.BufferOutputStream()
+    pq.write_table(file.read(use_threads=False).slice(before, segment.rows), sink)
+    return bytes(sink.getvalue())
 
 
 def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:

@@ -58,7 +58,7 @@ def recover(run: Path) -> UnfinishedRun | None:
     found = Manifest.read(run)
     found.check(run, journal.numbers(run))
     sweep(run, found)
-    left = [number for number in journal.numbers(run) if number not in found.closed]
+    left = [number for number in journal.numbers(run) if not found.is_closed(number)]
     damaged: list[int] = []
     while left:
         number = left.pop()

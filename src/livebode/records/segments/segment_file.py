@@ -19,7 +19,12 @@ _verified: set[tuple[object, ...]] = set()
 
 
 def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
-    """Read the file. Its checksum is computed once per process, as long as the file is unchanged.
+    """Read the file, as `segment_content`."""
+    return pq.ParquetFile(pa.BufferReader(segment_content(run, segment)))
+
+
+def segment_content(run: Path, segment: Segment) -> bytes:
+    """Content of the file. Its checksum is computed once per process, as long as the file is unchanged.
 
     Raises
     ------
@@ -52,13 +57,13 @@ def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
             _verified.clear()
         _verified.add(key)
     try:
-        file = pq.ParquetFile(pa.BufferReader(data))
+        about = pq.read_metadata(pa.BufferReader(data))
     except pa.ArrowException as error:
         raise RecordError(
             "damaged", f"it is not Parquet ({error})", "restore it from a backup", path=str(run / segment.name)
         ) from None
-    _check_size(file.metadata, segment)
-    return file
+    _check_size(about, segment)
+    return data
 
 
 def _check_size(about: pq.FileMetaData, segment: Segment) -> None:

@@ -7,7 +7,7 @@ import errno
 import hashlib
 import logging
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pyarrow as pa
@@ -18,10 +18,19 @@ from livebode.records.inside import check_folder, is_folder
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.manifest import Manifest, Retained, Segment
+from livebode.records.segments.merging import groups_to_merge, row_groups, rows_to_merge, unlisted
 from livebode.records.table_file import ColumnTable
+from livebode.records.versions import VERSIONS
 
 FIRST_TO_GO = "samples"
+_LONG_BYTES, _SHORTER = 128 << 10, 3
+_PLACES_MAX = 512
+Tiers = Callable[[Mapping[str, pa.Table]], Mapping[str, pa.Table]]
 _logger = logging.getLogger(__name__)
+
+
+def no_tiers(_: Mapping[str, pa.Table]) -> Mapping[str, pa.Table]:
+    return {}
 
 
 class Shelf:
@@ -40,13 +49,21 @@ class Shelf:
         Its manifest.
     sealed
         Numbers of journals that are complete and not closed yet.
+    tiers
+        The tables of means of the rows of a journal.
     """
 
-    def __init__(self, run: Path, tables: Mapping[str, ColumnTable], found: Manifest, sealed: list[int]) -> None:
-        self._run, self._tables = run, tables
+    def __init__(
+        self, run: Path, tables: Mapping[str, ColumnTable], found: Manifest, sealed: list[int], tiers: Tiers = no_tiers
+    ) -> None:
+        self._run, self._tables, self._tiers = run, tables, tiers
         self._file = AppendFile(run, manifest.NAME, found.length)
         self._segments = list(found.segments)
         self._retained = list(found.retained)
+        self._version = found.version
+        self._closed, self._sound = found.last_closed, not found.broken
+        places = [(found.place(name), name) for name in found.merged]
+        self._places = [(place[0].name, name, place[1]) for place, name in places if place is not None]
         self._sealed = list(sealed)
         self._unwanted: list[str] = []
 
@@ -82,10 +99,13 @@ class Shelf:
             del self._sealed[0]
 
     def make_room(self, bytes_max: int) -> list[Segment]:
-        """Remove the oldest segments until at most this is used: first those of samples, then all others equally."""
+        """Remove the oldest segments until at most this is used.
+
+        First those of samples, then all others equally, and last the means of old responses, which are small.
+        """
         gone: list[Segment] = []
         excess = self.used_bytes - bytes_max
-        order = sorted(self._segments, key=lambda segment: segment.table != FIRST_TO_GO)
+        order = sorted(self._segments, key=lambda one: (one.table != FIRST_TO_GO) + (one.table in manifest.TIERS))
         for segment in order:
             if excess <= 0:
                 break
@@ -97,6 +117,68 @@ class Shelf:
             self.discard(*(segment.name for segment in gone))
         return gone
 
+    def merge(self, bytes_max: int) -> None:
+        """Merge one group of small consecutive segments into one of at most `bytes_max`, if there is such a group.
+
+        Each closed journal adds a segment and each merge removes 15, so that one for each is enough, and short.
+
+        The same steps as elsewhere: the new file, its line, and only then the removal of the old files. A group with a
+        damaged file remains as it is.
+
+        Raises
+        ------
+        OSError
+            If the disk fails; the segments are then as before, or merged.
+        """
+        for parts in groups_to_merge(self._segments, bytes_max):
+            if (rows := rows_to_merge(self._run, parts)) is not None:
+                self._replace(parts, rows)
+                return
+
+    def shorten(self) -> None:
+        """Write a long manifest again without the lines on segments that were merged or removed since.
+
+        What a reader needs that listed segments before they were merged remains, for the newest 512.
+
+        Raises
+        ------
+        OSError
+            If the disk fails; the manifest is then unchanged.
+        """
+        if self._file.length < _LONG_BYTES or not self._sound:
+            return
+        present = {segment.name for segment in self._segments}
+        self._places = [place for place in self._places[-_PLACES_MAX:] if place[0] in present]
+        line = manifest.short_line(self._closed, self._segments, self._retained, self._places)
+        data = manifest.first_line() + line
+        if self._file.length < _SHORTER * len(data):
+            return
+        write_whole(self._run / manifest.NAME, data, locked=True)
+        before, self._file = self._file, AppendFile(self._run, manifest.NAME)
+        before.close()
+        self._version = VERSIONS["manifest"]
+
+    def _replace(self, parts: list[Segment], rows: list[pa.Table]) -> None:
+        name = manifest.name_of(parts[0].table, parts[0].numbers[0], parts[-1].numbers[1])
+        segment = self._put(name, parts[0].table, *row_groups(rows))
+        lines = manifest.merge_line(parts, segment)
+        if self._version < VERSIONS["manifest"]:
+            lines = manifest.first_line() + lines
+        self._file.append_synced(lines)
+        self._version = VERSIONS["manifest"]
+        self._segments[self._segments.index(parts[0])] = segment
+        self._segments = [one for one in self._segments if one not in parts]
+        before = 0
+        for part in parts:
+            self._places = [
+                (segment.name, name, rows + before) if new == part.name else (new, name, rows)
+                for new, name, rows in self._places
+            ]
+            self._places.append((segment.name, part.name, before))
+            before += part.rows
+        _logger.info("%s: %d segments merged into %s", self._run, len(parts), segment.name)
+        self.discard(*(part.name for part in parts))
+
     def discard(self, *names: str) -> None:
         """Remove files without an entry; those that cannot be removed now are tried again next time."""
         self._unwanted = [name for name in (*self._unwanted, *names) if not _removed(self._run, name)]
@@ -107,10 +189,15 @@ class Shelf:
 
     def _turn(self, number: int) -> None:
         read = journal.read_sealed(self._run, number)
-        segments = [self._put(number, table, pa.Table.from_batches(batches)) for table, batches in read.rows.items()]
+        tables = {table: pa.Table.from_batches(batches) for table, batches in read.rows.items()}
+        tables |= self._tiers(tables)
+        segments = [
+            self._put(manifest.name_of(table, number, number), table, rows) for table, rows in tables.items()
+        ]  # fmt: skip
         retained = Retained.of_journal(self._run, number, read)
         self._file.append_synced(manifest.closing_line(number, segments, retained))
         self._segments += segments
+        self._closed = max(self._closed, number)
         size_bytes = sum(segment.size_bytes for segment in segments)
         _logger.info("%s: journal %d closed: %d segments, %d bytes", self._run, number, len(segments), size_bytes)
         if retained is None:
@@ -120,42 +207,47 @@ class Shelf:
             with contextlib.suppress(OSError):  # it is then done when the run is continued
                 journal.set_aside(self._run, number)
 
-    def _put(self, number: int, table: str, rows: pa.Table) -> Segment:
+    def _put(self, name: str, table: str, *groups: pa.Table) -> Segment:
         folder = self._run / table
         if not is_folder(folder):
             os.mkdir(folder)
             sync_directory(self._run)
         sink = pa.BufferOutputStream()
-        pq.write_table(rows, sink, compression="lz4", use_dictionary=list(self._tables[table].repeating))
+        repeating = list(self._tables["responses" if table in manifest.TIERS else table].repeating)
+        with pq.ParquetWriter(sink, groups[0].schema, compression="lz4", use_dictionary=repeating) as file:
+            for group in groups:
+                file.write_table(group, row_group_size=group.num_rows)
         data = memoryview(sink.getvalue())
-        name = manifest.name_of(table, number)
         write_whole(self._run / name, data, locked=True)
-        sample, time_s = rows["sample"], rows["time_s"]
+        first, last = groups[0], groups[-1]
         return Segment(
             name=name,
             table=table,
-            rows=rows.num_rows,
-            first_sample=sample[0].as_py(),
-            last_sample=sample[-1].as_py(),
-            first_s=time_s[0].as_py(),
-            last_s=time_s[-1].as_py(),
+            rows=sum(group.num_rows for group in groups),
+            first_sample=first["sample"][0].as_py(),
+            last_sample=last["sample"][-1].as_py(),
+            first_s=first["time_s"][0].as_py(),
+            last_s=last["time_s"][-1].as_py(),
             size_bytes=len(data),
             sha256=hashlib.sha256(data).hexdigest(),
         )
 
 
 def sweep(run: Path, found: Manifest) -> None:
-    """Remove what a kill left between two steps: segments with a line on their removal, and closed journals.
+    """Remove what a kill left between two steps: segments with a line on their removal or merging, merged ones without
+    a line, and closed journals.
 
     Other remainders of a kill are written again with the same name.
     """
     for segment in found.gone:
         _removed(run, segment.name)
+    for name in unlisted(run, found):
+        _removed(run, name)
     retained = {one.number for one in found.retained}
     for number in journal.numbers(run):
         if number in retained:
             journal.set_aside(run, number)
-        elif number in found.closed:
+        elif found.is_closed(number):
             _removed(run, journal.name_of(number))
 
 

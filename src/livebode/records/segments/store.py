@@ -28,7 +28,7 @@ from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
 from livebode.records.segments.phase import Phase
 from livebode.records.segments.recovery import EVENTS, UnfinishedRun, recover
-from livebode.records.segments.shelf import Shelf
+from livebode.records.segments.shelf import Shelf, Tiers, no_tiers
 from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import UnsyncedRows
 from livebode.records.summary_file import COPY, RUN, to_document
@@ -54,6 +54,10 @@ class Store:
         Tables by name.
     limits
         Sizes and budget.
+    emit
+        Receives the events of the record itself.
+    tiers
+        The tables of means of the rows of a journal, computed when it is closed.
 
     Attributes
     ----------
@@ -70,12 +74,17 @@ class Store:
     """
 
     def __init__(
-        self, path: Path, tables: Mapping[str, ColumnTable], limits: SegmentLimits, emit: Emit = ignore
+        self,
+        path: Path,
+        tables: Mapping[str, ColumnTable],
+        limits: SegmentLimits,
+        emit: Emit = ignore,
+        tiers: Tiers = no_tiers,
     ) -> None:
         self.path, self.limits = path, limits
         self.last: Commit | None = None
         self.phase = 0.0
-        self._tables = dict(tables)
+        self._tables, self._tiers = dict(tables), tiers
         self._waiting = UnsyncedRows(tuple(self._tables))
         self._log = EventLog(path, emit)
         self._pause: Event | None = None
@@ -235,7 +244,7 @@ class Store:
         )
 
     def _open_files(self, found: Manifest, sealed: list[int], events_bytes: int) -> None:
-        self._shelf = Shelf(self.path, self._tables, found, sealed)
+        self._shelf = Shelf(self.path, self._tables, found, sealed, self._tiers)
         self._files.callback(self._shelf.close)
         self._closing = Closing(self._shelf)
         self._files.callback(self._closing.wait)

@@ -1,0 +1,91 @@
+"""Merging: small segments become larger ones as a run ages, so that a year of them is opened as fast as a day.
+
+16 consecutive segments become one, 16 of those again, and so on up to 4 MiB: a row is written a few times more at most,
+and the number of files grows with the logarithm of the length until they have that size. Larger ones would make reading
+an hour slower: the checksum is that of a whole file.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyarrow as pa
+
+from livebode.core import RecordError
+from livebode.records.inside import is_folder
+from livebode.records.segments.manifest import TABLES, Manifest, Segment, segment_numbers
+from livebode.records.segments.segment_file import open_segment
+
+_MERGED_MAX = 4 << 20
+_BUDGET_SHARE = 32  # the budget removes whole segments
+_FAN_IN = 16
+_GROUP_ROWS = 1 << 15
+_SEGMENT = re.compile(r"\d{6,9}(-\d{6,9})?\.parquet")
+
+
+def merged_bytes_max(budget_bytes: int | None) -> int:
+    """Largest size of a merged segment for a budget of the record."""
+    return _MERGED_MAX if budget_bytes is None else min(_MERGED_MAX, max(0, budget_bytes) // _BUDGET_SHARE)
+
+
+def groups_to_merge(segments: list[Segment], bytes_max: int) -> Iterator[list[Segment]]:
+    """Groups of 16 consecutive segments of a table, of one level, that together have at most this size."""
+    for table in TABLES:
+        of_table = [segment for segment in segments if segment.table == table]
+        begin = 0
+        while len(group := of_table[begin : begin + _FAN_IN]) == _FAN_IN:
+            levels = [_level(segment) for segment in group]
+            if len(set(levels)) > 1:  # continue where the last level begins
+                begin += max(i for i in range(1, _FAN_IN) if levels[i] != levels[i - 1])
+                continue
+            if sum(segment.size_bytes for segment in group) <= bytes_max:
+                yield group
+            begin += _FAN_IN
+
+
+def rows_to_merge(run: Path, parts: list[Segment]) -> list[pa.Table] | None:
+    """The rows of each segment; None if one is missing, damaged, or of an earlier version with other columns."""
+    tables = []
+    for part in parts:
+        try:
+            tables.append(open_segment(run, part).read(use_threads=False))
+        except (RecordError, FileNotFoundError):
+            return None
+        if tables[-1].schema != tables[0].schema:
+            return None
+    return tables
+
+
+def row_groups(tables: list[pa.Table]) -> Iterator[pa.Table]:
+    """The rows in few parts that end with the end of a table, and so with a whole response."""
+    waiting: list[pa.Table] = []
+    for table in tables:
+        waiting.append(table)
+        if sum(one.num_rows for one in waiting) >= _GROUP_ROWS:
+            yield pa.concat_tables(waiting)
+            waiting = []
+    if waiting:
+        yield pa.concat_tables(waiting)
+
+
+def unlisted(run: Path, found: Manifest) -> list[str]:
+    """Files that a kill left before their line was written, or after the line on their removal; none if lines of the
+    manifest are damaged, which may have listed them.
+    """
+    if found.broken:
+        return []
+    listed = {segment.name for segment in found.segments}
+    folders = [table for table in TABLES if is_folder(run / table)]
+    names = [f"{table}/{path.name}" for table in folders for path in (run / table).iterdir()]
+    names = [name for name in names if name not in listed and _SEGMENT.fullmatch(name.rpartition("/")[2])]
+    return [name for name in names if found.is_closed(segment_numbers(name)[1])]
+
+
+def _level(segment: Segment) -> int:
+    first, last = segment.numbers
+    level, journals = 0, last - first + 1
+    while journals >= _FAN_IN:
+        level, journals = level + 1, journals // _FAN_IN
+    return level

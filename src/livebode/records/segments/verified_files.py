@@ -1,0 +1,101 @@
+"""The segments of a table as data sets of Arrow: a file is opened, and its checksum computed, when a query needs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pyarrow as pa
+import pyarrow.dataset as ds
+import pyarrow.parquet as pq
+from pyarrow.fs import FileInfo, FileSystemHandler, FileType, PyFileSystem
+
+from livebode.core import Event
+from livebode.records.segments import reading
+from livebode.records.segments.manifest import Segment
+
+_GROUPS_MAX = 16  # DuckDB needs some milliseconds to plan each
+
+
+@dataclass(frozen=True)
+class SegmentGroup:
+    """Consecutive segments, and the times of their first and last row."""
+
+    rows: ds.Dataset
+    first_s: float
+    last_s: float
+
+
+def segment_groups(run: Path, segments: list[Segment], damages: list[Event]) -> list[SegmentGroup]:
+    """The segments of one table, by age, in at most 16 groups; none if all are damaged.
+
+    A query that excludes the times of a group opens none of its files. Damage that is found while a data set is read
+    is appended to `damages`, and the damaged file has no rows.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    """
+    first = next((found for one in segments if (found := reading.whole(run, one, damages.append)) is not None), None)
+    if first is None:
+        return []
+    schema = first.schema_arrow
+    files = PyFileSystem(_VerifiedFiles(run, segments, schema, damages))
+    parquet = ds.ParquetFileFormat()
+    size = -(-len(segments) // _GROUPS_MAX)
+    groups = []
+    for begin in range(0, len(segments), size):
+        part = segments[begin : begin + size]
+        pieces = [parquet.make_fragment(one.name, files, partition_expression=_within(one)) for one in part]
+        rows = ds.FileSystemDataset(pieces, schema, parquet, files)
+        groups.append(SegmentGroup(rows, min(one.first_s for one in part), max(one.last_s for one in part)))
+    return groups
+
+
+def _within(segment: Segment) -> ds.Expression:
+    sample, time_s = ds.field("sample"), ds.field("time_s")
+    of_samples = (sample >= segment.first_sample) & (sample <= segment.last_sample)
+    return of_samples & (time_s >= segment.first_s) & (time_s <= segment.last_s)
+
+
+class _VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
+    """Reads the files of these segments, and nothing else."""
+
+    def __init__(self, run: Path, segments: list[Segment], schema: pa.Schema, damages: list[Event]) -> None:
+        self._run, self._schema, self._damages = run, schema, damages
+        self._segments = {segment.name: segment for segment in segments}
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __ne__(self, other: object) -> bool:
+        return self is not other
+
+    def open_input_file(self, path: str) -> pa.NativeFile:
+        """The content of a segment; no rows if it is damaged."""
+        data = reading.content(self._run, self._segments[path], self._damages.append)
+        if data is None:
+            sink = pa.BufferOutputStream()
+            pq.write_table(self._schema.empty_table(), sink)
+            return pa.BufferReader(sink.getvalue())
+        return pa.BufferReader(data)
+
+    def open_input_stream(self, path: str) -> pa.NativeFile:
+        return self.open_input_file(path)
+
+    def normalize_path(self, path: str) -> str:
+        return path
+
+    def get_type_name(self) -> str:
+        return "segments of a run"
+
+    def get_file_info(self, paths: list[str]) -> list[FileInfo]:
+        return [FileInfo(path, FileType.File) for path in paths]
+
+    def _unsupported(self, *_: Any) -> NoReturn:
+        raise NotImplementedError
+
+    get_file_info_selector = create_dir = delete_dir = delete_dir_contents = delete_root_dir_contents = _unsupported
+    delete_file = move = copy_file = open_output_stream = open_append_stream = _unsupported
