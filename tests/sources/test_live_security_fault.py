@@ -20,7 +20,7 @@ from tests.support.errors import refused
 from tests.support.peers.broker import TOPIC, Mosquitto, publisher, stop
 from tests.support.peers.certificates import Authority, self_signed
 from tests.support.peers.opcua import OpcUaPeer
-from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, Feeding, batches, free_port, program, until
+from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, Feeding, batches, free_port, program, taken, until
 from tests.support.peers.plc import RingPeer
 
 SECRET = "correct horse battery"
@@ -268,8 +268,7 @@ def test_datagrams_of_others_than_the_sender_are_dropped_and_named(interface):
                 time.sleep(0.01)
 
         with Feeding(send), open_source(settings) as source:
-            blocks = source.blocks()
-            epochs = {next(blocks).origin.epoch for _ in range(10)}
+            epochs = {block.origin.epoch for block in taken(source.blocks(), 10)}
             events = [event for event in source.take_events() if event.kind == "foreign"]
     assert epochs == {5}
     assert events[0].message == "a datagram from 127.0.0.3 was dropped; source.sender is 127.0.0.2"

@@ -15,7 +15,7 @@ import pytest
 from livebode.core import SourceError
 from livebode.sources.live import SourceSettings, encode_layout, encode_samples, make_source, open_source
 from tests.support.peers.broker import TOPIC, Mosquitto, Nats, publisher, stop
-from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, batches, free_port, until
+from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, batches, free_port, taken, until
 
 V311, V5 = 4, 5
 REJECTED = b"\x20\x02\x00\x01"
@@ -123,16 +123,14 @@ def test_a_broker_of_version_3_1_1_stores_messages_for_a_client_with_a_name(tmp_
         thread = threading.Thread(target=first)
         thread.start()
         with open_source(settings(broker.port, client_id="livebode", reorder_batches=0)) as source:
-            blocks = source.blocks()
-            seen = [next(blocks) for _ in range(10)]
+            seen = taken(source.blocks(), 10)
             thread.join()
         # What the broker delivers to a client that is leaving is repeated after half a minute.
         until(lambda: broker.logged(broker.left), "the client to leave")
         client.publish(TOPIC, encode_layout(CHANNELS, RATE_HZ), qos=1).wait_for_publish(PATIENCE_S)
         send(slice(10, 40))
         with open_source(settings(broker.port, client_id="livebode", reorder_batches=0)) as source:
-            blocks = source.blocks()
-            later = [next(blocks) for _ in range(30)]
+            later = taken(source.blocks(), 30)
         stop(client)
     found = np.concatenate([block.data for block in [*seen, *later]], axis=1)
     np.testing.assert_array_equal(found, np.concatenate([batch.data for batch in given], axis=1))

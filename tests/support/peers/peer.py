@@ -7,7 +7,7 @@ import shutil
 import socket
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from livebode.core import Channel
-from livebode.sources.live import Batch, LiveSource, SourceSettings, open_source
+from livebode.sources.live import Batch, LiveBlock, LiveSource, SourceSettings, open_source
 
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
 RATE_HZ = 4000.0
@@ -33,6 +33,14 @@ def batches(count: int, first: int = 1000, epoch: int = 0) -> list[Batch]:
         noise = rng.standard_normal(SAMPLES) * 10.0 ** rng.integers(-12, 12, SAMPLES)
         data = np.stack([np.arange(start, start + SAMPLES, dtype=float), noise])
         found.append(Batch(start, data, CHANNELS, RATE_HZ, epoch, STAMP_S + start / RATE_HZ))
+    return found
+
+
+def taken(blocks: Iterator[LiveBlock], count: int) -> list[LiveBlock]:
+    """The next Blocks with the samples of so many batches: those that wait together are one Block."""
+    found: list[LiveBlock] = []
+    while sum(len(block) for block in found) < count * SAMPLES:
+        found.append(next(blocks))
     return found
 
 
