@@ -66,7 +66,7 @@ def test_the_help_has_a_short_option(name: str) -> None:
 
 def test_the_help_of_the_first_page_names_the_section_in_brackets() -> None:
     for name in ("report", "compare"):
-        text = " ".join(livebode(name, "--help").out.replace("│", " ").split())
+        text = " ".join(livebode(name, "--help").out.replace("│", " ").replace("|", " ").split())
         assert "TOML file with a [report]" in text
         assert "that of the [report], or en" in text
 

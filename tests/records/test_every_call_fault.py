@@ -64,8 +64,8 @@ def test_a_call_that_fails_once_costs_nothing(folder: Path) -> None:
             record_machine(machine(SAMPLES), out)
         check_whole(out, SAMPLES)
         shutil.rmtree(out)
-    # The others were closing a segment, which waits without a pause.
-    assert paused > (ended - begun) / 3
+    # The others were closing or merging segments, which waits without a pause.
+    assert paused > (ended - begun) / 4
     assert unclosed > 0
 
 

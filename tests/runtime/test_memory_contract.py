@@ -48,7 +48,8 @@ def test_a_run_holds_no_more_after_twice_the_blocks(tmp_path: Path) -> None:
     settings = Settings(lines=Lines((4, 7), WINDOW, RATE_HZ), output="y", input="u", excitation="w", hop=HOP)
     record(machine, Tracker(settings), tmp_path / "run", segments=RecordSection(segment_s=5.0), again=False)
     warm, end = machine.held
-    # 64 parts of the thinned copy, events that wait for the next report, and a line of the manifest a segment.
-    bounds = {"Responses": 70, "Event": REPEATS_MAX, "Segment": 2 * BLOCKS * BLOCK / RATE_HZ / 5.0}
+    # 64 parts of the thinned copy, events that wait for the next report, and lines of the manifest: for a segment of
+    # 5 s those of its responses, its parameters and its means over 1 s, 1 min and 1 h.
+    bounds = {"Responses": 70, "Event": REPEATS_MAX, "Segment": 5 * BLOCKS * BLOCK / RATE_HZ / 5.0}
     grown = {name: count - warm[name] for name, count in end.items() if count - warm[name] > bounds.get(name, 10)}
     assert grown == {}

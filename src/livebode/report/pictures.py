@@ -51,11 +51,13 @@ def save_pictures(
 
 def save(figure: Figure, path: Path, look: Style) -> Path:
     """Write a figure; the same figure gives the same bytes. OSError, and nothing has changed, if it is not written."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
     with whole_file(path) as partial, drawing(look), quiet_about_letters():
-        figure.canvas.draw()
-        pixels = np.asarray(figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()  # type: ignore[no-untyped-call]
+        pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
         # Without the alpha channel, a quarter of the bytes: the paper is opaque.
         picture = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
         picture.save(partial, "png", compress_type=_RUNS, dpi=(figure.dpi, figure.dpi))
