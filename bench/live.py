@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
+import os
 import socket
 import tempfile
 import time
@@ -125,7 +126,8 @@ def wake(end: Flag, results: Connection) -> None:
 
 
 def look_on(url: str, end: Flag) -> None:
-    """The browser of a person, on the first axis."""
+    """The browser of a person, on the first axis; it yields to the run, since it is mostly on another computer."""
+    os.nice(19)
     with chromium() as browser:
         shown = browser.new_page(viewport={"width": 1440, "height": 900})
         shown.goto(url)
