@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from bench.job import LINES, RATE_HZ, WINDOW, signals
-from bench.live import BATCH, CHANNELS, CORES, HOP, _free_ports, wake
+from bench.live import BATCH, CHANNELS, CORES, HOP, free_ports, show, wake
 from livebode.configuration import Axis
 from livebode.core import Block, Responses, SpectraLayout
 from livebode.runtime import Destination, Document, Session, turns
@@ -202,7 +202,7 @@ def track(
 def measure(hall: Hall, seconds: float) -> dict[str, float]:
     """Latency, losses and processor time."""
     context = multiprocessing.get_context("spawn")
-    ports, end = _free_ports(hall.axes), context.Event()
+    ports, end = free_ports(hall.axes), context.Event()
     sent_s = RawArray(c_double, TURNS * GROUPS)
     sender, idle = context.Pipe(duplex=False), context.Pipe(duplex=False)
     beside = [
@@ -244,15 +244,12 @@ def measure(hall: Hall, seconds: float) -> dict[str, float]:
 
 
 def report(hall: Hall, found: dict[str, float]) -> None:
-    print(hall.name)
-    for label, value in found.items():
-        print(f"  {label:42}{value:10.4g}")
-    for target, reached in (
-        ("0 lost", not found["samples lost"]),
-        (f"p99 ≤ {1e3 * TARGET_S:g} ms", found["p99, ms"] <= 1e3 * TARGET_S),
-        (f"at most {CORES} cores", found["cores used"] <= CORES),
-    ):
-        print(f"  target {target}: {'met' if reached else 'missed'}", flush=True)
+    targets = {
+        "0 lost": not found["samples lost"],
+        f"p99 ≤ {1e3 * TARGET_S:g} ms": found["p99, ms"] <= 1e3 * TARGET_S,
+        f"at most {CORES} cores": found["cores used"] <= CORES,
+    }
+    show(hall.name, found, targets)
 
 
 def main() -> None:

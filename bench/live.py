@@ -151,7 +151,7 @@ def _measured(
 ) -> dict[str, float]:
     clocks = {name: Clock() for name in hubs}  # after the dashboard, so that its work is in the latency
     context = multiprocessing.get_context("spawn")
-    ports, end = _free_ports(scenario.axes), context.Event()
+    ports, end = free_ports(scenario.axes), context.Event()
     results, outlet = context.Pipe(duplex=False)
     beside = [context.Process(target=send, args=(ports, end)), context.Process(target=wake, args=(end, outlet))]
     if url is not None:
@@ -204,19 +204,24 @@ def _measured(
 
 
 def report(scenario: Scenario, found: dict[str, float]) -> None:
-    print(scenario.name)
-    for label, value in found.items():
-        print(f"  {label:38}{value:10.4g}")
     target_s = TARGET_ALONE_S if scenario.axes == 1 else TARGET_S
-    whole = not found["samples lost"] and found["cores used"] <= CORES
-    for target, reached in (
-        (f"p99 ≤ {1e3 * target_s:g} ms", found["p99, ms"] <= 1e3 * target_s),
-        (f"nothing lost, at most {CORES} cores", whole),
-    ):
+    targets = {
+        f"p99 ≤ {1e3 * target_s:g} ms": found["p99, ms"] <= 1e3 * target_s,
+        f"nothing lost, at most {CORES} cores": not found["samples lost"] and found["cores used"] <= CORES,
+    }
+    show(scenario.name, found, targets)
+
+
+def show(name: str, found: dict[str, float], targets: dict[str, bool]) -> None:
+    """Print what was found, and which targets are met."""
+    print(name)
+    for label, value in found.items():
+        print(f"  {label:42}{value:10.4g}")
+    for target, reached in targets.items():
         print(f"  target {target}: {'met' if reached else 'missed'}", flush=True)
 
 
-def _free_ports(count: int) -> list[int]:
+def free_ports(count: int) -> list[int]:
     links = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     for link in links:
         link.bind(("127.0.0.1", 0))

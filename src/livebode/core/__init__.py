@@ -3,6 +3,28 @@
 import logging
 from typing import TYPE_CHECKING
 
+from livebode.core.errors import (
+    ArchiveError,
+    BaselineError,
+    ConfigError,
+    DamageWarning,
+    DesignError,
+    ExtraError,
+    FitError,
+    FleetError,
+    GridError,
+    LivebodeError,
+    LocationError,
+    OutputError,
+    RecordError,
+    RecordingError,
+    ServerError,
+    SignalError,
+    SimulationError,
+    SourceError,
+    StateError,
+    UsageError,
+)
 from livebode.on_first_use import on_first_use
 
 if TYPE_CHECKING:
@@ -18,28 +40,6 @@ if TYPE_CHECKING:
     from livebode.core._unit_reading import QuantityKind, UnitReading, read_unit, split_plant_unit
     from livebode.core._wording import counted, plural, rounded_down
     from livebode.core.controllers import PID, Cascade, PositionPD
-    from livebode.core.errors import (
-        ArchiveError,
-        BaselineError,
-        ConfigError,
-        DamageWarning,
-        DesignError,
-        ExtraError,
-        FitError,
-        FleetError,
-        GridError,
-        LivebodeError,
-        LocationError,
-        OutputError,
-        RecordError,
-        RecordingError,
-        ServerError,
-        SignalError,
-        SimulationError,
-        SourceError,
-        StateError,
-        UsageError,
-    )
     from livebode.core.lines import Lines
     from livebode.core.model import Gain, Model, as_model
     from livebode.core.parameters import Parameters
@@ -95,28 +95,6 @@ _NAMES = {
         "PID",
         "Cascade",
         "PositionPD",
-    ),
-    "errors": (
-        "ArchiveError",
-        "BaselineError",
-        "ConfigError",
-        "DamageWarning",
-        "DesignError",
-        "ExtraError",
-        "FitError",
-        "FleetError",
-        "GridError",
-        "LivebodeError",
-        "LocationError",
-        "OutputError",
-        "RecordError",
-        "RecordingError",
-        "ServerError",
-        "SignalError",
-        "SimulationError",
-        "SourceError",
-        "StateError",
-        "UsageError",
     ),
     "lines": ("Lines",),
     "model": (

@@ -14,9 +14,9 @@ from livebode.fitting import BinnedMeans, binned_means, combined
 from livebode.records.response_table import SCHEMA, as_batch, responses_in
 from livebode.records.run import RunRecord, lines_in
 from livebode.records.segments import reading
-from livebode.records.segments.manifest import Segment
+from livebode.records.segments.manifest import TIERS, Segment
 
-BIN_S = {"responses_1s": 1.0, "responses_1min": 60.0, "responses_1h": 3600.0}
+BIN_S = dict(zip(TIERS, (1.0, 60.0, 3600.0)))
 """The tables and the spans of their means."""
 
 TIER_SCHEMA = pa.schema([*SCHEMA, ("count", pa.int64()), ("windows", pa.float64()), ("responses", pa.int64())])

@@ -22,7 +22,7 @@ NAME = "manifest.jsonl"
 TIERS = ("responses_1s", "responses_1min", "responses_1h")
 TABLES = ("responses", "parameters", "samples", *TIERS)
 _SHA256 = re.compile("[0-9a-f]{64}")
-_NUMBERS = re.compile(r"[a-z0-9_]+/(\d{6,9})(?:-(\d{6,9}))?\.parquet")
+SEGMENT_NAME = re.compile(r"[a-z0-9_]+/(\d{6,9})(?:-(\d{6,9}))?\.parquet")
 _COUNTS = ("rows", "first_sample", "last_sample", "size_bytes")
 
 
@@ -237,7 +237,7 @@ def name_of(table: str, first: int, last: int) -> str:
 
 def segment_numbers(name: str) -> tuple[int, int]:
     """The numbers in `name_of`; ValueError for another name."""
-    found = _NUMBERS.fullmatch(name)
+    found = SEGMENT_NAME.fullmatch(name)
     if found is None:
         raise ValueError(f"{name!r} is not the name of a segment")
     return int(found[1]), int(found[2] or found[1])

@@ -7,7 +7,6 @@ an hour slower: the checksum is that of a whole file.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,14 +14,13 @@ import pyarrow as pa
 
 from livebode.core import RecordError
 from livebode.records.inside import is_folder
-from livebode.records.segments.manifest import TABLES, Manifest, Segment, segment_numbers
+from livebode.records.segments.manifest import SEGMENT_NAME, TABLES, Manifest, Segment, segment_numbers
 from livebode.records.segments.segment_file import open_segment
 
 _MERGED_MAX = 4 << 20
 _BUDGET_SHARE = 32  # the budget removes whole segments
 _FAN_IN = 16
 _GROUP_ROWS = 1 << 15
-_SEGMENT = re.compile(r"\d{6,9}(-\d{6,9})?\.parquet")
 
 
 def merged_bytes_max(budget_bytes: int | None) -> int:
@@ -79,7 +77,7 @@ def unlisted(run: Path, found: Manifest) -> list[str]:
     listed = {segment.name for segment in found.segments}
     folders = [table for table in TABLES if is_folder(run / table)]
     names = [f"{table}/{path.name}" for table in folders for path in (run / table).iterdir()]
-    names = [name for name in names if name not in listed and _SEGMENT.fullmatch(name.rpartition("/")[2])]
+    names = [name for name in names if name not in listed and SEGMENT_NAME.fullmatch(name)]
     return [name for name in names if found.is_closed(segment_numbers(name)[1])]
 
 
