@@ -20,6 +20,7 @@ from livebode.analysis.loop_report import LoopReport
 from livebode.analysis.parameter_track import Track
 from livebode.configuration.report_section import MAGNITUDES, MARGIN_UNITS, LimitSection
 from livebode.core import Loop, Response
+from livebode.core.distributions import normal_quantile
 from livebode.estimation.quantities import convert
 from livebode.fitting import Fit
 from livebode.language import marked
@@ -228,6 +229,4 @@ def _parameter(quantity: str, of: LimitEvidence) -> MeasuredValues | str:
 
 def _joint(count: int) -> float:
     """Deviations that cover so many normal values together with 95 % (Bonferroni)."""
-    from scipy.special import ndtri
-
-    return float(ndtri(1 - _RISK / (2 * count)))
+    return normal_quantile(1 - _RISK / (2 * count))

@@ -13,6 +13,7 @@ from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import LivebodeError
+from livebode.core.distributions import normal_quantile
 from livebode.fitting import Fit
 from livebode.margins import Margins, OpenLoop, against_lines, margins
 
@@ -116,14 +117,12 @@ def _rows(found: Margins) -> dict[str, tuple[float, float, str]]:
 
 
 def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[QuantityChange, ...]:
-    from scipy.special import ndtri
-
     before, after = rows
     names = [name for name in before if name in after]
     # The bounds of each are 1.96 sigma.
-    usual = float(ndtri(1 - ALPHA / 2))
-    wider = float(ndtri(1 - ALPHA / (2 * max(len(names), 1)))) / usual
-    surer = wider + float(ndtri(0.95)) / usual
+    usual = normal_quantile(1 - ALPHA / 2)
+    wider = normal_quantile(1 - ALPHA / (2 * max(len(names), 1))) / usual
+    surer = wider + normal_quantile(0.95) / usual
     return tuple(
         QuantityChange(
             name,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from livebode.core.errors.extra import ExtraError
@@ -32,6 +34,37 @@ def install_command(*extras: str) -> str:
 def not_installed(message: str, package: str, extra: str, **facts: object) -> ExtraError:
     """The error of an optional package that is missing, with the command that installs it."""
     return ExtraError("not-installed", message, f"run {install_command(extra)}", package=package, extra=extra, **facts)
+
+
+@contextmanager
+def needing(package: str, extra: str, what: str) -> Iterator[None]:
+    """Around the imports of an optional package: ExtraError where it is missing.
+
+    Parameters
+    ----------
+    package
+        Its name, as its makers write it; in lower case it is the name to import.
+    extra
+        That installs it.
+    what
+        Needs it: a noun in the singular, for the message.
+
+    Raises
+    ------
+    ExtraError
+        If the package is not installed.
+
+    Examples
+    --------
+    >>> with needing("SciPy", "analysis", "a validation"):
+    ...     from scipy import signal
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != package.lower():
+            raise
+        raise not_installed(f"{what} needs {package}, which is not installed", package.lower(), extra) from None
 
 
 def _pip() -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core._wording import counted
+from livebode.core.distributions import normal_quantile
 from livebode.core.errors import UsageError
 from livebode.core.rows import RowArrays
 
@@ -31,9 +32,7 @@ def half_width(sigma: Floats, probability: float) -> Floats:
             argument="probability",
             value=probability,
         )
-    from scipy.special import ndtri
-
-    return np.asarray(sigma * float(ndtri(0.5 + probability / 2)))
+    return np.asarray(sigma * normal_quantile(0.5 + probability / 2))
 
 
 @dataclass(frozen=True, eq=False)

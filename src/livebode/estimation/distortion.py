@@ -7,10 +7,10 @@ from functools import lru_cache
 from math import gcd
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
 from livebode.core import Lines
+from livebode.core.distributions import f_quantile
 from livebode.estimation.detection import Groups, Interpolation
 from livebode.estimation.moments import Moments
 from livebode.estimation.products import divided, power, times
@@ -169,4 +169,4 @@ def by_chance(known: int, dof: float) -> float:
     Of as many detection lines as the noise is averaged over; the mean over more of them exceeds it less often.
     """
     independent = 2 * min(known, _SMOOTH)
-    return float(scipy.special.fdtri(independent, independent * dof, 1 - _CHANCE))
+    return f_quantile(_CHANCE, independent, independent * dof)

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import detrend
-from scipy.signal.windows import hann
 
 from livebode.core import SignalError
 from livebode.core.mains import MAINS_HZ
@@ -94,8 +92,11 @@ def _powers(x: Floats, rate_hz: float) -> Floats:
             seconds_min=SECONDS_MIN,
         )
     n = x.size // _PARTS
-    parts = detrend(x[: n * _PARTS].reshape(_PARTS, n), axis=1)
-    window = hann(n, sym=False)
+    parts = x[: n * _PARTS].reshape(_PARTS, n)
+    slope = np.arange(n) - (n - 1) / 2
+    parts = parts - parts.mean(axis=1, keepdims=True)
+    parts = parts - np.outer(parts @ slope / (slope @ slope), slope)
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)  # Hann
     return np.asarray(np.abs(np.fft.rfft(parts * window, axis=1)) ** 2 * 4 / (n * np.sum(window**2)))
 
 

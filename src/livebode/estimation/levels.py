@@ -7,10 +7,10 @@ from math import gcd
 from typing import Any
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
 from livebode.core import Lines, Stage, StatefulBase
+from livebode.core.distributions import f_quantile
 from livebode.core.mains import meets_mains
 from livebode.estimation.detection import Interpolation
 from livebode.estimation.products import power
@@ -229,7 +229,7 @@ def _level(found: Floats, noise: Floats, of_line: float, periods: int, stretches
     if count < _BINS_MIN or of_line <= 0:
         return None
     total, by_chance = float(found[known].mean()), stretches * float(noise[known].mean())
-    limit = float(scipy.special.fdtri(2 * count * stretches, 2 * count * (periods - stretches), 1 - CHANCE))
+    limit = f_quantile(CHANCE, 2 * count * stretches, 2 * count * (periods - stretches))
     significant = bool(total > limit * by_chance and total > _ROUNDING * of_line * periods)
     rest, one = max(total - by_chance, 0.0), by_chance / stretches
     low, middle, high = np.nan, np.nan, rest + (limit - 1) * by_chance

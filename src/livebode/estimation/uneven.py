@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -163,11 +162,12 @@ class UnevenSpectra:
         normal[0, 0] = one[0].real
         if trend:
             normal[0, 1], normal[1, 1] = sums[_U, 0].real, sums[_UU, 0].real
-        factor, singular = scipy.linalg.lapack.dpotrf(normal, lower=0)
-        if singular:
+        normal = np.triu(normal) + np.triu(normal, 1).T
+        try:
+            np.linalg.cholesky(normal)
+        except np.linalg.LinAlgError:
             return None
-        inverse, _ = scipy.linalg.lapack.dpotri(factor, lower=0)
-        return np.asarray(np.triu(inverse) + np.triu(inverse, 1).T)
+        return np.asarray(np.linalg.inv(normal))
 
     def _head(self, sums: Complex, trend: bool) -> Complex:
         """Sums of the constant, and of the trend, at all orders."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import Block, Lines, Response, SignalError, UsageError
+from livebode.core.installing import needing
 from livebode.estimation.products import power
 from livebode.estimation.welch_average import independent_windows
 
@@ -85,7 +86,8 @@ def welch(
     if not np.isfinite(u.sum() + y.sum() + w.sum()):
         raise SignalError("not-finite", "the recording has samples that are not finite", "cut it before or after them")
 
-    from scipy import signal  # takes half a second to import
+    with needing("SciPy", "analysis", "the estimator welch"):
+        from scipy import signal  # takes half a second to import
 
     def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         _, s = signal.csd(

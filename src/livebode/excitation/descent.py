@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
+
+from livebode.core.fast_length import fast_length
+from livebode.core.installing import needing
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -26,12 +28,12 @@ def period(bins: Bins, complexes: Complex, samples: int) -> Floats:
     """Re Σ c_k·e^(2πjkt) over one period, shape (…, samples), from c of shape (…, lines)."""
     spectrum = np.zeros((*complexes.shape[:-1], samples // 2 + 1), dtype=np.complex128)
     spectrum[..., bins] = complexes * (samples / 2)
-    return np.asarray(scipy.fft.irfft(spectrum, samples, axis=-1))
+    return np.asarray(np.fft.irfft(spectrum, samples, axis=-1))
 
 
 def samples_for(highest: int, oversampled: int) -> int:
     """Number of samples of a period; fewer where a single line is very high, but above its Nyquist rate."""
-    return int(scipy.fft.next_fast_len(min(oversampled * highest, max(_SAMPLES_MAX, 3 * highest)), real=True))
+    return fast_length(min(oversampled * highest, max(_SAMPLES_MAX, 3 * highest)))
 
 
 def _power(x: Floats, exponent: int) -> Floats:
@@ -94,8 +96,8 @@ class _Norm:
         """(JᵀJ + damping)⁻¹·Jᵀr/(2p − 1), for a peak of 1, shape (starts, lines)."""
         lines = self._amplitude * np.exp(1j * phases)
         weights = _power(x, 2 * self._p - 2)
-        slope = -np.imag(lines * np.conj(scipy.fft.rfft(weights * x, axis=-1)[:, self._bins]))
-        spectrum = scipy.fft.rfft(weights, axis=-1)
+        slope = -np.imag(lines * np.conj(np.fft.rfft(weights * x, axis=-1)[:, self._bins]))
+        spectrum = np.fft.rfft(weights, axis=-1)
         columns, rows = lines[:, np.newaxis, :], lines[:, :, np.newaxis]
         hessian = np.real(rows * columns.conj() * _at(spectrum, self._apart, self._samples))
         hessian -= np.real(rows * columns * _at(spectrum, self._added, self._samples).conj())
@@ -114,7 +116,8 @@ def _at(spectrum: Complex, bins: Bins, samples: int) -> Complex:
 
 def descend(phases: Floats, bins: Bins, amplitude: Floats, stages: Stages) -> Floats:
     """The same from one start, shape (lines,), by L-BFGS: for so many lines that a Hessian would take too long."""
-    from scipy.optimize import minimize  # a third of a second to import
+    with needing("SciPy", "analysis", f"a design of {bins.size} lines"):
+        from scipy.optimize import minimize  # a third of a second to import
 
     def norm(at: Floats, p: int, samples: int) -> tuple[float, Floats]:
         lines = amplitude * np.exp(1j * at)
@@ -123,7 +126,7 @@ def descend(phases: Floats, bins: Bins, amplitude: Floats, stages: Stages) -> Fl
         x /= peak
         power = _power(x, 2 * p - 1)
         total = float(np.sum(power * x))  # no BLAS: its threads cost ten times this on a busy machine
-        slope = -np.imag(lines * np.conj(scipy.fft.rfft(power)[bins])) / (peak * total)
+        slope = -np.imag(lines * np.conj(np.fft.rfft(power)[bins])) / (peak * total)
         return float(np.log(peak) + np.log(total / samples) / (2 * p)), slope
 
     for p, oversampled in stages:

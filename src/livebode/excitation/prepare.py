@@ -5,10 +5,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import Block, SignalError, UsageError
+from livebode.core.fast_length import fast_length
 
 Floats = NDArray[np.float64]
 
@@ -113,16 +113,16 @@ def whitened(x: Floats) -> tuple[Floats, Floats]:
     subtracting the line between them, because the filter is circular.
     """
     level = _joined(x)
-    size = scipy.fft.next_fast_len(x.size, real=True)
-    power = np.abs(scipy.fft.rfft(level * np.hanning(x.size), size)) ** 2
+    size = fast_length(x.size)
+    power = np.abs(np.fft.rfft(level * np.hanning(x.size), size)) ** 2
     background = _band_medians(power)
     background += _WHITEN_FLOOR * float(power[1:].mean())
-    spectrum = scipy.fft.rfft(level, size)
+    spectrum = np.fft.rfft(level, size)
     spectrum[0] = 0
     spectrum[1:] /= np.sqrt(background[1:])
-    flat = scipy.fft.irfft(spectrum, size)[: x.size]
+    flat = np.fft.irfft(spectrum, size)[: x.size]
     spectrum[power < _PROMINENT * background] = 0
-    return flat, scipy.fft.irfft(spectrum, size)[: x.size]
+    return flat, np.fft.irfft(spectrum, size)[: x.size]
 
 
 def _joined(x: Floats) -> Floats:

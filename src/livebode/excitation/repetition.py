@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
+
+from livebode.core.fast_length import fast_length
 
 Floats = NDArray[np.float64]
 
@@ -21,9 +22,9 @@ def difference(x: Floats) -> Floats:
     autocorrelation by FFT (Wiener–Khinchin) and running sums: O(n log n), and without the bias of an autocorrelation
     that divides by the full length. Cf. de Cheveigné, Kawahara 2002 (YIN), eq. (7).
     """
-    size = scipy.fft.next_fast_len(2 * x.size, real=True)
-    spectrum = scipy.fft.rfft(x, size)
-    product = scipy.fft.irfft(spectrum.real**2 + spectrum.imag**2, size)[: x.size]
+    size = fast_length(2 * x.size)
+    spectrum = np.fft.rfft(x, size)
+    product = np.fft.irfft(spectrum.real**2 + spectrum.imag**2, size)[: x.size]
     del spectrum
     head, tail = _running(x)
     head2, tail2 = _running(x * x)

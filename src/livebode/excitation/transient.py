@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from statistics import NormalDist
-
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core.distributions import normal_quantile
 from livebode.excitation.medians import medians
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
-_normal = NormalDist().inv_cdf  # scipy.special takes as long to load as a recording of minutes to track
 
 FALSE_ALARM = 1e-3  # probability that any period of a recording is marked by chance
 # With fewer periods there is no majority of steady ones.
@@ -70,8 +68,8 @@ def _far(distance: Floats, rounding: float | Floats) -> Flags:
     # Equal periods have the distance 0; adding the rounding keeps the logarithm.
     log = np.log(distance + rounding + np.finfo(np.float64).tiny)
     middle = _median(log)
-    spread = _median(np.abs(log - middle)) / _normal(0.75)
-    sigmas = -_normal(FALSE_ALARM / len(log))
+    spread = _median(np.abs(log - middle)) / normal_quantile(0.75)
+    sigmas = -normal_quantile(FALSE_ALARM / len(log))
     return np.asarray(log > middle + max(sigmas * spread, np.log(_FACTOR_MIN)))
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Responses
+from livebode.core.installing import needing
 from livebode.export.result import WriteResult, whole
 
 VARIABLE = "livebode"
@@ -30,7 +31,8 @@ def write_mat(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
     OutputError
         If there are more values than `VALUES_MAX`.
     """
-    from scipy.io import savemat
+    with needing("SciPy", "analysis", "an export for MATLAB"):
+        from scipy.io import savemat
 
     responses = whole(parts, "mat")
     struct = _struct(responses) | ({} if about is None else {"run": json.dumps(about, ensure_ascii=False)})

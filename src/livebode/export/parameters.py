@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.core import OutputError, RecordError
+from livebode.core.installing import needing
 from livebode.export.delimited import begin
 from livebode.export.matlab import VARIABLE
 from livebode.export.result import VALUES_MAX, WriteResult
@@ -89,7 +90,8 @@ def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> WriteRe
     OutputError
         If there are more than `VALUES_MAX`.
     """
-    from scipy.io import savemat
+    with needing("SciPy", "analysis", "an export for MATLAB"):
+        from scipy.io import savemat
 
     kept: list[pa.RecordBatch] = []
     for part in parts:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, inf, lgamma, log
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Lines, Responses, Stage, StatefulBase
+from livebode.core.distributions import sum_exceeded
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -130,7 +130,7 @@ class DriftTest(StatefulBase):
             if (trend := self._trend(i)) is not None:
                 change[i], sigma[i], farthest[i], log_chance[i] = trend
         own = log_chance < np.log(FALSE_ALARM / 2 / max(n, 1))
-        together = _chance_of_sum(n, -float(log_chance.sum())) < FALSE_ALARM / 2
+        together = sum_exceeded(n, -float(log_chance.sum())) < FALSE_ALARM / 2
         found = bool(own.any() or together)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = self._pairs[1].sum(axis=0) / self._pairs[2].sum(axis=0)
@@ -172,14 +172,3 @@ def _added(sums: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
     """Sums, shape (kinds, lines), and rows of shape (kinds, rows, lines), added one after the other: as if they came
     one by one, to the bit."""
     return np.asarray(np.add.reduce(np.concatenate([sums[:, np.newaxis], rows], axis=1), axis=1))
-
-
-def _chance_of_sum(count: int, total: float) -> float:
-    """Probability that the sum of `count` exponential variables of mean 1 exceeds `total`.
-
-    It is that of fewer than `count` events of a Poisson process, a sum over their number; `scipy.special.gammaincc` is
-    the same, and takes a tenth of a second to load.
-    """
-    if not 0 < total < inf:
-        return float(total <= 0)
-    return float(sum(exp(k * log(total) - total - lgamma(k + 1)) for k in range(count)))

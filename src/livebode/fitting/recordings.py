@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
 from livebode.core import Response, Responses, SignalError
+from livebode.core.distributions import f_exceeded, sum_exceeded
 from livebode.fitting.mean import RunningMean
 
 Floats = NDArray[np.float64]
@@ -276,11 +276,12 @@ def _excess(each: _Each) -> tuple[Floats, float]:
     excess = np.maximum(_smooth(np.where(judged, beyond / noise, np.nan)), 0.0) * noise
     if not judged.any():
         return np.zeros(each.value.shape[1]), np.nan
-    free = 2.0 * (each.count[judged] - 1)
+    free = 2 * (each.count[judged] - 1)
     of_noise = 2 * np.sum(np.where(each.used[:, judged], each.dof, 0.0), axis=0)
-    p = scipy.special.fdtrc(free, of_noise, found[judged] / by_noise[judged])
+    ratio = found[judged] / by_noise[judged]
+    p = np.array([f_exceeded(*one) for one in zip(ratio, free, of_noise)])
     log_p = np.log(np.maximum(p, 1e-300))
-    together = float(scipy.special.gammaincc(p.size, -log_p.sum()))
+    together = sum_exceeded(p.size, -log_p.sum())
     chance = min(1.0, 2 * min(together, float(p.min()) * p.size))
     return np.nan_to_num(excess), chance
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core.installing import needing
 from livebode.fitting.partial_fractions import PartialFractions, Structure
 from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.problem import Measured, Solution
@@ -147,7 +148,8 @@ class _Weighted:
         self._moves: tuple[Floats, tuple[Complex, Complex]] | None = None
 
     def minimised(self, start: Floats, evaluations: int) -> tuple[Floats, bool]:
-        from scipy.optimize import least_squares
+        with needing("SciPy", "analysis", "a fit of poles"):
+            from scipy.optimize import least_squares
 
         if not start.size:
             return start, True

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.margins.bracketing import find_minima, find_roots
 from livebode.margins.open_loop import OpenLoop
 
 Floats = NDArray[np.float64]
@@ -16,7 +17,7 @@ Complex = NDArray[np.complex128]
 BANDWIDTH = 10 ** (-3 / 20)
 """|T| at the bandwidth: 3 dB down."""
 
-_TOLERANCE = 1e-10  # of a frequency
+_TOLERANCE, _TOLERANCE_OF_PEAK = 1e-10, 1e-7  # of a frequency
 
 
 class Crossings(NamedTuple):
@@ -67,8 +68,6 @@ def crossings(
 
 def nearest_to_minus_one(loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex) -> Crossings:
     """Where |1 + L| is least in each row."""
-    from scipy.optimize import elementwise
-
     row = np.arange(len(grid))
     at = np.argmin(np.abs(1 + grid), axis=1)
     found = Crossings(row, frequency_hz[at], grid[row, at])
@@ -76,14 +75,12 @@ def nearest_to_minus_one(loop: OpenLoop, values: Floats, frequency_hz: Floats, g
     if not inside.size:
         return found
     log = np.log(frequency_hz)
-    bracket = tuple(log[at[inside] + step] for step in (-1, 0, 1))
 
-    def distance(x: Floats, i: Any) -> Floats:
-        return np.log(np.abs(1 + _one(loop, values, np.exp(x), i.astype(np.int64))))
+    def distance(x: Floats) -> Floats:
+        return np.abs(1 + _one(loop, values, np.exp(x), inside))
 
-    better = elementwise.find_minimum(distance, bracket, args=(inside.astype(float),), tolerances={"xatol": 1e-7})
     frequency = found.frequency_hz.copy()
-    frequency[inside] = np.exp(better.x)
+    frequency[inside] = np.exp(find_minima(distance, log[at[inside] - 1], log[at[inside] + 1], _TOLERANCE_OF_PEAK))
     return Crossings(row, frequency, _one(loop, values, frequency, row))
 
 
@@ -105,21 +102,18 @@ def _changes(grid: Complex, kind: CrossingKind) -> Starts:
 
 def _roots(loop: OpenLoop, values: Floats, frequency_hz: Floats, starts: list[Starts]) -> list[Crossings]:
     """The roots between neighbours of the grid; all kinds at once, because the number of calls determines the time."""
-    from scipy.optimize import elementwise
-
     row, at = (np.concatenate(part) for part in zip(*starts))
     kind = np.repeat(np.arange(len(starts)), [len(r) for r, _ in starts])
     if not row.size:
         return [Crossings(row, np.zeros(0), np.zeros(0, dtype=np.complex128))] * len(starts)
 
-    def value(x: Floats, row: Any, kind: Any) -> Floats:
-        found = _one(loop, values, x, row.astype(np.int64))
-        return np.asarray(np.choose(kind.astype(np.int64), [k.side(found) for k in _KINDS]))
+    def value(x: Floats) -> Floats:
+        found = _one(loop, values, x, row)
+        return np.asarray(np.choose(kind, [k.side(found) for k in _KINDS]))
 
-    ends, about = (frequency_hz[at], frequency_hz[at + 1]), (row.astype(float), kind.astype(float))
-    root = elementwise.find_root(value, ends, args=about, tolerances={"xrtol": _TOLERANCE})
-    level = _one(loop, values, root.x, row)
-    return [Crossings(row[of], root.x[of], level[of]) for of in (kind == i for i in range(len(starts)))]
+    root = find_roots(value, frequency_hz[at], frequency_hz[at + 1], _TOLERANCE)
+    level = _one(loop, values, root, row)
+    return [Crossings(row[of], root[of], level[of]) for of in (kind == i for i in range(len(starts)))]
 
 
 def _one(loop: OpenLoop, values: Floats, frequency_hz: Floats, row: NDArray[np.int64]) -> Complex:

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.core import UsageError
 from livebode.core.model import Algebra
 
+Polynomial = tuple[float, float, float]
+
 
 @dataclass(frozen=True)
 class Biquad(Algebra):
@@ -38,10 +40,8 @@ class Biquad(Algebra):
         return np.asarray((self.b[0] + before * (self.b[1] + before * self.b[2])) / below)
 
     @classmethod
-    def of(cls, numerator: list[float], denominator: list[float], frequency_hz: float, rate_hz: float) -> Biquad:
+    def of(cls, numerator: Polynomial, denominator: Polynomial, frequency_hz: float, rate_hz: float) -> Biquad:
         """By the bilinear transformation that is exact at `frequency_hz` (prewarped)."""
-        from scipy.signal import bilinear
-
         if not 0 < frequency_hz < rate_hz / 2:
             raise UsageError(
                 "out-of-range",
@@ -51,8 +51,15 @@ class Biquad(Algebra):
                 value=frequency_hz,
                 rate_hz=rate_hz,
             )
-        b, a = bilinear(numerator, denominator, fs=pi * frequency_hz / tan(pi * frequency_hz / rate_hz))
-        return cls((float(b[0]), float(b[1]), float(b[2])), (float(a[1]), float(a[2])), rate_hz)
+        double = 2 * pi * frequency_hz / tan(pi * frequency_hz / rate_hz)  # s = double·(1 − 1/z)/(1 + 1/z)
+        b, a = (_of_delays(polynomial, double) for polynomial in (numerator, denominator))
+        return cls((b[0] / a[0], b[1] / a[0], b[2] / a[0]), (a[1] / a[0], a[2] / a[0]), rate_hz)
+
+
+def _of_delays(polynomial: Polynomial, double: float) -> Polynomial:
+    """p2·s² + p1·s + p0 times (1 + 1/z)²: its coefficients of 1, 1/z, 1/z²."""
+    square, first, constant = polynomial[0] * double**2, polynomial[1] * double, polynomial[2]
+    return square + first + constant, 2 * (constant - square), square - first + constant
 
 
 def notch(frequency_hz: float, depth_db: float, damping: float, rate_hz: float) -> Biquad:
@@ -70,7 +77,7 @@ def notch(frequency_hz: float, depth_db: float, damping: float, rate_hz: float) 
     array([1. , 0.1, 1. ])
     """
     omega, share = 2 * pi * frequency_hz, 10 ** (-depth_db / 20)
-    above, below = ([1.0, 2 * d * omega, omega**2] for d in (share * damping, damping))
+    above, below = ((1.0, 2 * d * omega, omega**2) for d in (share * damping, damping))
     return Biquad.of(above, below, frequency_hz, rate_hz)
 
 
@@ -88,7 +95,7 @@ def low_pass(frequency_hz: float, rate_hz: float, damping: float = 1 / sqrt(2)) 
     array([1.    , 0.7071])
     """
     omega = 2 * pi * frequency_hz
-    return Biquad.of([omega**2], [1.0, 2 * damping * omega, omega**2], frequency_hz, rate_hz)
+    return Biquad.of((0.0, 0.0, omega**2), (1.0, 2 * damping * omega, omega**2), frequency_hz, rate_hz)
 
 
 def notch_over(low_hz: float, high_hz: float, depth_db: float, least_damping: float, rate_hz: float) -> Biquad:

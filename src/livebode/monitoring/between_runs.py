@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f, t
 
+from livebode.core.distributions import f_exceeded, normal_quantile, t_quantile
 from livebode.monitoring.accuracy import STRETCH
 from livebode.monitoring.evidence import Evidence
 
@@ -83,7 +83,7 @@ def between_runs(parts: Sequence[Evidence], smallest: Floats) -> BetweenRuns | N
     spread = np.sqrt(max(variance, 0.0)) / (along @ along)
     if chance(ratio, degrees, within) > _FALSE or spread < _MATTERS or size[-1] <= 0:
         return None
-    few = t.ppf(_CERTAIN, degrees) / t.ppf(_CERTAIN, np.inf)
+    few = t_quantile(_CERTAIN, degrees) / normal_quantile(_CERTAIN)
     return BetweenRuns(along * smallest, float(spread * few))
 
 
@@ -98,7 +98,7 @@ def chance(ratio: float, between: int, within: int) -> float:
     root = np.sqrt(((p * between) ** 2 - 4) / (p**2 + between**2 - 5))
     first = p * between
     second = (within - (p - between + 1) / 2) * root - first / 2 + 1
-    return float(f.sf(((1 + ratio) ** (1 / root) - 1) * second / first, first, second))
+    return f_exceeded(((1 + ratio) ** (1 / root) - 1) * second / first, first, second)
 
 
 def _offset(part: Evidence, smallest: Floats) -> tuple[Floats, Floats]:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
+
+from livebode.core.installing import needing
 
 Floats = NDArray[np.float64]
 
@@ -96,6 +97,8 @@ def amplitudes(e: Floats, gram: Floats) -> Floats:
     With independent orders E⟨ψi, e⟩² = tr⟨ψi, ψi⟩ + Σj Aj²·‖⟨ψi, ψj⟩‖² (a window does not separate orders that are near
     to each other), summed over the windows and solved for all Aj² ≥ 0.
     """
+    with needing("SciPy", "analysis", "a baseline with ripple"):
+        from scipy.optimize import nnls
     windows, orders = len(e), e.shape[1] // 2
     power = (e.reshape(windows, orders, 2) ** 2).sum(axis=(0, 2))
     own = gram.reshape(windows, orders, 2, orders, 2)

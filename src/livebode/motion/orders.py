@@ -6,11 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
-from scipy.signal.windows import blackmanharris
-from scipy.stats import gamma
 
 from livebode.core import Lines, Stage, StatefulBase
+from livebode.core.distributions import log_sum_exceeded
 from livebode.motion.replay import without_drift
 
 Floats = NDArray[np.float64]
@@ -95,7 +93,8 @@ class OrderSpectrum(StatefulBase):
         width = self._points / max(even.size, 1)
         if even.size < _FLOOR or width > self.cycles_per_m.size / _FLOOR:
             return
-        power = np.abs(np.fft.rfft((even - even.mean()) * blackmanharris(even.size), self._points)) ** 2
+        window = _blackman_harris(even.size)
+        power = np.abs(np.fft.rfft((even - even.mean()) * window, self._points)) ** 2
         block = round(_FLOOR * width)
         blocks = power[: power.size // block * block].reshape(-1, block)
         noise = np.interp(
@@ -112,7 +111,7 @@ class OrderSpectrum(StatefulBase):
         self._count += use
         if gain is not None:
             # Of a tone of amplitude a, windowed by w and averaged over steps, the power is (a·Σw/2·sinc)².
-            whole = blackmanharris(even.size).sum() / 2 * np.sinc(self.cycles_per_m[use] * self._step_m)
+            whole = window.sum() / 2 * np.sinc(self.cycles_per_m[use] * self._step_m)
             self._torque[use] += np.maximum(power[use] - noise[use], 0.0) / (whole * gain(frequency_hz[use])) ** 2
 
     def amplitudes(self, orders: Floats) -> Floats:
@@ -127,18 +126,30 @@ class OrderSpectrum(StatefulBase):
             return np.zeros(0)
         strength = np.where(enough, self._whole / np.maximum(self._count, 1), 0.0)
         mean = np.where(enough, self._sum / np.maximum(self._count, 1), 1.0)
-        # Components that move with the speed, such as an eccentric pulley's sidebands, raise whole ranges.
-        around = np.maximum(median_filter(mean, 2 * _FLOOR * _PADDED + 1), 1.0)
-        chance = np.zeros(self._sum.size)
-        chance[enough] = gamma.logsf(self._sum[enough] / around[enough], self._count[enough])
         limit = np.log(_FALSE / max(np.count_nonzero(enough) / _PADDED, 1))
+        left = enough & (log_sum_exceeded(self._count, self._sum) < limit)
+        # Components that move with the speed, such as an eccentric pulley's sidebands, raise whole ranges.
+        around = np.maximum(_medians(mean, _FLOOR * _PADDED, left), 1.0)
+        left[left] = log_sum_exceeded(self._count[left], self._sum[left] / around) < limit
         orders, apart = list[float](), round(_APART * _PADDED)
-        left = chance < limit
         while left.any() and len(orders) < _MOST:
             peak = int(np.argmax(np.where(left, strength, 0.0)))
             orders.append(float(self.cycles_per_m[peak]))
             left[max(peak - apart, 0) : peak + apart + 1] = False
         return np.array(orders)
+
+
+def _blackman_harris(samples: int) -> Floats:
+    """The window with four terms, symmetrical (Harris, Proc. IEEE 66(1), 1978)."""
+    angle = np.linspace(-np.pi, np.pi, samples)
+    terms = enumerate((0.35875, 0.48829, 0.14128, 0.01168))
+    return np.asarray(sum(weight * np.cos(order * angle) for order, weight in terms))
+
+
+def _medians(values: Floats, beside: int, chosen: NDArray[np.bool_]) -> Floats:
+    """Median of each chosen value and so many on each side; the ends are mirrored."""
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, beside, mode="symmetric"), 2 * beside + 1)
+    return np.asarray(np.median(windows[chosen], axis=1))
 
 
 def _over_position(residual: Floats, position_m: Floats, step_m: float) -> Floats:

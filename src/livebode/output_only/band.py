@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
+from livebode.core.installing import needing
 from livebode.output_only.settings import OVERSAMPLING
+
+with needing("SciPy", "analysis", "a run from the outputs alone"):
+    import scipy  # its parts are loaded when they are first used
 
 Floats = NDArray[np.float64]
 

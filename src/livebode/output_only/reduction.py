@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
+
+from livebode.core.installing import needing
+
+with needing("SciPy", "analysis", "a run from the outputs alone"):
+    import scipy  # its parts are loaded when they are first used
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
 
 from livebode.core.model import Algebra
+from livebode.simulation.hold import held
 from livebode.simulation.mechanics import Mechanics, Spans
 from livebode.simulation.settings import Friction
 
@@ -75,11 +75,7 @@ class StateSpace(Algebra):
 
     def sampled(self, rate_hz: float) -> Sampled:
         """The same behind a zero-order hold, read at the ticks: exact."""
-        n = len(self.b)
-        block = np.zeros((n + 1, n + 1))
-        block[:n, :n], block[:n, n] = self.a, self.b
-        step = expm(block / rate_hz)
-        return Sampled(step[:n, :n], step[:n, n], self.c, rate_hz)
+        return Sampled(*held(self.a, self.b, 1 / rate_hz), self.c, rate_hz)
 
     def out(self, output: Output) -> StateSpace:
         """The same plant with another output: motor velocity, rad/s, motor angle, rad, or cart position, m."""

@@ -6,13 +6,11 @@ Plant and Controller exchange numbers; the plant may be another one with the sam
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from math import copysign, cos, floor, isfinite, sin, sqrt
 from typing import Any, NamedTuple
 
-from scipy.integrate import DOP853
-
-# Nonzero coefficients of each stage after the first, and of the step (Hairer, Nørsett, Wanner, section II.10).
-STAGES = [[(j, float(w)) for j, w in enumerate(row) if w != 0] for row in (*DOP853.A[1:], DOP853.B)]
+from livebode.core.installing import needing
 
 Settings = Mapping[str, Any]
 
@@ -73,6 +71,14 @@ def weakening(s: Settings, at: float) -> float:
     return factor
 
 
+@cache
+def stages() -> list[list[tuple[int, float]]]:
+    """Nonzero coefficients of each stage after the first, and of the step (Hairer, Nørsett, Wanner, section II.10)."""
+    with needing("SciPy", "analysis", "the plain Python simulation"):
+        from scipy.integrate import DOP853
+    return [[(j, float(w)) for j, w in enumerate(row) if w != 0] for row in (*DOP853.A[1:], DOP853.B)]
+
+
 class Plant:
     """The belt drive's motion; state as in the truth: angle and speed of each pulley, then of the cart."""
 
@@ -100,7 +106,7 @@ class Plant:
         """A step, or two halves where it crosses from one region of the play into another."""
         start, at, slopes = self.state, self.state, []
         self._regions = set()
-        for stage in STAGES:
+        for stage in stages():
             slopes.append(self.derivative(now, torque, at))
             sums = [0.0] * len(start)
             for j, weight in stage:

@@ -1,7 +1,7 @@
 """A small exact closed loop: two masses under the cascade of Nevaranta 2016, Fig. 7, for many runs at once.
 
 The plant is discretised with zero-order hold; the position loop runs every second tick and holds its output in between.
-It shares no code with the simulated axis: each verifies the other.
+It shares no code with the simulated axis but its hold, which is compared with SciPy's: each verifies the other.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
+
+from livebode.simulation.hold import held
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -51,11 +52,7 @@ class TwoMassPlant:
 
     def discrete(self) -> tuple[Floats, Floats]:
         """The same for one tick of 4 kHz, with zero-order hold."""
-        a, b = self.continuous()
-        block = np.zeros((5, 5))
-        block[:4, :4], block[:4, 4] = a, b
-        step = expm(block / RATE_HZ)
-        return step[:4, :4], step[:4, 4]
+        return held(*self.continuous(), 1 / RATE_HZ)
 
     def response(self, frequency_hz: Floats) -> Complex:
         """Exact sampled response from held torque to sampled velocity, rad/s per N m, at each frequency."""

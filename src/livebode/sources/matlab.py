@@ -9,14 +9,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import loadmat
 
+from livebode.core.installing import needing
 from livebode.sources.arrays import array_columns
 from livebode.sources.damage import oversized
 from livebode.sources.friendly import with_friendly_names
 from livebode.sources.mat5check import list_variables
 from livebode.sources.mat5stream import stream, streamable
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+
+with needing("SciPy", "analysis", "a MATLAB file"):
+    from scipy.io import loadmat
 
 NUMERIC = {
     "double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64",

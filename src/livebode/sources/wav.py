@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, ClassVar
 
-from scipy.io import wavfile
-
+from livebode.core.installing import needing
 from livebode.sources.damage import damaged, oversized, truncated
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording
+
+with needing("SciPy", "analysis", "a WAV file"):
+    from scipy.io import wavfile
 
 CHUNKS_MAX = 10_000
 FORMAT_BYTES_MAX = 4096

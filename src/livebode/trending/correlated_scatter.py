@@ -7,8 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
-from scipy.stats import t
+
+from livebode.core.installing import needing
+
+with needing("SciPy", "analysis", "a trend"):
+    from scipy.fft import dct
+    from scipy.stats import t
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan
 
 import numpy as np
-from scipy.stats import false_discovery_control
 
+from livebode.core.installing import needing
 from livebode.trending.trend import Trend
+
+with needing("SciPy", "analysis", "a trend"):
+    from scipy.stats import false_discovery_control
 
 FALSE_DISCOVERIES = 0.05
 """Expected share of unchanged machines among those that are reported as changed."""

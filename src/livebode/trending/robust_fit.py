@@ -7,10 +7,13 @@ from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.stats import t
 
+from livebode.core.installing import needing
 from livebode.trending.correlated_scatter import CorrelatedScatter
+
+with needing("SciPy", "analysis", "a trend"):
+    from scipy.linalg import solve_triangular
+    from scipy.stats import t
 
 Floats = NDArray[np.float64]
 

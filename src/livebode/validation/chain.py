@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, signal
 
+from livebode.core.installing import needing
 from livebode.fitting.transfer import Transfer
+
+with needing("SciPy", "analysis", "a validation"):
+    from scipy import linalg, signal
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, signal, stats
+
+from livebode.core.installing import needing
+
+with needing("SciPy", "analysis", "a validation"):
+    from scipy import linalg, signal, stats
 
 Floats = NDArray[np.float64]
 

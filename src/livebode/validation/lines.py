@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Response, SignalError
+from livebode.core.installing import needing
 from livebode.fitting import CommonPoles, EvaluationGrid, Fit
 from livebode.validation.correlation import SMALL
 
@@ -201,7 +202,8 @@ def _slopes(model: FittedModel, f: Floats) -> Floats:
 
 def _probability(half: float, lines: int, dof: float) -> float:
     """That Σ|e|²/sigma² over the lines is at least `half`."""
-    from scipy.special import gammaincc
+    with needing("SciPy", "analysis", "a validation"):
+        from scipy.special import gammaincc
 
     d = max(dof, _DOF_LEAST) if np.isfinite(dof) else np.inf
     mean, variance = (1.0, 1.0) if np.isinf(d) else (d / (d - 1), d**3 / ((d - 1) ** 2 * (d - 2)))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core.installing import needing
 from livebode.experiment_design.files.c_names import identifier
 from livebode.experiment_design.files.facts import facts
 from livebode.experiment_design.waveform import Waveform
@@ -36,7 +37,8 @@ def write_npz(path: Path, waveform: Waveform, name: str) -> None:
 
 def write_mat(path: Path, waveform: Waveform, name: str) -> None:
     """A MATLAB v5 file with one struct of that name; its arrays are columns, `Ts` is the sample time in seconds."""
-    from scipy.io import savemat
+    with needing("SciPy", "analysis", "a design for MATLAB"):
+        from scipy.io import savemat
 
     found = _arrays(waveform)
     columns = {key: value[:, np.newaxis] if np.ndim(value) else value for key, value in found.items()}
