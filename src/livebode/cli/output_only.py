@@ -8,7 +8,7 @@ from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
-from livebode.cli.pictures import one_drawing_at_a_time
+from livebode.cli.pictures import can_draw, one_drawing_at_a_time, tell_how_to_draw
 from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.core import counted
 from livebode.locations import original
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 
 def draw_modes(into: Path, title: str) -> None:
-    """Draw modes.png into the directory of a run."""
+    """Draw modes.png into the directory of a run, if Matplotlib is installed."""
+    if not can_draw():
+        return
     from livebode.analysis.mode_curves import mode_curves
     from livebode.records import RunRecord
     from livebode.report.modes import save_modes  # with Matplotlib half a second to import
@@ -56,6 +58,7 @@ def show_modes(outcome: OutputOnlyOutcome) -> None:
     for line in mode_lines(outcome.summary):
         print(line)
     print(f"{original(str(outcome.directory))}/")
+    tell_how_to_draw()
 
 
 def mode_lines(summary: dict[str, Any]) -> list[str]:

@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 from importlib import import_module
+from importlib.util import find_spec
 from math import isnan
 from pathlib import Path
 from shutil import get_terminal_size
@@ -14,6 +15,7 @@ from typing import Any
 from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.core import Model, Responses, counted
 from livebode.core.clock import RunClock, moment, moments_by
+from livebode.core.installing import install_command
 from livebode.fitting import Fit
 from livebode.fitting.common_poles import CommonPoles
 from livebode.locations import original
@@ -28,10 +30,23 @@ def one_drawing_at_a_time() -> threading.Lock:
     return _ONE_AT_A_TIME
 
 
+def can_draw() -> bool:
+    """Whether Matplotlib is installed: without it a run has no pictures, and everything else."""
+    return find_spec("matplotlib") is not None
+
+
+def tell_how_to_draw() -> None:
+    """Print how a run gets pictures, where it has none."""
+    if not can_draw():
+        print(f"no pictures, because Matplotlib is not installed; run {install_command('plots')}")
+
+
 def drawing(title: str, names: tuple[str, str]) -> Draw:
-    """A function that draws bode.png and tracking.png."""
+    """A function that draws bode.png and tracking.png, if Matplotlib is installed."""
 
     def draw(responses: Responses, into: Path, schedule: str, fitted: Model | None) -> None:
+        if not can_draw():
+            return
         from livebode.report import save_pictures  # with Matplotlib half a second to import
 
         with _ONE_AT_A_TIME:
@@ -42,7 +57,8 @@ def drawing(title: str, names: tuple[str, str]) -> Draw:
 
 def load_beside() -> None:
     """Load Matplotlib in a thread: a second processor has time while a recording is examined and tracked."""
-    threading.Thread(target=_load_matplotlib, name="matplotlib").start()
+    if can_draw():
+        threading.Thread(target=_load_matplotlib, name="matplotlib").start()
 
 
 def _load_matplotlib() -> None:
@@ -81,6 +97,7 @@ def show(outcome: Outcome) -> None:
         _show_loop(outcome.summary["loop"])
     if "monitoring" in outcome.summary:
         _show_monitoring(outcome.summary["monitoring"])
+    tell_how_to_draw()
 
 
 _LINES_SHOWN = 20

@@ -13,7 +13,7 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.band import parsed_band
 from livebode.cli.notices import NoticePrinter
-from livebode.cli.pictures import drawing, load_beside, show, tracked_amount
+from livebode.cli.pictures import drawing, load_beside, show, tell_how_to_draw, tracked_amount
 from livebode.cli.remote import recorded_at
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
@@ -252,6 +252,8 @@ def _run_axes(
             print(
                 f"{thread.name}: {tracked_amount(thread.outcome.summary)}\n{original(str(thread.outcome.directory))}/"
             )
+    if not as_json:
+        tell_how_to_draw()
     errors = [thread.error for thread in session.all if thread.error is not None and not thread.ended_early]
     if errors:
         raise typer.Exit(2 if all(isinstance(error, (LivebodeError, StoppedError)) for error in errors) else 1)

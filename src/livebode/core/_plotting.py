@@ -8,6 +8,7 @@ import numpy as np
 
 from livebode.core._kinds import PlotKind
 from livebode.core.errors import UsageError
+from livebode.core.installing import needing
 from livebode.drawing import Cloud, Curve
 
 if TYPE_CHECKING:
@@ -42,7 +43,8 @@ def _panels(kind: PlotKind, axes: Any) -> Any:
     """The axes as an array of two or one; a new figure of pyplot by default, as pandas and xarray do."""
     count = 2 if kind == "bode" else 1
     if axes is None:
-        from matplotlib import pyplot
+        with needing("Matplotlib", "plots", "a picture"):
+            from matplotlib import pyplot
 
         ratios = {"height_ratios": [3, 2]} if count == 2 else {}
         _, found = pyplot.subplots(

@@ -52,21 +52,26 @@ def find_roots(function: Function, low: Floats, high: Floats, tolerance: float) 
     return found
 
 
-def find_minima(function: Function, low: Floats, high: Floats, tolerance: float) -> Floats:
-    """Minima between ends, (rows,), by golden sections, to this absolute tolerance.
+def find_minima(function: Function, low: Floats, high: Floats, width: float) -> Floats:
+    """Minima between ends, (rows,), by golden sections to this width, and then by a parabola.
+
+    The parabola is more accurate than any section: near a minimum values differ by rounding only.
 
     Examples
     --------
-    >>> find_minima(lambda x: (x - np.array([0.2, 0.7])) ** 2, np.zeros(2), np.ones(2), 1e-6).round(5)
+    >>> find_minima(lambda x: (x - np.array([0.2, 0.7])) ** 2, np.zeros(2), np.ones(2), 1e-4).round(8)
     array([0.2, 0.7])
     """
     left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
     at_left, at_right = function(left), function(right)
-    while (high - low).max(initial=0.0) > tolerance:
+    while (high - low).max(initial=0.0) > width:
         lower = at_left < at_right
         low, high = np.where(lower, low, left), np.where(lower, right, high)
         new = np.where(lower, high - _GOLDEN * (high - low), low + _GOLDEN * (high - low))
         value = function(new)
         left, right = np.where(lower, new, right), np.where(lower, left, new)
         at_left, at_right = np.where(lower, value, at_right), np.where(lower, at_left, value)
-    return (low + high) / 2
+    middle, quarter = (low + high) / 2, (high - low) / 4
+    before, at, after = (function(x) for x in (low, middle, high))
+    bend = before - 2 * at + after
+    return middle + quarter * np.divide(before - after, bend, out=np.zeros_like(bend), where=bend > 0).clip(-2, 2)

@@ -17,7 +17,7 @@ Complex = NDArray[np.complex128]
 BANDWIDTH = 10 ** (-3 / 20)
 """|T| at the bandwidth: 3 dB down."""
 
-_TOLERANCE, _TOLERANCE_OF_PEAK = 1e-10, 1e-7  # of a frequency
+_TOLERANCE, _WIDTH = 1e-10, 1e-5  # of a frequency
 
 
 class Crossings(NamedTuple):
@@ -80,7 +80,7 @@ def nearest_to_minus_one(loop: OpenLoop, values: Floats, frequency_hz: Floats, g
         return np.abs(1 + _one(loop, values, np.exp(x), inside))
 
     frequency = found.frequency_hz.copy()
-    frequency[inside] = np.exp(find_minima(distance, log[at[inside] - 1], log[at[inside] + 1], _TOLERANCE_OF_PEAK))
+    frequency[inside] = np.exp(find_minima(distance, log[at[inside] - 1], log[at[inside] + 1], _WIDTH))
     return Crossings(row, frequency, _one(loop, values, frequency, row))
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from matplotlib.ticker import Formatter
-
+from livebode.core.installing import needing
 from livebode.language import numerals
+
+with needing("Matplotlib", "plots", "a picture"):
+    from matplotlib.ticker import Formatter
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-import matplotlib
-from matplotlib.ft2font import FT2Font
-
 from livebode.core import OutputError
+from livebode.core.installing import needing
 from livebode.language import current_language
+
+with needing("Matplotlib", "plots", "a picture"):
+    import matplotlib
+    from matplotlib.ft2font import FT2Font
 
 _PLAIN, _FIXED = "DejaVu Sans", "DejaVu Sans Mono"
 _WIDE_FAMILIES = (

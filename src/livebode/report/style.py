@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from livebode.core.installing import needing
 from livebode.language import tr
 
 if TYPE_CHECKING:
@@ -79,7 +80,8 @@ def style(dark: bool) -> Style:
 @contextmanager
 def drawing(look: Style) -> Iterator[None]:
     """Use Matplotlib's defaults with this look, whatever the user's matplotlibrc is; restore settings afterwards."""
-    import matplotlib
+    with needing("Matplotlib", "plots", "a picture"):
+        import matplotlib
 
     settings: Any = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith("backend")}
     settings |= {
@@ -117,8 +119,9 @@ def drawing(look: Style) -> Iterator[None]:
 
 def new_figure(width_in: float, height_in: float) -> Figure:
     """An empty figure on an Agg canvas."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    with needing("Matplotlib", "plots", "a picture"):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width_in, height_in), dpi=DPI)
     FigureCanvasAgg(figure)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TextIO
 
-from matplotlib.backends.backend_mixed import MixedModeRenderer
-from matplotlib.backends.backend_svg import RendererSVG
-
+from livebode.core.installing import needing
 from livebode.report.style import wide_letters
+
+with needing("Matplotlib", "plots", "a picture"):
+    from matplotlib.backends.backend_mixed import MixedModeRenderer
+    from matplotlib.backends.backend_svg import RendererSVG
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
