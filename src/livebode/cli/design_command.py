@@ -46,6 +46,7 @@ def design_command(
     as_json: Json = False,
 ) -> None:
     """Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml."""
+    from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.experiments.designing import design_experiment  # with the simulation
     from livebode.experiments.experiment import Experiment
     from livebode.records import to_json
@@ -56,7 +57,7 @@ def design_command(
     }  # fmt: skip
     asked = Experiment.read(experiment, {key: value for key, value in over.items() if value is not None})
     with _working():
-        made = design_experiment(asked, out, name=name, suffixes=to, force=force, draw=_draw)
+        made = design_experiment(asked, out, name=name, suffixes=to, force=force, draw=_draw if can_draw() else None)
     if as_json:
         print(to_json({"directory": str(made.directory), "files": list(made.files)} | made.design.plain()))
         return
@@ -64,6 +65,7 @@ def design_command(
     if made.left_out:
         print(made.left_out)
     print(f"{made.directory}/: {', '.join(made.files)}")
+    tell_how_to_draw()
 
 
 def _working() -> AbstractContextManager[object]:

@@ -36,6 +36,7 @@ def margins_command(
     Writes margins.png to the run directory.
     """
     from livebode.analysis.loop_report import loop_of_run
+    from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.configuration import Axis
     from livebode.configuration.fit_section import FitSection
     from livebode.records import to_json
@@ -45,13 +46,15 @@ def margins_command(
     section = FitSection.model_validate(given) if given else None
     found = loop_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity)
     into = results_directory(directory)
-    with writing(into, RecordError):
-        picture = save_loop_picture(found, into, title=directory.name)
+    if can_draw():
+        with writing(into, RecordError):
+            save_loop_picture(found, into, title=directory.name)
     if as_json:
         print(to_json(found.plain()))
         return
     show_loop(found)
-    print(f"\n{picture}")
+    print(f"\n{into / 'margins.png'}" if can_draw() else "")
+    tell_how_to_draw()
 
 
 def show_loop(found: LoopReport) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
-from livebode.cli.pictures import can_draw, one_drawing_at_a_time, tell_how_to_draw
+from livebode.cli.picture_support import can_draw, tell_how_to_draw
+from livebode.cli.pictures import one_drawing_at_a_time
 from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.core import counted
 from livebode.locations import original

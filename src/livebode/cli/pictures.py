@@ -6,16 +6,15 @@ import os
 import sys
 import threading
 from importlib import import_module
-from importlib.util import find_spec
 from math import isnan
 from pathlib import Path
 from shutil import get_terminal_size
 from typing import Any
 
+from livebode.cli.picture_support import can_draw, tell_how_to_draw
 from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.core import Model, Responses, counted
 from livebode.core.clock import RunClock, moment, moments_by
-from livebode.core.installing import install_command
 from livebode.fitting import Fit
 from livebode.fitting.common_poles import CommonPoles
 from livebode.locations import original
@@ -28,17 +27,6 @@ _ONE_AT_A_TIME = threading.Lock()
 def one_drawing_at_a_time() -> threading.Lock:
     """The lock for drawing, because Matplotlib's settings belong to the whole process."""
     return _ONE_AT_A_TIME
-
-
-def can_draw() -> bool:
-    """Whether Matplotlib is installed: without it a run has no pictures, and everything else."""
-    return find_spec("matplotlib") is not None
-
-
-def tell_how_to_draw() -> None:
-    """Print how a run gets pictures, where it has none."""
-    if not can_draw():
-        print(f"no pictures, because Matplotlib is not installed; run {install_command('plots')}")
 
 
 def drawing(title: str, names: tuple[str, str]) -> Draw:

@@ -13,7 +13,8 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.band import parsed_band
 from livebode.cli.notices import NoticePrinter
-from livebode.cli.pictures import drawing, load_beside, show, tell_how_to_draw, tracked_amount
+from livebode.cli.picture_support import tell_how_to_draw
+from livebode.cli.pictures import drawing, load_beside, show, tracked_amount
 from livebode.cli.remote import recorded_at
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile

@@ -57,6 +57,7 @@ def validate_command(
     not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was.
     """
     from livebode.configuration.fit_section import FitSection
+    from livebode.cli.picture_support import tell_how_to_draw
     from livebode.configuration.recorded import recorded_configuration
     from livebode.records import RunRecord, to_json
 
@@ -90,6 +91,7 @@ def validate_command(
         print(sentence)
     if picture is not None:
         print(f"\n{picture}")
+    tell_how_to_draw()
 
 
 def _reason(section: FitSection, on: Path, at_lines: bool) -> str:
@@ -105,12 +107,15 @@ def _reason(section: FitSection, on: Path, at_lines: bool) -> str:
 
 def _simulated(
     directory: Path, on: Path, sections: list[FitSection], lags: int, samples: int | None, channels: Channels
-) -> tuple[list[Validation], list[str], Path]:
+) -> tuple[list[Validation], list[str], Path | None]:
     from livebode.analysis.validation import validate_run
+    from livebode.cli.picture_support import can_draw
     from livebode.report import save_validation_picture
 
     found, notes = validate_run(directory, on, sections, lags=lags, samples=samples, channels=channels)
     into = results_directory(directory)
+    if not can_draw():
+        return found, notes, None
     with writing(into, RecordError):
         picture = save_validation_picture(found, into, title=f"{directory.name} on {on.name}")
     return found, notes, picture

@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from livebode.core.errors.extra import ExtraError
+
+if TYPE_CHECKING:
+    from packaging.requirements import Requirement
 
 
 def install_command(*extras: str) -> str:
@@ -91,12 +95,38 @@ def _clone(direct_url: str | None) -> tuple[Path | None, bool]:
     return (folder if there else None), bool(origin["dir_info"].get("editable"))
 
 
-def _packages(requires: list[str], extras: tuple[str, ...]) -> list[str]:
+def packages_of(extra: str, requires: Sequence[str]) -> list[Requirement]:
+    """What an extra needs beside the packages that are always needed, also by the extras that it contains.
+
+    Parameters
+    ----------
+    extra
+        Its name.
+    requires
+        Of a distribution: the lines "Requires-Dist" of its metadata.
+
+    Examples
+    --------
+    >>> requires = ["a>=1", "b>=2; extra == 'plots'", "livebode[plots]; extra == 'pdf'", "c; extra == 'pdf'"]
+    >>> [str(one.name) for one in packages_of("pdf", requires)]
+    ['b', 'c']
+    """
     from packaging.requirements import Requirement
 
-    found = [Requirement(text) for text in requires]
-    wanted = [one for one in found if one.marker and any(one.marker.evaluate({"extra": extra}) for extra in extras)]
-    return [f"{one.name}{one.specifier}" for one in wanted]
+    found = []
+    for one in map(Requirement, requires):
+        if one.marker is None or one.marker.evaluate({"extra": ""}) or not one.marker.evaluate({"extra": extra}):
+            continue
+        if one.name == "livebode":
+            found += [package for inner in sorted(one.extras) for package in packages_of(inner, requires)]
+        else:
+            found.append(one)
+    return found
+
+
+def _packages(requires: list[str], extras: tuple[str, ...]) -> list[str]:
+    found = [f"{one.name}{one.specifier}" for extra in extras for one in packages_of(extra, requires)]
+    return list(dict.fromkeys(found))
 
 
 def _quoted(text: str) -> str:

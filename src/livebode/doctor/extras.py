@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, metadata, requires, version
+from typing import TYPE_CHECKING
 
-from packaging.requirements import Requirement
-
-from livebode.core.installing import install_command
+from livebode.core.installing import install_command, packages_of
 from livebode.doctor.check import Check
+
+if TYPE_CHECKING:
+    from packaging.requirements import Requirement
 
 NAME = "extras"
 _ALL = "all"  # the extra of all others
@@ -19,11 +21,9 @@ def check_extras() -> Check:
     found: dict[str, list[str]] = {
         extra: [] for extra in metadata("livebode").get_all("Provides-Extra") or () if extra != _ALL
     }
-    required = [Requirement(text) for text in requires("livebode") or ()]
+    required = requires("livebode") or []
     for extra in found:
-        own = [one for one in required if one.marker and one.marker.evaluate({"extra": extra})]
-        always = {one.name for one in required if one.marker is None or one.marker.evaluate({"extra": ""})}
-        found[extra] = [problem for one in own if one.name not in always and (problem := _problem(one))]
+        found[extra] = [problem for one in packages_of(extra, required) if (problem := _problem(one))]
     return judged(found)
 
 

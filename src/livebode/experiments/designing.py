@@ -6,11 +6,13 @@ import json
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from livebode.configuration.schema import axis_schema
 from livebode.core import ConfigError, OutputError, UsageError
 from livebode.core.files import whole_directory
+from livebode.core.installing import install_command
 from livebode.core.writing import writing
 from livebode.experiment_design import FORMATS, Design, axis_text, choose, write
 from livebode.experiments.experiment import Experiment
@@ -32,7 +34,7 @@ class Designed:
     directory, files
         Its location.
     left_out
-        Sentence on the formats that were not written by default; empty if there are none.
+        Sentences on the formats that were not written by default, one a line; empty if there are none.
     """
 
     design: Design
@@ -78,11 +80,9 @@ def design_experiment(
     _check_free(directory, force)
     design = choose(experiment.spec(), experiment.machine(), experiment.machine_limits())
     lines = design.waveform.lines
-    left_out = ""
-    if kinds is None and lines.window > PERIOD_MAX:
-        left_out = f"no .st: its {lines.window} samples are more than the {PERIOD_MAX} of a PLC's table"
+    left_out = {} if kinds else _without(lines.window)
     with writing(directory), whole_directory(directory, shutil.rmtree) as partial:
-        for kind in kinds or _all_that_hold(lines.window):
+        for kind in kinds or (kind for kind in FORMATS if kind not in left_out):
             write(partial / f"{name}{kind}", design.waveform, name)
         configuration = axis_text(
             design,
@@ -100,7 +100,7 @@ def design_experiment(
         facts = {"files": files} | design.plain()
         (partial / _MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
         _check_free(directory, force)
-    return Designed(design, directory, files, left_out)
+    return Designed(design, directory, files, "\n".join(left_out.values()))
 
 
 def _check_names(name: str, log: str) -> None:
@@ -130,9 +130,14 @@ def _check_names(name: str, log: str) -> None:
         )
 
 
-def _all_that_hold(window: int) -> list[str]:
-    """The default formats: a PLC's compiler limits the length of the period."""
-    return [kind for kind in FORMATS if kind != ".st" or window <= PERIOD_MAX]
+def _without(window: int) -> dict[str, str]:
+    """The formats that are not possible here, with the reason."""
+    reasons = {}
+    if find_spec("scipy") is None:
+        reasons[".mat"] = f"no .mat, because SciPy is not installed; run {install_command('analysis')}"
+    if window > PERIOD_MAX:
+        reasons[".st"] = f"no .st: its {window} samples are more than the {PERIOD_MAX} of a PLC's table"
+    return reasons
 
 
 def _check_free(directory: Path, force: bool) -> None:

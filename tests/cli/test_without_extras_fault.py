@@ -1,0 +1,102 @@
+"""The core alone: what has to work without SciPy and Matplotlib works, and the rest names the extra that it needs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import Any, NamedTuple
+
+import pytest
+
+from tests.support.loop_runs import AXIS, record
+
+ABSENT = ("scipy", "matplotlib", "mpl_toolkits", "PIL", "contourpy", "kiwisolver", "fontTools")
+PROGRAM = """
+import contextlib, io, json, sys
+for name in {absent!r}:
+    sys.modules[name] = None
+from livebode.cli import main
+answers = []
+for words in {commands!r}:
+    sys.argv[1:] = words
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code or 0
+    answers.append((code, out.getvalue(), err.getvalue()))
+print(json.dumps(answers))
+"""
+
+
+class Answer(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
+    folder = tmp_path_factory.mktemp("core")
+    record(folder / "log.parquet", 1)
+    (folder / "axis.toml").write_text(AXIS.format(gain=0.2308, delay=0), encoding="utf-8")
+    (folder / "tone.wav").write_bytes(
+        b"RIFF\x24\0\0\0WAVEfmt \x10\0\0\0\1\0\1\0\x40\x1f\0\0\x80\x3e\0\0\2\0\x10\0data\0\0\0\0"
+    )
+    run = str(folder / "run")
+    commands: dict[str, list[str]] = {
+        "run": ["run", str(folder / "axis.toml"), "--out", run],
+        "fit": ["fit", run],
+        "margins": ["margins", run],
+        "inspect": ["inspect", str(folder / "log.parquet"), "--excitation", "w", "--output", "y", "--rate", "4000"],
+        "compare": ["compare", run, run],
+        "export": ["export", run, "--to", "csv"],
+        "example": ["example", "design"],
+        "design": ["design", "example/experiment.toml", "--out", str(folder / "design")],
+        "demo": ["demo", "--fast", "--seconds", "16", "--out", str(folder / "demo")],
+        "report": ["report", run],
+        "validate": ["validate", run, "--on", str(folder / "log.parquet")],
+        "modal": ["fit", run, "--model", "modal"],
+        "mat": ["export", run, "--to", "mat"],
+        "wav": ["inspect", str(folder / "tone.wav")],
+        "output-only": ["run", str(folder / "log.parquet"), "--output-only", "--output", "y", "--out", run + "2"],
+    }
+    code = PROGRAM.format(absent=ABSENT, commands=list(commands.values()))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    found: list[Any] = json.loads(done.stdout.splitlines()[-1])
+    return {name: Answer(*answer) for name, answer in zip(commands, found)}
+
+
+@pytest.mark.parametrize(
+    "command", ["run", "fit", "margins", "inspect", "compare", "export", "example", "design", "demo"]
+)
+def test_the_core_does_its_work_alone(answers: dict[str, Answer], command: str) -> None:
+    assert answers[command].code == 0, answers[command].err
+    assert "error" not in answers[command].err
+
+
+@pytest.mark.parametrize("command", ["run", "margins", "design", "demo"])
+def test_a_command_with_pictures_says_once_how_to_get_them(answers: dict[str, Answer], command: str) -> None:
+    assert answers[command].out.count("no pictures, because Matplotlib is not installed; run ") == 1
+    assert "plots" in answers[command].out.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("command", "extra", "sentence"),
+    [
+        ("report", "plots", "a picture needs Matplotlib, which is not installed; run "),
+        ("validate", "analysis", "a validation needs SciPy, which is not installed; run "),
+        ("modal", "analysis", "a fit of poles needs SciPy, which is not installed; run "),
+        ("mat", "analysis", "an export for MATLAB needs SciPy, which is not installed; run "),
+        ("wav", "analysis", "a WAV file needs SciPy, which is not installed; run "),
+        ("output-only", "analysis", "a run from the outputs alone needs SciPy, which is not installed; run "),
+    ],
+)
+def test_what_needs_an_extra_names_it(answers: dict[str, Answer], command: str, extra: str, sentence: str) -> None:
+    assert answers[command].code == 2
+    assert sentence in answers[command].err
+    assert {"plots": "matplotlib", "analysis": "scipy"}[extra] in answers[command].err or extra in answers[command].err
+    assert "Traceback" not in answers[command].err
