@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check profiles lowest peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -94,6 +94,16 @@ bench-compare: $(BUILT)  ## the speed of this version and of another commit, alt
 release-check: $(VENV)/.docs  ## what is missing for a release (CONTRIBUTING.md)
 	$(BIN)/python -m tools.release check
 
+$(VENV)/.uv: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet uv
+	touch $@
+
+profiles: $(BUILT) $(VENV)/.uv ## install each profile of the wheel into a fresh environment: sizes, and whether the core works (10 min)
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m tools.profiles
+
+lowest: $(BUILT) $(VENV)/.uv ## tests with the lowest versions that pyproject.toml permits (20 min)
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m tools.lowest
+
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/explanation/peers.md)
 	$(BIN)/python -m studies.peers
 
@@ -175,8 +185,7 @@ system-packages: ## Debian packages that some tests use (as root)
 catalogues: $(BUILT)  ## after a change of a sentence of report or dashboard: update the catalogues, list what lacks a translation
 	$(BIN)/python -m tools.catalogues
 
-lock:            ## renew the pinned dependencies from pyproject.toml
-	$(BIN)/python -m pip install --quiet uv
+lock: $(VENV)/.uv ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/uv lock --upgrade
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --all-extras --group dev -o requirements-dev.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group bench -o requirements-bench.lock
