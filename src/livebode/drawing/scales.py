@@ -34,19 +34,11 @@ def frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
 
 def _short_ticks(axes: Axes, at: list[float]) -> None:
     """Minor ticks at these places: as markers of one line, which look the same and take less time."""
-    look = {
-        "color": rcParams["xtick.color"], "markersize": rcParams["xtick.minor.size"],
-        "markeredgewidth": rcParams["xtick.minor.width"], "zorder": 2.01,
-    }  # fmt: skip
     axes.plot(
-        at,
-        np.zeros(len(at)),
+        at, np.zeros(len(at)), linestyle="", marker=TICKDOWN, markersize=rcParams["xtick.minor.size"],
+        markeredgewidth=rcParams["xtick.minor.width"], color=rcParams["xtick.color"], zorder=2.01, clip_on=False,
         transform=axes.get_xaxis_transform(),
-        linestyle="",
-        marker=TICKDOWN,
-        clip_on=False,
-        **look,
-    )
+    )  # fmt: skip
 
 
 def free_frequency_axis(axes: Axes) -> None:
