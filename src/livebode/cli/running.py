@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import gc
 import re
 import signal
@@ -243,7 +242,6 @@ def _run_axes(
         return Destination(directory / name, _drawing(axis), force, subscribers)
 
     gc.freeze()  # what is loaded remains: a search through it would stop all axes for tens of milliseconds
-    atexit.register(gc.unfreeze)  # or objects of C remain at exit, which nanobind reports
     shown = AxesTerminal(quiet=as_json)
     session = Session(axes, to, report=shown.print_event, leave=shown.leave, file=file)
     shown.run(session)
