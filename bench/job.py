@@ -15,6 +15,7 @@ command are to that, those for tracking alone to the best call in a process that
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import resource
@@ -106,8 +107,10 @@ def pictures(run: Path) -> None:
     """Draw the pictures of a run; print the seconds of the first time, which loads Matplotlib, and of the best."""
     import livebode.report
     from livebode.analysis.overview import Overview
+    from livebode.cli.start import OBJECTS_NEW
     from livebode.records import RunRecord
 
+    gc.set_threshold(OBJECTS_NEW)  # as in the command
     overview = Overview()
     for responses in RunRecord.open(run).batches():
         overview.add(responses)

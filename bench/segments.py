@@ -59,7 +59,7 @@ def recorded(path: Path, segments: int, *, plain: bool) -> None:
         for number in range(segments):
             store.write("responses", as_batch(_responses(rng, number * each)))
             store.commit((number + 1) * each, (number + 1) * SEGMENT_S, {})
-        store.finish(summary, finished=True)
+        store.finish(summary, {}, finished=True)
 
 
 def _responses(rng: np.random.Generator, begin: int) -> Responses:

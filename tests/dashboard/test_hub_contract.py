@@ -24,7 +24,7 @@ from livebode.dashboard.past import Past
 from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses
 from livebode.dashboard.state import State
-from livebode.dashboard.trends import POINTS_MAX, ParameterTrend, TrendRows
+from livebode.dashboard.trends import POINTS_MAX, ModelTrend, TrendRows
 from livebode.runtime import RunControl
 from livebode.runtime.documents import ClockSet, RunEnded, RunStarted, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
@@ -190,18 +190,21 @@ def test_recent_responses_are_the_newest_and_thinned() -> None:
 @given(st.lists(st.integers(1, 700), min_size=1, max_size=12))
 @settings(max_examples=25, deadline=None)
 def test_a_trend_is_evenly_thinned_however_it_came(sizes: list[int]) -> None:
-    trend, at = ParameterTrend("two-mass", "Js", "kg m²"), 0
+    trend, at = ModelTrend("two-mass", ["Js", "mL"], ["kg m²", "kg"]), 0
     for size in sizes:
         time_s = np.arange(at, at + size, dtype=float)
-        trend.add(TrendRows(time_s, time_s, 2 * time_s, time_s, np.full(size, "ok")))
+        value = np.stack([2 * time_s, 3 * time_s], axis=1)
+        trend.add(TrendRows(time_s, time_s, value, value, np.full(size, "ok")))
         at += size
     assert len(trend._rows) <= 16
     kept = trend.rows()
     assert len(kept) <= POINTS_MAX
     assert len(set(np.diff(kept.time_s))) <= 1
     assert kept.time_s[0] == 0
-    assert np.array_equal(kept.value, 2 * kept.time_s)
-    assert trend.plain(whole=False)["value"] == [2.0 * (at - 1)]
+    assert np.array_equal(kept.value[:, 1], 3 * kept.time_s)
+    assert [(one["name"], one["value"]) for one in trend.plain(whole=False)] == [
+        ("Js", [2.0 * (at - 1)]), ("mL", [3.0 * (at - 1)]),
+    ]  # fmt: skip
 
 
 def test_notices_are_bounded_and_known_again() -> None:

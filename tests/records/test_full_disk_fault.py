@@ -81,7 +81,7 @@ def test_the_lost_samples_are_reported_exactly(tmp_path: Path) -> None:
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         paused, resumed = events
-        store.finish(SUMMARY, finished=True)
+        store.finish(SUMMARY, {}, finished=True)
     assert taken == [True] * 5 + [False] * 22 + [True] * 13
     run = RunRecord.open(tmp_path / "run")
     number = np.concatenate([table["sample"].to_numpy() for table in run.tables("samples")])
@@ -116,7 +116,7 @@ def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(
     with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
         assert store.last is not None
         assert store.last.sample == 2100
-        store.finish(SUMMARY, finished=True)
+        store.finish(SUMMARY, {}, finished=True)
     assert all(taken)
     assert unclosed == ["record-unclosed"] * 5  # of 18 attempts the 1st, 2nd, 4th, 8th and 16th
     assert table.num_rows == 2000
@@ -132,7 +132,7 @@ def test_segments_are_closed_again_when_the_next_journal_could_be_opened(tmp_pat
         for k in range(8):
             resource.setrlimit(resource.RLIMIT_NOFILE, (soft if k > 3 else 0, hard))
             _second(store, k, None, hard)
-        store.finish(SUMMARY, finished=True)
+        store.finish(SUMMARY, {}, finished=True)
     assert [event.kind for event in events] == ["record-unclosed", "record-unclosed", "record-closed"]
     assert events[-1].details["attempts"] == 2
 
@@ -184,7 +184,7 @@ def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> No
             store.write_event(Event("mark", start, start / RATE_HZ, ""))
             store.commit(block.stop, block.stop / RATE_HZ, {"state": bytes(100)})
             used.append(size_of(tmp_path / "run"))
-        store.finish(SUMMARY, finished=True)
+        store.finish(SUMMARY, {}, finished=True)
     run = RunRecord.open(tmp_path / "run")
     assert max(used) <= budget
     assert max(used) > budget / 2

@@ -54,4 +54,4 @@ def record_long(run: Path, segment_s: float, responses: Responses, *, finished: 
             if use.size:
                 store.write("responses", as_batch(responses[use]))
             store.commit(stop, stop / RATE_HZ, {})
-        store.finish(summary, finished=finished)
+        store.finish(summary, {}, finished=finished)

@@ -11,13 +11,13 @@ ROWS_MAX = 2048
 LIVE_VALUES_MAX = 1 << 13
 """Responses × lines of a live run, about 0.5 MB: a process may have many axes."""
 _ROWS_MIN = 256
-_PARTS_MAX = 64
+_PARTS_MAX = 16  # a one-row part takes three times the memory of its data
 
 
 class Overview:
     """Every n-th response, evenly over the run; n is doubled whenever there are too many.
 
-    It contains at most 2,048 rows in at most 64 parts, for any size of batches. The tracking thread adds rows; any
+    It contains at most 2,048 rows in at most 16 parts, for any size of batches. The tracking thread adds rows; any
     other thread may read at the same time.
 
     Parameters

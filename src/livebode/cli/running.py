@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 import signal
 from collections.abc import Callable, Mapping
@@ -27,6 +28,8 @@ from livebode.runtime.documents import TrackerResults
 from livebode.sources.formats import read_head
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from livebode.runtime import OutputOnlyOutcome
 
 T = TypeVar("T")
@@ -197,27 +200,29 @@ def _run_output_only(
 
 
 def _with_progress(job: Callable[[tuple[Subscriber, ...]], T], quiet: bool) -> T:
-    """Run a job whose subscribers show a progress bar and notices."""
+    """Run a job whose subscribers show notices and, on a terminal, a progress bar."""
+    if quiet or not terminal.is_terminal(stderr=True):
+        return job((NoticePrinter(lambda message: _print_notice(terminal.console(stderr=True), message)),))
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    console = terminal.console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.percentage:>3.0f} %"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
+    with Progress(*columns, console=terminal.console(stderr=True), transient=True) as bar:
         task = bar.add_task("tracking", total=None)
 
         def show_progress(document: Document) -> None:
             if isinstance(document, TrackerResults):
                 bar.update(task, completed=document.samples, total=document.samples_total)
 
-        notices = NoticePrinter(
-            lambda message: bar.console.print(f"livebode: {message}", highlight=False, markup=False)
-        )
-        return job((show_progress, notices))
+        return job((show_progress, NoticePrinter(lambda message: _print_notice(bar.console, message))))
+
+
+def _print_notice(console: Console, message: str) -> None:
+    console.print(f"livebode: {message}", highlight=False, markup=False)
 
 
 def _run_axes(
@@ -237,6 +242,7 @@ def _run_axes(
         subscribers = (*subscribers_of(name), shown.subscriber(name))
         return Destination(directory / name, _drawing(axis), force, subscribers)
 
+    gc.freeze()  # what is loaded remains: a search through it would stop all axes for tens of milliseconds
     shown = AxesTerminal(quiet=as_json)
     session = Session(axes, to, report=shown.print_event, leave=shown.leave, file=file)
     shown.run(session)

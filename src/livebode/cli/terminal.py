@@ -66,9 +66,9 @@ def print_page(page: Callable[[int, bool], str], *, stderr: bool = False) -> Non
     print(printable(page(terminal_width(stream), has_colours(stream)), stream), file=stream, flush=True)
 
 
-def is_terminal() -> bool:
-    """Whether standard output is a terminal."""
-    return _unchecked().isatty()
+def is_terminal(*, stderr: bool = False) -> bool:
+    """Whether standard output, or standard error, is a terminal."""
+    return _unchecked(stderr=stderr).isatty()
 
 
 def print_drawn(text: str) -> None:

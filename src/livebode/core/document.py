@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal
 
+from livebode.core.paper import Paper
 from livebode.language import marked
 
 Tone = Literal["ok", "check", "alarm", "differs", "open", "pass", "fail", "undecided"]
 """Nothing to do; a person should look; an alarm is active; two runs differ; not assessed; and the three results of a
 limit: inside by more than the bound, outside by more than the bound, too close to decide."""
-
-Paper = Literal["a4", "letter"]
 
 TONES: Mapping[str, str] = {
     "ok": marked("OK"),

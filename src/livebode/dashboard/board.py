@@ -139,8 +139,8 @@ class Board:
             except LivebodeError:
                 continue  # it is just being closed; the next look reads it
             state.take(items)
-            for row in rows:
-                state.trends.add(*row)
+            for model, name, unit, new in rows:
+                state.trends.add(model, [name], [unit], new)
             state.renewed(summary, finished)
 
 

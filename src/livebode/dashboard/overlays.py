@@ -67,12 +67,10 @@ class FittedCurve:
 
     def _parameters(self, trends: Trends, time_s: float | None) -> tuple[float, Floats] | None:
         """Time and values of one valid fit."""
-        found = [trends.by_name.get((self.model.name, name)) for name in self.model.names]
-        rows = [t.newest if time_s is None else t.rows() for t in found if t is not None and t.newest is not None]
-        if len(rows) < len(found) or any(len(r) != len(rows[0]) for r in rows if r is not None):
+        found = trends.values(self.model.name, self.model.names, whole=time_s is not None)
+        if found is None:
             return None
-        values = np.stack([r.value for r in rows if r is not None], axis=1)
-        at_s = rows[0].time_s if rows[0] is not None else np.zeros(0)
+        at_s, values = found
         good = np.flatnonzero(np.isfinite(values).all(axis=1))
         if time_s is not None and good.size:
             at = good[np.argmin(np.abs(at_s[good] - time_s))]

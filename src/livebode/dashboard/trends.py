@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ _PARTS_MAX = 16
 
 @dataclass(frozen=True, eq=False)
 class TrendRows(RowArrays):
-    """One parameter over time, arrays of equal length."""
+    """Parameters of one model over time: value and sigma (rows, parameters), the others (rows,)."""
 
     time_s: Floats
     schedule: Floats
@@ -28,11 +29,11 @@ class TrendRows(RowArrays):
     status: NDArray[Any]
 
 
-class ParameterTrend:
-    """Every n-th row of one parameter, with n doubled whenever there are too many, and the newest row."""
+class ModelTrend:
+    """Every n-th row of the parameters of a model, with n doubled whenever there are too many, and the newest row."""
 
-    def __init__(self, model: str, name: str, unit: str) -> None:
-        self.model, self.name, self.unit = model, name, unit
+    def __init__(self, model: str, names: Sequence[str], units: Sequence[str]) -> None:
+        self.model, self.names, self.units = model, tuple(names), tuple(units)
         self.newest: TrendRows | None = None
         self._rows: list[TrendRows] = []
         self._seen, self._stride, self._kept = 0, 1, 0
@@ -56,46 +57,63 @@ class ParameterTrend:
             self._rows = [TrendRows.join(self._rows)]
         return self._rows[0]
 
-    def plain(self, *, whole: bool) -> dict[str, Any]:
-        """Plain data for the page: all retained rows, or only the newest."""
+    def plain(self, *, whole: bool) -> list[dict[str, Any]]:
+        """Plain data for the page, one item for each parameter: all retained rows, or only the newest."""
         rows = self.rows() if whole else self.newest
         assert rows is not None
-        found = {"model": self.model, "name": self.name, "unit": self.unit}
-        return found | {name: array.tolist() for name, array in vars(rows).items()}
+        shared = {name: getattr(rows, name).tolist() for name in ("time_s", "schedule", "status")}
+        return [
+            {"model": self.model, "name": name, "unit": unit, "value": value.tolist(), "sigma": sigma.tolist()} | shared
+            for name, unit, value, sigma in zip(self.names, self.units, rows.value.T, rows.sigma.T)
+        ]
 
     def _keep(self, rows: TrendRows) -> None:
         if len(rows):
             self._rows.append(TrendRows.join([rows]))  # a copy
             self._kept += len(rows)
-            if len(self._rows) > _PARTS_MAX:  # a one-row part takes ten times the memory of its data
+            if len(self._rows) > _PARTS_MAX:  # a one-row part takes several times the memory of its data
                 self.rows()
 
 
 class Trends:
-    """The trends of one run, by model and name."""
+    """The trends of one run. Parameters that arrive together are one trend: they share times and status."""
 
     def __init__(self) -> None:
-        self.by_name: dict[tuple[str, str], ParameterTrend] = {}
         self.version = 0
+        self._trends: dict[tuple[str, tuple[str, ...]], ModelTrend] = {}
+        self._count = 0
 
     def take(self, parts: tuple[Parameters, ...]) -> None:
         """Take the published parameters of a run."""
         for part in parts:
-            sigma = part.sigma
-            for i, (name, unit) in enumerate(zip(part.names, part.units)):
-                rows = TrendRows(part.time_s, part.schedule, part.value[:, i], sigma[:, i], part.status)
-                self.add(part.model, name, unit, rows)
+            rows = TrendRows(part.time_s, part.schedule, part.value, part.sigma, part.status)
+            self.add(part.model, part.names, part.units, rows)
 
-    def add(self, model: str, name: str, unit: str, rows: TrendRows) -> None:
-        """Take rows of one parameter."""
-        key = (model, name)
-        if key not in self.by_name:
-            if len(self.by_name) >= TRENDS_MAX:
+    def add(self, model: str, names: Sequence[str], units: Sequence[str], rows: TrendRows) -> None:
+        """Take rows of parameters of a model."""
+        key = (model, tuple(names))
+        if key not in self._trends:
+            if self._count + len(names) > TRENDS_MAX:
                 return
-            self.by_name[key] = ParameterTrend(model, name, unit)
-        self.by_name[key].add(rows)
+            self._trends[key] = ModelTrend(model, names, units)
+            self._count += len(names)
+        self._trends[key].add(rows)
         self.version += 1
 
+    def values(self, model: str, names: Sequence[str], *, whole: bool) -> tuple[Floats, Floats] | None:
+        """Times, and values (rows, names), of all retained rows or of the newest; None if a name or row is missing."""
+        columns = {
+            name: (rows.time_s, rows.value[:, at])
+            for trend in self._trends.values()
+            if trend.model == model and trend.newest is not None
+            for rows in [trend.rows() if whole else trend.newest]
+            for at, name in enumerate(trend.names)
+        }
+        found = [columns[name] for name in names if name in columns]
+        if len(found) < len(names) or any(len(time_s) != len(found[0][0]) for time_s, _ in found):
+            return None
+        return found[0][0], np.stack([value for _, value in found], axis=1)
+
     def plain(self, *, whole: bool) -> list[dict[str, Any]]:
-        """Plain data for the page; see `ParameterTrend.plain`."""
-        return [trend.plain(whole=whole) for trend in self.by_name.values() if trend.newest is not None]
+        """Plain data for the page; see `ModelTrend.plain`."""
+        return [one for trend in self._trends.values() if trend.newest is not None for one in trend.plain(whole=whole)]

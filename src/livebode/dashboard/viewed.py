@@ -75,7 +75,7 @@ class Viewed:
 
     def _rest(self, state: State) -> None:
         for model, name, unit, rows in self._parameters(None):
-            state.trends.add(model, name, unit, rows)
+            state.trends.add(model, [name], [unit], rows)
         state.take(list(self._new_events()))
         state.finished = self._run.finished
         state.read()
@@ -115,5 +115,6 @@ class Viewed:
             _, first = np.unique(both, return_index=True)
             for at in np.sort(first):
                 use = both == both[at]
-                rows = TrendRows(*(column[c][use] for c in ("time_s", "schedule", "value", "sigma", "status")))
+                one = {c: x[use] for c, x in column.items()}
+                rows = TrendRows(**one | {c: one[c][:, np.newaxis] for c in ("value", "sigma")})
                 yield str(model[at]), str(name[at]), str(unit[at]), rows

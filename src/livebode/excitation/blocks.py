@@ -28,14 +28,23 @@ def cut(x: Floats, period: int) -> Floats:
         slope[-1] = slope[-2]
     before = np.concatenate((slope[:1], slope[:-1]))
     at = (np.arange(period) + 0.5) / period - 0.5  # position about the middle of the period
-    drift = level[:, np.newaxis] + np.where(at < 0, before[:, np.newaxis], slope[:, np.newaxis]) * at
-    return np.asarray(blocks - drift - typical.mean())
+    middle = np.searchsorted(at, 0.0)
+    drift = np.empty_like(blocks)
+    np.multiply.outer(before, at[:middle], out=drift[:, :middle])
+    np.multiply.outer(slope, at[middle:], out=drift[:, middle:])
+    drift += level[:, np.newaxis]
+    np.subtract(blocks, drift, out=drift)
+    drift -= typical.mean()
+    return drift
 
 
-def spectra(blocks: Floats) -> Complex:
-    """Spectra of the periods, shape (periods, bins 0 … below N/2), scaled so that |X_k| is a line's amplitude."""
+def spectra(blocks: Floats, bins: slice | NDArray[np.bool_] = slice(None)) -> Complex:
+    """Spectra of the periods, shape (periods, bins 0 … below N/2), scaled so that |X_k| is a line's amplitude.
+
+    Only some of the `bins` if they are given.
+    """
     period = blocks.shape[1]
-    return np.asarray(np.fft.rfft(blocks, axis=1)[:, : (period + 1) // 2] * (2 / period))
+    return np.asarray(np.fft.rfft(blocks, axis=1)[:, : (period + 1) // 2][:, bins] * (2 / period))
 
 
 def grouped(periods: Complex, most: int = 16) -> Complex:

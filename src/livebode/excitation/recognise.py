@@ -258,7 +258,7 @@ def _periods(samples: Floats, period: int, lines: Flags) -> tuple[Floats, Flags]
     strange: Flags = np.array(missing)
     # Bridged samples are not compared, so that they do not count as usual.
     whole = blocks[~missing]
-    strange[~missing] = unlike(whole, spectra(whole), lines)
+    strange[~missing] = unlike(whole, lines)
     return blocks, strange
 
 

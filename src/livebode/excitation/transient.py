@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core.distributions import normal_quantile
+from livebode.excitation.blocks import spectra
 from livebode.excitation.medians import medians
 
 Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
 
@@ -23,15 +23,13 @@ _ROUNDING = 1e-9
 _FACTOR_MIN = 3.0
 
 
-def unlike(blocks: Floats, spectra: Complex, excited: Flags) -> Flags:
+def unlike(blocks: Floats, excited: Flags) -> Flags:
     """Periods that differ from the median period by more than their noise, shape (periods,).
 
     Parameters
     ----------
     blocks
         Periods without drift, shape (periods, samples).
-    spectra
-        Their spectra, shape (periods, bins).
     excited
         Bins of the excitation, shape (bins,).
 
@@ -48,13 +46,13 @@ def unlike(blocks: Floats, spectra: Complex, excited: Flags) -> Flags:
         return np.zeros(count, dtype=np.bool_)
     if not excited.any():
         return np.zeros(count, dtype=np.bool_)
-    lines = spectra[:, excited]
+    lines = spectra(blocks, excited)
     real = medians(lines.real, axis=0)
     away = np.abs(lines - real - 1j * medians(lines.imag, axis=0)) ** 2
     usual = medians(away, axis=0) + (_ROUNDING * np.abs(real)) ** 2
     usual += np.finfo(np.float64).tiny
     at_lines = np.sqrt(np.mean(away / usual, axis=1))
-    size = np.max(np.abs(blocks), axis=1)
+    size = np.maximum(blocks.max(axis=1), -blocks.min(axis=1))
     at_samples = np.max(np.abs(blocks - medians(blocks, axis=0)), axis=1)
     return _far(at_lines, np.zeros(count)) | _far(at_samples, _ROUNDING * _median(size))
 

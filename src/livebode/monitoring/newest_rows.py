@@ -41,8 +41,8 @@ class NewestRows:
         self._begin = max(self._begin, self._end - self._most)
 
     def fill(self, rows: Floats) -> None:
-        """Replace all rows by these, (rows, columns), with room for as many again."""
-        memory = np.empty((max(_FIRST, 2 * len(rows)), self._memory.shape[1]))
+        """Replace all rows by these, (rows, columns), with room for some more."""
+        memory = np.empty((len(rows) + max(_FIRST, len(rows) // 4), self._memory.shape[1]))
         memory[: len(rows)] = rows
         self._memory, self._begin, self._end = memory, 0, len(rows)
 

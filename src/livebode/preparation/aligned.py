@@ -57,7 +57,7 @@ class SlipSearch:
                 found.append(Slip(begins + at, slip.missing))
         # The next part begins on the grid of this one.
         done = max(self._held.size - _OVERLAP * period, 0) // period * period
-        self._first, self._held = self._first + done, self._held[done:]
+        self._first, self._held = self._first + done, self._held[done:].copy()  # a view would hold all of it
         return found
 
 

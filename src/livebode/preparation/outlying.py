@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Event, counted
 from livebode.estimation import Settings
-from livebode.excitation.blocks import cut
 from livebode.excitation.medians import medians
-from livebode.excitation.prepare import filled
 from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.roles import ROLES
 from livebode.preparation.transients import (
@@ -19,7 +17,7 @@ from livebode.preparation.transients import (
     EXAMINED_MIN,
     EXAMINED_SAMPLES_MAX,
     SHARE_MAX,
-    compared,
+    Periods,
     excited_bins,
     moves,
 )
@@ -82,21 +80,20 @@ def _outlying(signals: Mapping[str, Floats], settings: Settings, last: bool) -> 
         return np.zeros(count, dtype=np.bool_)
     names = [name for role in settings.roles if (name := settings.channel(role)) and name not in settings.spikes]
     strange = np.zeros(count, dtype=np.bool_)
+    reference = settings.excitation if settings.method.reference == "excitation" else None
+    periods = {name: Periods.of(signals[name], window) for name in dict.fromkeys([*names, *filter(None, [reference])])}
     for name in names:
-        whole, unlike = compared(signals[name], window, excited_bins(settings))
-        strange[whole[unlike]] = True
+        strange[periods[name].whole[periods[name].unlike(excited_bins(settings))]] = True
     silent = np.zeros(count, dtype=np.bool_)
-    if settings.method.reference == "excitation" and settings.excitation:
-        silent = _silent(signals[settings.excitation], window)
+    if reference:
+        silent = _silent(periods[reference])
     returning = bounded(strange | silent, last)
     return silent | (returning if np.count_nonzero(returning & ~silent) <= SHARE_MAX * count else silent)
 
 
-def _silent(x: Floats, window: int) -> Flags:
+def _silent(excitation: Periods) -> Flags:
     """Periods in which the excitation does not run."""
-    if np.count_nonzero(np.isfinite(x)) < window:
-        return np.zeros(x.size // window, dtype=np.bool_)
-    blocks = cut(filled(x), window)
+    blocks = excitation.blocks
     typical = medians(blocks, axis=0)
     return np.asarray(blocks @ typical < _SILENT * typical @ typical)
 

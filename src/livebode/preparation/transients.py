@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from livebode.core import Event, counted
 from livebode.estimation import Movement, Settings
 from livebode.estimation.movement import PLACES
-from livebode.excitation.blocks import cut, spectra
+from livebode.excitation.blocks import cut
 from livebode.excitation.prepare import filled
 from livebode.excitation.transient import leading, unlike
 from livebode.preparation.aligned import AlignedLog
@@ -53,18 +54,32 @@ def transient_periods(signals: Mapping[str, Floats], settings: Settings) -> int:
     return first if first <= SHARE_MAX * count else 0
 
 
-def compared(x: Floats, window: int, excited: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Numbers of the periods without missing samples, and which of these differ from the others."""
-    if np.count_nonzero(np.isfinite(x)) < window:
-        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.bool_)
-    blocks = cut(filled(x), window)
-    # An interpolated period differs from the others, but not because of the machine.
-    whole = np.flatnonzero(np.isfinite(x[: blocks.size]).reshape(blocks.shape).all(axis=1))
-    return whole, unlike(blocks[whole], spectra(blocks[whole]), excited)
+@dataclass(frozen=True, eq=False)
+class Periods:
+    """Periods of a signal without their drift, (periods, window), and the numbers of those without missing samples."""
+
+    blocks: Floats
+    whole: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, x: Floats, window: int) -> Periods:
+        """Those of a signal, NaN for missing samples; none if less than one period is known."""
+        known = np.isfinite(x)
+        if np.count_nonzero(known) < window:
+            return cls(np.zeros((x.size // window, window)), np.zeros(0, dtype=np.intp))
+        blocks = cut(filled(x), window)
+        # An interpolated period differs from the others, but not because of the machine.
+        return cls(blocks, np.flatnonzero(known[: blocks.size].reshape(blocks.shape).all(axis=1)))
+
+    def unlike(self, excited: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which of the whole periods differ from the others."""
+        blocks = self.blocks if len(self.whole) == len(self.blocks) else self.blocks[self.whole]
+        return unlike(blocks, excited)
 
 
 def _transient(x: Floats, window: int, excited: NDArray[np.bool_]) -> int:
-    whole, strange = compared(x, window, excited)
+    periods = Periods.of(x, window)
+    whole, strange = periods.whole, periods.unlike(excited)
     count = leading(strange) if whole.size else 0
     return int(whole[count - 1]) + 1 if count else 0
 

@@ -42,11 +42,13 @@ def save_pictures(
     from livebode.report.tracking import tracking_figure
 
     assessed = responses[responses.ready] if responses.ready.any() else responses
-    pictures = {
-        "bode.png": bode_figure(assessed, title=title, names=names, fitted=fitted, dark=dark),
-        "tracking.png": tracking_figure(responses, title=title, schedule_name=schedule_name, dark=dark),
-    }
-    return [save(figure, Path(directory) / name, style(dark)) for name, figure in pictures.items()]
+    look = style(dark)
+    with drawing(look):
+        pictures = {
+            "bode.png": bode_figure(assessed, title=title, names=names, fitted=fitted, dark=dark),
+            "tracking.png": tracking_figure(responses, title=title, schedule_name=schedule_name, dark=dark),
+        }
+        return [save(figure, Path(directory) / name, look) for name, figure in pictures.items()]
 
 
 def save(figure: Figure, path: Path, look: Style) -> Path:

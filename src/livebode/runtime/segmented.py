@@ -264,8 +264,9 @@ class SegmentedRecord:
         assert last is not None
         # Results that were delayed until the end were written after the last commit, and belong to the present states.
         self._unwritten.write(self._store, self._samples)
-        self._store.commit(last.sample, last.time_s, self._states())
-        self._store.finish(self._named(summary), finished=self._ends() or "continued_in" in summary)
+        states = self._states()
+        self._store.commit(last.sample, last.time_s, states)
+        self._store.finish(self._named(summary), states, finished=self._ends() or "continued_in" in summary)
 
     def _begin_interval(self) -> None:
         """The next commits are due in the phase of this record."""

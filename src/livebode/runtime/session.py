@@ -14,7 +14,7 @@ from livebode.configuration.axes import Axes, ConfigurationFile
 from livebode.configuration.axis import Axis
 from livebode.core import ConfigError, Event, LivebodeError
 from livebode.core.ending import ENDING, Handler, handled
-from livebode.runtime.allocation import share_between_threads
+from livebode.runtime.allocation import FreeMemory, share_between_threads
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
 from livebode.runtime.destination import Destination
@@ -70,6 +70,7 @@ class Session:
     def run(self, look: Callable[[], None] = lambda: None) -> None:
         """Wait until every axis ended; `look` is called ten times a second, in this thread."""
         share_between_threads()
+        memory = FreeMemory()
         with self._hearing():
             for thread in list(self.threads.values()):
                 thread.start()
@@ -77,6 +78,7 @@ class Session:
             while any(thread.alive for thread in self.all):
                 time.sleep(TICK_S)
                 look()
+                memory.give_back()
                 asked, now = self._reload_asked.is_set(), time.monotonic()
                 if self._file is not None and not self.ended_by and (asked or now - looked_s >= LOOK_S):
                     looked_s = now

@@ -7,7 +7,7 @@ import logging
 import os
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +62,8 @@ class Store:
     Attributes
     ----------
     last
-        The commit to continue from; None in a new directory, in which `begin` starts a run.
+        The commit to continue from, or the newest one, without its states; None in a new directory, in which `begin`
+        starts a run.
     phase
         Part of an interval by which its commits and segments are ahead of those of another record of the process.
 
@@ -159,7 +160,7 @@ class Store:
             elif committed_s - self._synced_s >= self.limits.interval_s:
                 self._synced_s = committed_s
                 self._syncing.begin(self._journal, parts)
-            self.last = commit
+            self.last = replace(commit, states={})  # some 100 kB for each axis of the process
         except OSError as error:
             self._failed(error, sample, time_s)
             return False
@@ -167,15 +168,17 @@ class Store:
         if full:
             # Without space for it, the journal continues to grow, and this is tried again at the next commit.
             try:
-                self._close_segment()
+                self._close_segment(commit)
             except (OSError, LivebodeError) as error:
                 self._not_closed(error, "with the next commit")
         elif self._closing.done:
             self._closed()
         return True
 
-    def finish(self, summary: dict[str, Any], *, finished: bool) -> None:
-        """Close open files and write run.json; a run that is not `finished` can be continued later.
+    def finish(self, summary: dict[str, Any], states: Mapping[str, bytes], *, finished: bool) -> None:
+        """Close open files and write run.json; a run that is not `finished` can be continued later from `states`.
+
+        These are the states of the last commit.
 
         Raises
         ------
@@ -186,10 +189,10 @@ class Store:
             assert self.last is not None
             self._not_paused()
             self._sync()
-            self._close_segment()
+            self._close_segment(replace(self.last, states=dict(states)))
             if (error := self._closed()) is not None:
                 raise error
-            self.commit(self.last.sample, self.last.time_s, self.last.states)  # with the events of closing
+            self.commit(self.last.sample, self.last.time_s, states)  # with the events of closing
             self._not_paused()
             self._write_summary(summary, finished=finished)
             if finished:
@@ -289,12 +292,11 @@ class Store:
         self._syncing.close()
         self._journal.close()
 
-    def _close_segment(self) -> None:
-        """Continue in a new journal, and begin to convert the previous one to segments."""
-        assert self.last is not None
+    def _close_segment(self, commit: Commit) -> None:
+        """Continue in a new journal from this commit, and begin to convert the previous one to segments."""
         self._closed()  # if the journal is full before the previous one is converted, wait for it
         before, number = self._journal, self._number
-        self._open_journal(number + 1, self.last)
+        self._open_journal(number + 1, commit)
         before.close()
         self._shelf.seal(number)
         self._begin_closing()

@@ -1,0 +1,5 @@
+"""Sizes of paper."""
+
+from typing import Literal
+
+Paper = Literal["a4", "letter"]
