@@ -6,10 +6,13 @@ BUILT   = $(VENV)/.built
 NODE    = node_modules/.package-lock.json
 # Small products only make BLAS's threads wait for each other; the command line does the same for itself.
 export OPENBLAS_NUM_THREADS ?= 1
+WHEELS  = .venv-wheels
+# A Python that has the wheel of the stable ABI: the newest of pyenv, else that of the system.
+LATER_PYTHON ?= $(or $(lastword $(sort $(wildcard $(HOME)/.pyenv/versions/3.1[2-9].*/bin/python3))),python3.13)
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check wheels test-abi3 peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -90,6 +93,20 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 BASE ?=
 bench-compare: $(BUILT)  ## the speed of this version and of another commit, alternately (BASE=REV; default: newest tag or stored result)
 	$(BIN)/python -m bench.versions --base "$(BASE)"
+
+$(WHEELS)/.installed: requirements-wheels.lock
+	$(PYTHON) -m venv $(WHEELS)
+	$(WHEELS)/bin/python -m pip install --quiet --require-hashes -r requirements-wheels.lock
+	touch $@
+
+wheels: $(WHEELS)/.installed  ## wheels for every Python of this computer in dist/, tried without a compiler or the network (10 min)
+	$(WHEELS)/bin/python -m tools.wheels build
+	$(WHEELS)/bin/python -m tools.wheels gather
+	$(WHEELS)/bin/python -m tools.wheels try
+	$(WHEELS)/bin/python -m tools.wheels runners
+
+test-abi3:       ## every test on the stable ABI, in an environment of LATER_PYTHON
+	@$(MAKE) --no-print-directory VENV=.venv-abi3 PYTHON=$(LATER_PYTHON) pytest
 
 release-check: $(VENV)/.docs  ## what is missing for a release (CONTRIBUTING.md)
 	$(BIN)/python -m tools.release check
@@ -181,7 +198,8 @@ lock:            ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --all-extras --group dev -o requirements-dev.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group bench -o requirements-bench.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group docs -o requirements-docs.lock
+	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group wheels -o requirements-wheels.lock
 	PATH="$(abspath $(BIN)):$$PATH" npm install --package-lock-only --save-dev --save-exact @biomejs/biome@latest axe-core@latest typescript@latest
 
 clean:           ## remove what was built
-	rm -rf build node_modules $(VENV)
+	rm -rf build dist node_modules $(VENV) $(WHEELS) .venv-abi3

@@ -1,0 +1,86 @@
+"""`python -m tools.wheels`: build the wheels of this computer's Pythons, and try them without a compiler or network.
+
+`build` writes them to dist/ (audited, manylinux), and `gather` adds the wheels that they need. `try` creates a fresh
+environment for each Python from that directory alone and prints a table: demo, own log, live run, dashboard. `runners`
+starts the demo with uvx and pipx in the same way.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from tools.wheels.build import TOOLS, build, builders
+from tools.wheels.interpreters import ROOT, Interpreter, interpreters
+from tools.wheels.trial import REQUIREMENT, Trial
+
+DIST = ROOT / "dist"
+
+
+def built() -> None:
+    """Write the wheels of this computer to an empty dist/, and print their sizes."""
+    shutil.rmtree(DIST, ignore_errors=True)
+    for interpreter in builders(interpreters()):
+        wheel = build(interpreter, DIST)
+        print(f"{interpreter.name:6}{wheel.stat().st_size / 1e6:6.1f} MB  {wheel.name}", flush=True)
+
+
+def gathered() -> None:
+    """Download the wheels that these need, as a user's pip would choose them for each Python."""
+    for interpreter in interpreters():
+        pip = [TOOLS / "pip", "--python", interpreter.path, "download", "--quiet", "--quiet", "--only-binary", ":all:"]
+        subprocess.run([*pip, "--dest", DIST, "--find-links", DIST, REQUIREMENT], check=True)
+
+
+def tried() -> bool:
+    """Print a row for each Python, and whether everything worked."""
+    faults = []
+    for interpreter in interpreters():
+        with tempfile.TemporaryDirectory() as folder:
+            trial = Trial(interpreter, Path(folder))
+            for name, step in trial.steps(DIST).items():
+                began = time.perf_counter()
+                try:
+                    found = step()
+                except (RuntimeError, OSError, ValueError, subprocess.SubprocessError) as error:
+                    found = f"FAILED: {error}"
+                    faults.append(found)
+                took_s = time.perf_counter() - began
+                print(f"{interpreter.name:6}{name:12}{took_s:6.1f} s  {found}", flush=True)
+    return not faults
+
+
+def run_by_runners(interpreter: Interpreter) -> None:
+    """Start the demo with uvx and pipx from dist/; with an empty home directory, and without the network."""
+    demo = ["livebode", "demo", "--fast"]
+    with tempfile.TemporaryDirectory() as home:
+        links = ["--no-index", "--find-links", str(DIST)]
+        uvx = [TOOLS / "uvx", "--offline", "--python", str(interpreter.path), *links, *demo]
+        pipx = [TOOLS / "pipx", "run", "--python", str(interpreter.path), "--pip-args", " ".join(links), *demo]
+        for name, command in (("uvx", uvx), ("pipx run", pipx)):
+            began = time.perf_counter()
+            environment = {"PATH": str(TOOLS), "HOME": home, "OPENBLAS_NUM_THREADS": "1"}
+            subprocess.run(command, check=True, cwd=home, env=environment, stdout=subprocess.DEVNULL)
+            print(f"{name} livebode demo --fast: {time.perf_counter() - began:.1f} s", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m tools.wheels", description=__doc__)
+    parser.add_argument("command", choices=("build", "gather", "try", "runners"))
+    command = parser.parse_args().command
+    if command == "build":
+        built()
+    elif command == "gather":
+        gathered()
+    elif command == "runners":
+        run_by_runners(interpreters()[-1])
+    elif not tried():
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()
