@@ -15,7 +15,8 @@ def test_3_11_and_free_threaded_pythons_have_their_own_wheel_and_all_others_shar
     found = [
         Interpreter(Version(version), is_free_threaded, Path(version))
         for version, is_free_threaded in (
-            ("3.11.7", False), ("3.12.1", False), ("3.13.0", False), ("3.13.0", True), ("3.14.0", False), ("3.14.0", True),
+            ("3.11.7", False), ("3.12.1", False), ("3.13.0", False), ("3.13.0", True),
+            ("3.14.0", False), ("3.14.0", True),
         )
     ]  # fmt: skip
     assert [one.name for one in builders(found)] == ["3.11", "3.12", "3.13t", "3.14t"]
