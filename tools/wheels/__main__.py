@@ -8,6 +8,8 @@ starts the demo with uvx and pipx in the same way.
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import shutil
 import subprocess
 import tempfile
@@ -33,7 +35,7 @@ def gathered() -> None:
     """Download the wheels that these need, as a user's pip would choose them for each Python."""
     for interpreter in interpreters():
         pip = [TOOLS / "pip", "--python", interpreter.path, "download", "--quiet", "--quiet", "--only-binary", ":all:"]
-        subprocess.run([*pip, "--dest", DIST, "--find-links", DIST, REQUIREMENT], check=True)
+        subprocess.run([*pip, "--dest", DIST, "--find-links", DIST, REQUIREMENT, "pip"], check=True)  # pipx renews pip
 
 
 def tried() -> bool:
@@ -56,16 +58,24 @@ def tried() -> bool:
 
 def run_by_runners(interpreter: Interpreter) -> None:
     """Start the demo with uvx and pipx from dist/; with an empty home directory, and without the network."""
-    demo = ["livebode", "demo", "--fast"]
+    links = ["--no-index", "--find-links", str(DIST)]
     with tempfile.TemporaryDirectory() as home:
-        links = ["--no-index", "--find-links", str(DIST)]
-        uvx = [TOOLS / "uvx", "--offline", "--python", str(interpreter.path), *links, *demo]
-        pipx = [TOOLS / "pipx", "run", "--python", str(interpreter.path), "--pip-args", " ".join(links), *demo]
+        uvx = [TOOLS / "uvx", "--offline", "--no-build", "--python", interpreter.path, *links]
+        pip = " ".join(["--only-binary :all:", *links])
+        pipx = [TOOLS / "pipx", "run", "--backend", "pip", "--python", interpreter.path, "--pip-args", pip]
+        path = os.pathsep.join([str(TOOLS), "/usr/bin", "/bin"])  # their scripts call realpath
         for name, command in (("uvx", uvx), ("pipx run", pipx)):
             began = time.perf_counter()
-            environment = {"PATH": str(TOOLS), "HOME": home, "OPENBLAS_NUM_THREADS": "1"}
-            subprocess.run(command, check=True, cwd=home, env=environment, stdout=subprocess.DEVNULL)
-            print(f"{name} livebode demo --fast: {time.perf_counter() - began:.1f} s", flush=True)
+            environment = {"PATH": path, "HOME": home, "OPENBLAS_NUM_THREADS": "1"}
+            done = subprocess.run(
+                [*command, "livebode", "demo", "--fast", "--json"], cwd=home, env=environment, capture_output=True
+            )
+            if done.returncode:
+                raise SystemExit(f"{name} failed:\n{done.stderr.decode()}")
+            responses = json.loads(done.stdout)["counts"]["responses"]
+            print(
+                f"{name} livebode demo --fast: {responses} responses, {time.perf_counter() - began:.1f} s", flush=True
+            )
 
 
 def main() -> None:
