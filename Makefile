@@ -108,7 +108,7 @@ wheels: $(WHEELS)/.installed  ## wheels for every Python of this computer in dis
 test-abi3:       ## every test on the stable ABI, in an environment of LATER_PYTHON
 	@$(MAKE) --no-print-directory VENV=.venv-abi3 PYTHON=$(LATER_PYTHON) pytest
 
-release-check: $(VENV)/.docs  ## what is missing for a release (CONTRIBUTING.md)
+release-check: $(VENV)/.docs $(WHEELS)/.installed  ## what is missing for a release (CONTRIBUTING.md)
 	$(BIN)/python -m tools.release check
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/explanation/peers.md)
@@ -187,7 +187,7 @@ screenshots: $(BUILT)  ## pictures of dashboard and report in every state (light
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends chromium clang fonts-wqy-microhei gcc-aarch64-linux-gnu gcc-arm-none-eabi libc6-dev-arm64-cross mosquitto nats-server openssh-server openssl poppler-utils qemu-system-arm qemu-user
+	apt-get install -y -qq --no-install-recommends chromium clang fonts-wqy-microhei gcc-aarch64-linux-gnu gcc-arm-none-eabi libc6-dev-arm64-cross mosquitto nats-server openssh-server openssl nginx-light poppler-utils qemu-system-arm qemu-user systemd
 
 catalogues: $(BUILT)  ## after a change of a sentence of report or dashboard: update the catalogues, list what lacks a translation
 	$(BIN)/python -m tools.catalogues

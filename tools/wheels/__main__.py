@@ -2,7 +2,7 @@
 
 `build` writes them to dist/ (audited, manylinux), and `gather` adds the wheels that they need. `try` creates a fresh
 environment for each Python from that directory alone and prints a table: demo, own log, live run, dashboard. `runners`
-starts the demo with uvx and pipx in the same way.
+starts the demo with uvx and pipx in the same way. `bill` writes a bill of materials to dist/livebode.cdx.json.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shutil
 import subprocess
 import tempfile
 import time
 from pathlib import Path
 
+from tools.wheels.bill import bill
 from tools.wheels.build import TOOLS, build, builders
 from tools.wheels.interpreters import ROOT, Interpreter, interpreters
 from tools.wheels.trial import REQUIREMENT, Trial
@@ -24,8 +24,9 @@ DIST = ROOT / "dist"
 
 
 def built() -> None:
-    """Write the wheels of this computer to an empty dist/, and print their sizes."""
-    shutil.rmtree(DIST, ignore_errors=True)
+    """Write the wheels of this computer to dist/, in place of those there, and print their sizes."""
+    for old in DIST.glob("livebode-*.whl"):
+        old.unlink()
     for interpreter in builders(interpreters()):
         wheel = build(interpreter, DIST)
         print(f"{interpreter.name:6}{wheel.stat().st_size / 1e6:6.1f} MB  {wheel.name}", flush=True)
@@ -80,7 +81,7 @@ def run_by_runners(interpreter: Interpreter) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tools.wheels", description=__doc__)
-    parser.add_argument("command", choices=("build", "gather", "try", "runners"))
+    parser.add_argument("command", choices=("build", "gather", "try", "runners", "bill"))
     command = parser.parse_args().command
     if command == "build":
         built()
@@ -88,6 +89,8 @@ def main() -> None:
         gathered()
     elif command == "runners":
         run_by_runners(interpreters()[-1])
+    elif command == "bill":
+        print(f"{bill(DIST, DIST / 'livebode.cdx.json')} packages")
     elif not tried():
         raise SystemExit(1)
 

@@ -60,11 +60,14 @@ class Trial:
         }  # fmt: skip
 
     def install(self, wheels: Path) -> str:
-        """Install with what the demo and the dashboard need; the size is that of all packages."""
+        """Install with what the demo and the dashboard need; the size is that of all packages.
+
+        The cache is its own: that of the user may have another build of the same version.
+        """
         _checked([TOOLS / "uv", "venv", "--quiet", "--python", self.interpreter.path, self._place], os.environ)
         _checked(
             [TOOLS / "uv", "pip", "install", "--quiet", "--python", self._bin / "python", "--no-index",
-             "--find-links", wheels, REQUIREMENT],
+             "--find-links", wheels, "--cache-dir", self.folder / "cache", REQUIREMENT],
             os.environ,
         )  # fmt: skip
         (packages,) = self._place.glob("lib/python3*/site-packages")
