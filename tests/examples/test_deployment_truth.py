@@ -55,9 +55,7 @@ def proxied(folder: Path, upstream: int, certificate: Path, key: Path) -> Iterat
     ):  # fmt: skip
         assert ours in server
         server = server.replace(ours, theirs)
-    places = "".join(
-        f"{name}_temp_path {folder};\n" for name in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
-    )
+    places = "".join(f"{name}_temp_path {folder};\n" for name in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi"))
     (folder / "nginx.conf").write_text(
         f"daemon off;\npid {folder}/pid;\nevents {{}}\nhttp {{\naccess_log off;\n{places}{server}}}\n"
     )

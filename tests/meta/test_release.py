@@ -31,6 +31,7 @@ FILES = {
     "## [1.1.0] - 2026-01-01\n\n- Old.\n",
     "CITATION.cff": "title: livebode\nversion: 1.2.0\ndate-released: 2026-02-03\nreferences:\n  - year: 2016\n",
     "src/livebode/version.py": '__version__ = "1.2.0"\n',
+    "examples/deploy/conda/meta.yaml": '{% set version = "1.2.0" %}\n',
     "LICENSE": "MIT", "NOTICE": "uPlot, src/livebode/dashboard/_vendor/uplot\n",
     "src/livebode/dashboard/_vendor/uplot/LICENSE": "MIT",
     "package-lock.json": "{}", **dict.fromkeys(("requirements-dev.lock", "requirements-bench.lock"), LOCK),
@@ -145,6 +146,7 @@ def test_a_prepared_version_misses_only_what_it_cannot_write(ready: Path, tmp_pa
     edited("CHANGELOG.md", "## [Unreleased]\n", "## [Unreleased]\n\n- Smaller.\n")(root)
     prepare(root, "1.3.0", "2026-03-04")
     assert run(CHECKS, root) == ["clean tree", "benchmark history"]
+    assert 'version = "1.3.0"' in (root / "examples/deploy/conda/meta.yaml").read_text()
     changelog = (root / "CHANGELOG.md").read_text()
     assert "## [Unreleased]\n\n## [1.3.0] - 2026-03-04\n\n- Smaller.\n\n## [1.2.0] - 2026-02-03\n" in changelog
     with pytest.raises(ValueError, match="nothing to release"):
