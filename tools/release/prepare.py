@@ -9,7 +9,6 @@ from packaging.version import Version
 
 from tools.release.files import PACKAGE, section, text
 
-
 RECIPE = "examples/deploy/conda/meta.yaml"
 
 
