@@ -12,7 +12,7 @@ LATER_PYTHON ?= $(or $(lastword $(sort $(wildcard $(HOME)/.pyenv/versions/3.1[2-
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check wheels test-abi3 peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -107,6 +107,10 @@ wheels: $(WHEELS)/.installed  ## wheels for every Python of this computer in dis
 
 test-abi3:       ## every test on the stable ABI, in an environment of LATER_PYTHON
 	@$(MAKE) --no-print-directory VENV=.venv-abi3 PYTHON=$(LATER_PYTHON) pytest
+
+bench-abi3: $(BUILT)  ## the speed of the stable ABI and of the ABI of LATER_PYTHON itself
+	@$(MAKE) --no-print-directory VENV=.venv-abi3 PYTHON=$(LATER_PYTHON) .venv-abi3/.built
+	$(BIN)/python -m bench.stable_abi .venv-abi3/bin/python
 
 release-check: $(VENV)/.docs $(WHEELS)/.installed  ## what is missing for a release (CONTRIBUTING.md)
 	$(BIN)/python -m tools.release check
