@@ -6,10 +6,13 @@ BUILT   = $(VENV)/.built
 NODE    = node_modules/.package-lock.json
 # Small products only make BLAS's threads wait for each other; the command line does the same for itself.
 export OPENBLAS_NUM_THREADS ?= 1
+WHEELS  = .venv-wheels
+# A Python that has the wheel of the stable ABI: the newest of pyenv, else that of the system.
+LATER_PYTHON ?= $(or $(lastword $(sort $(wildcard $(HOME)/.pyenv/versions/3.1[2-9].*/bin/python3))),python3.13)
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check profiles lowest peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -91,18 +94,32 @@ BASE ?=
 bench-compare: $(BUILT)  ## the speed of this version and of another commit, alternately (BASE=REV; default: newest tag or stored result)
 	$(BIN)/python -m bench.versions --base "$(BASE)"
 
-release-check: $(VENV)/.docs  ## what is missing for a release (CONTRIBUTING.md)
-	$(BIN)/python -m tools.release check
-
-$(VENV)/.uv: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet uv
+$(WHEELS)/.installed: requirements-wheels.lock
+	$(PYTHON) -m venv $(WHEELS)
+	$(WHEELS)/bin/python -m pip install --quiet --require-hashes -r requirements-wheels.lock
 	touch $@
 
-profiles: $(BUILT) $(VENV)/.uv ## install each profile of the wheel into a fresh environment: sizes, and whether the core works (10 min)
-	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m tools.profiles
+wheels: $(WHEELS)/.installed  ## wheels for every Python of this computer in dist/, tried without a compiler or the network (10 min)
+	$(WHEELS)/bin/python -m tools.wheels build
+	$(WHEELS)/bin/python -m tools.wheels gather
+	$(WHEELS)/bin/python -m tools.wheels try
+	$(WHEELS)/bin/python -m tools.wheels runners
 
-lowest: $(BUILT) $(VENV)/.uv ## tests with the lowest versions that pyproject.toml permits (20 min)
-	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m tools.lowest
+test-abi3:       ## every test on the stable ABI, in an environment of LATER_PYTHON
+	@$(MAKE) --no-print-directory VENV=.venv-abi3 PYTHON=$(LATER_PYTHON) pytest
+
+bench-abi3: $(BUILT)  ## the speed of the stable ABI and of the ABI of LATER_PYTHON itself
+	@$(MAKE) --no-print-directory VENV=.venv-abi3 PYTHON=$(LATER_PYTHON) .venv-abi3/.built
+	$(BIN)/python -m bench.stable_abi .venv-abi3/bin/python
+
+release-check: $(VENV)/.docs $(WHEELS)/.installed  ## what is missing for a release (CONTRIBUTING.md)
+	$(BIN)/python -m tools.release check
+
+profiles: $(BUILT) $(WHEELS)/.installed  ## install each profile of the wheel into a fresh environment: sizes, and whether the core works (10 min)
+	PATH="$(abspath $(BIN)):$(abspath $(WHEELS)/bin):$$PATH" $(BIN)/python -m tools.profiles
+
+lowest: $(BUILT) $(WHEELS)/.installed  ## tests with the lowest versions that pyproject.toml permits (20 min)
+	PATH="$(abspath $(BIN)):$(abspath $(WHEELS)/bin):$$PATH" $(BIN)/python -m tools.lowest
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/explanation/peers.md)
 	$(BIN)/python -m studies.peers
@@ -180,7 +197,7 @@ screenshots: $(BUILT)  ## pictures of dashboard and report in every state (light
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends chromium clang fonts-wqy-microhei gcc-aarch64-linux-gnu gcc-arm-none-eabi libc6-dev-arm64-cross mosquitto nats-server openssh-server openssl poppler-utils qemu-system-arm qemu-user
+	apt-get install -y -qq --no-install-recommends chromium clang fonts-wqy-microhei gcc-aarch64-linux-gnu gcc-arm-none-eabi libc6-dev-arm64-cross mosquitto nats-server openssh-server openssl nginx-light poppler-utils qemu-system-arm qemu-user systemd
 
 catalogues: $(BUILT)  ## after a change of a sentence of report or dashboard: update the catalogues, list what lacks a translation
 	$(BIN)/python -m tools.catalogues
@@ -190,7 +207,8 @@ lock: $(VENV)/.uv ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --all-extras --group dev -o requirements-dev.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group bench -o requirements-bench.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group docs -o requirements-docs.lock
+	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group wheels -o requirements-wheels.lock
 	PATH="$(abspath $(BIN)):$$PATH" npm install --package-lock-only --save-dev --save-exact @biomejs/biome@latest axe-core@latest typescript@latest
 
 clean:           ## remove what was built
-	rm -rf build node_modules $(VENV)
+	rm -rf build dist node_modules $(VENV) $(WHEELS) .venv-abi3

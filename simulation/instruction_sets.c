@@ -1,5 +1,6 @@
 /* Chooses the version of a function for the processor. All have the same operations in the same order, without fused
  * multiplications, and so the same bits. */
+#include "../kernel/src/processor.h"
 #include "late.h"
 #include "two_masses.h"
 
@@ -15,8 +16,8 @@ typedef enum { BASELINE, AVX2, AVX512 } instruction_set;
 
 static instruction_set best(void)
 {
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl")) return AVX512;
-    return __builtin_cpu_supports("avx2") ? AVX2 : BASELINE;
+    if (lb_has_avx512()) return AVX512;
+    return lb_has_avx2() ? AVX2 : BASELINE;
 }
 
 void lb_two_masses_advance(const lb_two_masses_course *course, size_t pairs, const lb_two_masses *pair,

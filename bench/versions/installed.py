@@ -1,6 +1,6 @@
-"""Two versions of livebode, each installed into a virtual environment of its own.
+"""Versions of livebode, each installed into a virtual environment of its own.
 
-Both use the dependencies of this environment, so that a ratio shows what changed in livebode and not in NumPy.
+Versions that are compared use the same dependencies, so that a ratio shows what changed in livebode and not in NumPy.
 """
 
 from __future__ import annotations
@@ -9,9 +9,7 @@ import os
 import shutil
 import subprocess
 import sys
-import sysconfig
 import tarfile
-import venv
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -47,17 +45,25 @@ def working_tree(folder: Path) -> Path:
     return folder
 
 
-def installed(source: Path, folder: Path) -> Path:
-    """The Python of a new environment in this directory, with livebode built from this source."""
-    venv.create(folder, with_pip=False)
-    python = folder / "bin" / "python"
-    packages = Path(sysconfig.get_path("purelib", vars={"base": str(folder)}))
+def installed(source: Path, folder: Path, python: Path = Path(sys.executable), *settings: str) -> Path:
+    """The Python of a new environment in this directory, with livebode built from this source.
+
+    It has the packages of the environment of `python`; `settings` are those of scikit-build-core.
+    """
+    subprocess.run([python, "-m", "venv", "--without-pip", folder], check=True)
+    own = folder / "bin" / "python"
     # A line in a .pth file adds the directory alone: the hook of the editable installation in it is not read.
-    (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    (_packages(own) / "dependencies.pth").write_text(f"{_packages(python)}\n", encoding="utf-8")
+    path = f"{python.parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    settings = (f"build-dir={folder / 'build'}", *settings)
     subprocess.run(
-        [python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index",
-         "--ignore-installed", f"--config-settings=build-dir={folder / 'build'}", str(source)],
+        [own, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index",
+         "--ignore-installed", *(f"--config-settings={setting}" for setting in settings), str(source)],
         check=True, env=os.environ | {"PATH": path},
     )  # fmt: skip
-    return python
+    return own
+
+
+def _packages(python: Path) -> Path:
+    asked = [python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]
+    return Path(subprocess.run(asked, check=True, capture_output=True, text=True).stdout.strip())

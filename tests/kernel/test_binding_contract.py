@@ -1,6 +1,8 @@
 """The Python face: shapes, types, strides, buffers, threads."""
 
+import sys
 import threading
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -127,3 +129,9 @@ def test_instruction_set_can_be_forced(monkeypatch):
     monkeypatch.setenv("LIVEBODE_INSTRUCTION_SET", "sse9")
     with pytest.raises(ValueError, match="'sse9' is not one of best, baseline"):
         SlidingDFT(4, [1])
+
+
+@pytest.mark.parametrize("module", ["livebode.kernel._native", "livebode.simulation._axis"])
+def test_modules_have_the_stable_abi_from_3_12(module):
+    """One wheel then serves all later versions; 3.11 lacks what nanobind needs of it."""
+    assert (".abi3." in find_spec(module).origin) == (sys.version_info >= (3, 12))

@@ -211,7 +211,7 @@ def _imported(path: Path) -> Iterator[tuple[str, str]]:
 
 
 def test_locks_name_no_host_and_agree_with_each_other() -> None:
-    pins = [_pins(ROOT / f"requirements-{lock}.lock") for lock in ("dev", "bench", "docs")]
+    pins = [_pins(ROOT / f"requirements-{lock}.lock") for lock in ("dev", "bench", "docs", "wheels")]
     for others in pins[1:]:
         for package in pins[0].keys() & others.keys():
             assert pins[0][package] == others[package], package

@@ -25,15 +25,17 @@ FORMATS = (
 )
 FILES = {
     "pyproject.toml": '[project]\nname = "livebode"\nversion = "1.2.0"\ndependencies = ["numpy>=2.0"]\n'
-    '[dependency-groups]\ndev = ["ruff>=0.8"]\ndocs = ["sphinx>=8.2"]\nbench = ["numba>=0.61"]\n',
+    '[dependency-groups]\ndev = ["ruff>=0.8"]\ndocs = ["sphinx>=8.2"]\nbench = ["numba>=0.61"]\n'
+    'wheels = []\n',
     "CHANGELOG.md": "# Changelog\n\n## [Unreleased]\n\n## [1.2.0] - 2026-02-03\n\n- Faster.\n\n"
     "## [1.1.0] - 2026-01-01\n\n- Old.\n",
     "CITATION.cff": "title: livebode\nversion: 1.2.0\ndate-released: 2026-02-03\nreferences:\n  - year: 2016\n",
     "src/livebode/version.py": '__version__ = "1.2.0"\n',
+    "examples/deploy/conda/meta.yaml": '{% set version = "1.2.0" %}\n',
     "LICENSE": "MIT", "NOTICE": "uPlot, src/livebode/dashboard/_vendor/uplot\n",
     "src/livebode/dashboard/_vendor/uplot/LICENSE": "MIT",
     "package-lock.json": "{}", **dict.fromkeys(("requirements-dev.lock", "requirements-bench.lock"), LOCK),
-    "requirements-docs.lock": LOCK,
+    "requirements-docs.lock": LOCK, "requirements-wheels.lock": LOCK,
     "docs/reference/formats.md": FORMATS.format(2), "tests/records/stored/2/expected.json": "{}",
     "docs/reference/command-line.md": command_page(), "docs/reference/errors.md": error_page(),
     "docs/reference/configuration.md": configuration_page(),
@@ -144,6 +146,7 @@ def test_a_prepared_version_misses_only_what_it_cannot_write(ready: Path, tmp_pa
     edited("CHANGELOG.md", "## [Unreleased]\n", "## [Unreleased]\n\n- Smaller.\n")(root)
     prepare(root, "1.3.0", "2026-03-04")
     assert run(CHECKS, root) == ["clean tree", "benchmark history"]
+    assert 'version = "1.3.0"' in (root / "examples/deploy/conda/meta.yaml").read_text()
     changelog = (root / "CHANGELOG.md").read_text()
     assert "## [Unreleased]\n\n## [1.3.0] - 2026-03-04\n\n- Smaller.\n\n## [1.2.0] - 2026-02-03\n" in changelog
     with pytest.raises(ValueError, match="nothing to release"):
@@ -162,6 +165,7 @@ LICENCES = [f"livebode-1.2.0.dist-info/licenses/{name}" for name in FILES if nam
     [
         (LICENCES, "1.2.0", ""),
         ([*LICENCES, "livebode/tests/test_run.py"], "1.2.0", "the wheel contains livebode/tests/test_run.py"),
+        ([*LICENCES, "livebode/kernel/native.cpp"], "1.2.0", "the wheel contains livebode/kernel/native.cpp"),
         (LICENCES[:2], "1.2.0", "the wheel lacks the licence files src/livebode/dashboard/_vendor/uplot/LICENSE"),
         (LICENCES, "1.1.0", "the metadata has version 1.1.0"),
     ],

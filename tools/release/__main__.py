@@ -13,6 +13,7 @@ from pathlib import Path
 
 from tools.release.builds import BUILDS
 from tools.release.checks import CHECKS, Check
+from tools.release.deployment import DEPLOYMENT
 from tools.release.prepare import prepare
 
 ROOT = Path(__file__).parents[2]
@@ -47,7 +48,7 @@ def main() -> None:
             parser.error(str(error))
         print(f"written: {', '.join(written)}; install again, or `livebode --version` is the previous one")
         return
-    missed = run((*CHECKS, *BUILDS), ROOT)
+    missed = run((*CHECKS, *DEPLOYMENT, *BUILDS), ROOT)
     print(f"{len(missed)} checks missed" if missed else "every check is ok")
     raise SystemExit(1 if missed else 0)
 

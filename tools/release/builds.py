@@ -18,7 +18,7 @@ from tools.release.files import version
 
 WANTED = ("Name", "Version", "Summary", "License-Expression", "Requires-Python", "Description-Content-Type")
 HOOK = "import sys, scikit_build_core.build as build; build.build_{kind}(sys.argv[1])"
-FOREIGN = re.compile(r"(^|/)(tests?|bench|studies|conftest\.py)(/|$)|(^|/)test_[^/]*$")
+FOREIGN = re.compile(r"(^|/)(tests?|bench|studies|conftest\.py)(/|$)|(^|/)test_[^/]*$|\.(cpp|h|po)$")
 
 
 def translations(_: Path) -> str:

@@ -26,7 +26,7 @@ from tools.release.files import (
     version_in_package,
 )
 
-LOCKS = {"requirements-dev.lock": "dev", "requirements-bench.lock": "bench", "requirements-docs.lock": "docs"}
+LOCKS = {f"requirements-{group}.lock": group for group in ("dev", "bench", "docs", "wheels")}
 FORMATS = "docs/reference/formats.md"
 
 

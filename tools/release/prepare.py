@@ -9,6 +9,8 @@ from packaging.version import Version
 
 from tools.release.files import PACKAGE, section, text
 
+RECIPE = "examples/deploy/conda/meta.yaml"
+
 
 def replaced(content: str, pattern: str, replacement: str, name: str) -> str:
     new, count = re.subn(pattern, replacement, content, count=1, flags=re.M)
@@ -18,7 +20,7 @@ def replaced(content: str, pattern: str, replacement: str, name: str) -> str:
 
 
 def prepare(root: Path, version: str, date: str) -> list[str]:
-    """Write version and date to pyproject.toml, the package, CITATION.cff and CHANGELOG.md; return what was written."""
+    """Write version and date to every file that has them; return what was written."""
     version = str(Version(version))
     if not section(root, "Unreleased"):
         raise ValueError("the Unreleased part of CHANGELOG.md is empty: there is nothing to release")
@@ -32,6 +34,9 @@ def prepare(root: Path, version: str, date: str) -> list[str]:
             text(root, "pyproject.toml"), r'^version = ".*"$', f'version = "{version}"', "pyproject.toml"
         ),
         PACKAGE: replaced(text(root, PACKAGE), r'^__version__ = ".*"$', f'__version__ = "{version}"', PACKAGE),
+        RECIPE: replaced(
+            text(root, RECIPE), '^{% set version = ".*" %}$', f'{{% set version = "{version}" %}}', RECIPE
+        ),
         "CITATION.cff": replaced(cff, r"^date-released:.*$", f"date-released: {date}", "CITATION.cff"),
         "CHANGELOG.md": replaced(text(root, "CHANGELOG.md"), r"^## \[Unreleased\]$", heading, "CHANGELOG.md"),
     }

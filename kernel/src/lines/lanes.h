@@ -25,7 +25,7 @@
 #if defined(__AVX2__) && !defined(LB_SCALAR)
 #include <immintrin.h>
 #endif
-#ifndef __GNUC__
+#if !(defined(__GNUC__) || defined(__clang__))
 #include <math.h>
 #endif
 
@@ -230,7 +230,7 @@ LB_INLINE double lb_largest_lane(lb_lanes x)
 /* Exactly rounded. */
 LB_INLINE lb_lanes lb_roots(lb_lanes x)
 {
-#if defined(LB_SCALAR) && defined(__GNUC__)
+#if defined(LB_SCALAR) && (defined(__GNUC__) || defined(__clang__))
     return __builtin_sqrt(x);
 #elif defined(LB_SCALAR)
     return sqrt(x);

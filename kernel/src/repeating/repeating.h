@@ -34,7 +34,7 @@ typedef struct {
     size_t known;      /* detection lines */
 } lb_repeats;
 
-#ifndef __GNUC__
+#if !(defined(__GNUC__) || defined(__clang__))
 #include <math.h>
 #endif
 
@@ -56,7 +56,7 @@ static inline double lb_absolute(double x) { return x > 0.0 ? x : 0.0 - x; }
 /* Exactly rounded; one instruction, without libm. */
 static inline double lb_root(double x)
 {
-#ifdef __GNUC__
+#if defined(__GNUC__) || defined(__clang__)
     return __builtin_sqrt(x);
 #else
     return sqrt(x);

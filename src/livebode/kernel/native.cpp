@@ -113,7 +113,7 @@ class Engine {
     void push(nb::handle x)
     {
         if (PyFloat_CheckExact(x.ptr()) && channels_ == 1 && !busy_) {
-            const double value = PyFloat_AS_DOUBLE(x.ptr());
+            const double value = PyFloat_AsDouble(x.ptr());
             if (is_double_) {
                 lb_sdft64_queue(dft64_, &value);
             } else {
@@ -154,7 +154,7 @@ class Engine {
         PyObject *result = PyBytes_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(bytes));
         if (!result) throw nb::python_error();
         nb::bytes owner = nb::steal<nb::bytes>(result);
-        void *data = PyBytes_AS_STRING(result);
+        void *data = PyBytes_AsString(result);
         expect(is_double_ ? lb_sdft64_snapshot(dft64_, data, bytes) : lb_sdft32_snapshot(dft32_, data, bytes));
         return owner;
     }
@@ -216,14 +216,14 @@ class Engine {
         constexpr Py_ssize_t most = 16;
         const bool is_list = PyList_CheckExact(x.ptr());
         if (!is_list && !PyTuple_CheckExact(x.ptr())) return false;
-        const Py_ssize_t length = is_list ? PyList_GET_SIZE(x.ptr()) : PyTuple_GET_SIZE(x.ptr());
+        const Py_ssize_t length = is_list ? PyList_Size(x.ptr()) : PyTuple_Size(x.ptr());
         if (length != static_cast<Py_ssize_t>(channels_) || length > most) return false;
         double values[most];
         float narrow[most];
         for (Py_ssize_t i = 0; i < length; ++i) {
-            PyObject *item = is_list ? PyList_GET_ITEM(x.ptr(), i) : PyTuple_GET_ITEM(x.ptr(), i);
+            PyObject *item = is_list ? PyList_GetItem(x.ptr(), i) : PyTuple_GetItem(x.ptr(), i);
             if (!PyFloat_CheckExact(item)) return false;
-            values[i] = PyFloat_AS_DOUBLE(item);
+            values[i] = PyFloat_AsDouble(item);
             narrow[i] = static_cast<float>(values[i]);
         }
         expect(is_double_ ? lb_sdft64_queue(dft64_, values) : lb_sdft32_queue(dft32_, narrow));

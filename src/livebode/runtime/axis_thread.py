@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 
 from livebode.configuration.axis import Axis
 from livebode.core import LivebodeError
@@ -49,6 +50,11 @@ class AxisThread:
     @property
     def alive(self) -> bool:
         return self._thread.is_alive()
+
+    def stands_still(self, longest_s: float) -> bool:
+        """Whether it has begun to take samples, and did not look for new ones for this time."""
+        looked_s = self.control.looked_s
+        return self.alive and looked_s is not None and time.monotonic() - looked_s > longest_s
 
     def end(self) -> None:
         """Request its end."""

@@ -30,6 +30,8 @@ class RunControl:
         self._source: LiveSource | None = None
         self.ended = False
         """Whether its end was requested."""
+        self.looked_s: float | None = None
+        """When the run looked for samples last, by the monotonic clock; None while it does not wait for any."""
         self.stopped: Callable[[], Event | None] | None = None
         """Message if the run is stopped in its present state; None while there is no run."""
 

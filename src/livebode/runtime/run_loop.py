@@ -175,6 +175,7 @@ class RunLoop:
                 self._turn.end()
                 if self._control.changing:
                     break
+        self._control.looked_s = None
         self._recorder.commit_last()
         if not self._counts.stop:
             raise SignalError("empty", "the recording has no samples", "choose another one")
@@ -198,6 +199,7 @@ class RunLoop:
         source = self.source
         paced = isinstance(source, LiveSource) and source.paced and not source.waits
         for block in self._blocks:
+            self._control.looked_s = time.monotonic()
             if paced and isinstance(block, LiveBlock) and self._relation.take(block, self._events.append):
                 self._set_clock()
             if isinstance(block, LiveBlock) and self._numbers.take(block):

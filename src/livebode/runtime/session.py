@@ -18,6 +18,7 @@ from livebode.runtime.allocation import FreeMemory, share_between_threads
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
 from livebode.runtime.destination import Destination
+from livebode.runtime.service_manager import ServiceManager
 from livebode.runtime.status import Status
 
 TICK_S = 0.1
@@ -31,6 +32,7 @@ class Session:
 
     SIGINT and SIGTERM end every axis with complete records; the second one calls `leave`. On SIGHUP or an edit, the
     file is checked completely and then applied or rejected for all axes. Signals are handled in the main thread only.
+    A service manager is informed of all this, and its watchdog as long as every axis works.
 
     Parameters
     ----------
@@ -64,6 +66,7 @@ class Session:
         """The signal that ended it, or 0."""
         self._reload_asked = threading.Event()
         self._postponed = ""
+        self._manager = ServiceManager()
         for name, axis in axes.items():
             self._add(name, axis)
 
@@ -74,15 +77,20 @@ class Session:
         with self._hearing():
             for thread in list(self.threads.values()):
                 thread.start()
+            self._manager.ready()
             looked_s = time.monotonic()
             while any(thread.alive for thread in self.all):
                 time.sleep(TICK_S)
                 look()
                 memory.give_back()
+                self._inform()
                 asked, now = self._reload_asked.is_set(), time.monotonic()
                 if self._file is not None and not self.ended_by and (asked or now - looked_s >= LOOK_S):
                     looked_s = now
+                    if asked:
+                        self._manager.reloading()
                     self._look_at(self._file, asked)
+        self._manager.stopping()
 
     @property
     def all(self) -> list[AxisThread]:
@@ -93,6 +101,15 @@ class Session:
         """End every axis with a complete record."""
         for thread in self.all:
             thread.end()
+
+    def _inform(self) -> None:
+        """Inform the service manager; not its watchdog if an axis stands still."""
+        if not any(thread.stands_still(self._manager.patience_s) for thread in self.all):
+            self._manager.working()
+        if self.ended_by:
+            self._manager.stopping()
+        elif not self._reload_asked.is_set():
+            self._manager.ready()
 
     def _add(self, name: str, axis: Axis, *, replaces: bool = True) -> AxisThread:
         """Start an axis that may replace records from before this session, but none of this session."""
