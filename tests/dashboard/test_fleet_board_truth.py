@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from livebode.core import ServerError
 from livebode.dashboard.alarm import AlarmStatus
-from livebode.dashboard.alarm_kinds import ALARMS
+from livebode.monitoring.alarm_kinds import ALARMS
 from livebode.dashboard.alarm_requests import AlarmRequest
 from livebode.dashboard.fleet_alarms import CONDITIONS, FleetAct, FleetAlarms
 from livebode.dashboard.fleet_board import LOOKS, LOST_S, FleetBoard

@@ -9,7 +9,7 @@ from functools import cache
 
 import pytest
 
-from livebode.dashboard.alarm_kinds import ALARMS, RETURNS
+from livebode.monitoring.alarm_kinds import ALARMS, RETURNS
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.fitting.extended import WORDS as EFFECTS
 from livebode.fitting.extended import Extended
