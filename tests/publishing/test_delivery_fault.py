@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from livebode.core import Event
-from livebode.publishing import outbox, publisher
+from livebode.publishing import outbox
 from tests.support.receivers import HttpReceiver, PublishedAxis, free_port, until, webhook
 
 
@@ -31,8 +31,7 @@ def test_events_wait_while_the_receiver_is_down_and_arrive_in_order(tmp_path: Pa
     assert not axis.outbox.exists()
 
 
-def test_events_of_an_ended_process_are_sent_by_the_next_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(publisher, "CLOSE_S", 0.2)
+def test_events_of_an_ended_process_are_sent_by_the_next_one(tmp_path: Path) -> None:
     port = free_port()
     with PublishedAxis(tmp_path, webhook(port)) as axis:
         axis.change(2.0, 7)
@@ -125,8 +124,7 @@ def test_an_event_about_a_receiver_is_sent_to_the_others_only(tmp_path: Path) ->
     assert other.texts == ["x: a is down"]
 
 
-def test_a_subscriber_only_appends_while_the_disk_is_stuck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(publisher, "CLOSE_S", 0.2)
+def test_a_subscriber_only_appends_while_the_disk_is_stuck(tmp_path: Path) -> None:
     with PublishedAxis(tmp_path, webhook(free_port())) as axis:
         box = axis.publisher._outbox  # the lock stands for a disk that does not answer
         with box._lock:
@@ -134,5 +132,7 @@ def test_a_subscriber_only_appends_while_the_disk_is_stuck(tmp_path: Path, monke
             published.start()
             published.join(20)
             assert not published.is_alive()
-        until(lambda: sum(box.dropped.values()) + axis.counts("hook")["events_waiting"] == outbox.INTAKE_MAX + 900, "all")
+        until(
+            lambda: sum(box.dropped.values()) + axis.counts("hook")["events_waiting"] == outbox.INTAKE_MAX + 900, "all"
+        )
         assert 0 < sum(box.dropped.values()) <= 900

@@ -1,4 +1,4 @@
-"""Receivers of [[publish]] on the loopback that a test closes, slows down and lets refuse; and what an axis publishes."""
+"""Receivers of [[publish]] that a test closes, slows down and lets refuse; and an axis that publishes."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class PublishedAxis:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.publisher.close()
+        self.publisher.close(0.5)
 
     def change(self, percent: float, number: int = 0) -> None:
         """Report an alarm: the stiffness changed."""

@@ -76,12 +76,12 @@ class Publisher:
         found = {one.section.label: one.counts(feed.name) for one in receivers if isinstance(one, Delivery)}
         return {"published": found} if found else {}
 
-    def close(self) -> None:
-        """Send what waits, for some seconds, and end."""
+    def close(self, patience_s: float = CLOSE_S) -> None:
+        """Send what waits, for at most so many seconds, and end."""
         if self._outbox is not None:
             self._outbox.flush()
         for delivery in self._deliveries.values():
-            delivery.end(CLOSE_S)
+            delivery.end(patience_s)
         for label, delivery in self._deliveries.items():
             delivery.join()
             if left := sum(delivery.waiting().values()):
