@@ -195,8 +195,12 @@ class Delivery:
         _logger.info("%s: %s", self.section.label, error)
         if self._failures >= DOWN_AFTER and self._down_s is None:
             self._down_s = self._first_failure_s
-            waits = "; events wait on disk, retrying with increasing delay" if self._outbox else "; retrying"
-            self._tell("sink-down", f"{self.section.label} does not take messages: {error.message}{waits}")
+            waits = (
+                "events wait on disk, retrying with increasing delay"
+                if self._outbox
+                else "retrying with increasing delay"
+            )
+            self._tell("sink-down", f"{self.section.label} does not take messages: {error.message}; {waits}")
 
     def _succeeded(self) -> None:
         self._failures = 0
