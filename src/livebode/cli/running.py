@@ -27,7 +27,7 @@ from livebode.runtime.documents import TrackerResults
 from livebode.sources.formats import read_head
 
 if TYPE_CHECKING:
-    from livebode.publishing import Publisher
+    from livebode.publishing.publisher import Publisher
     from livebode.runtime import OutputOnlyOutcome
 
 T = TypeVar("T")

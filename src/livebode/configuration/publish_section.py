@@ -236,11 +236,13 @@ def _check_keys(section: PublishSection) -> None:
             allowed=sorted(taken),
         )
     addresses = [key for key in ("url", "url_env", "url_file") if getattr(section, key) is not None]
-    if len(addresses) != 1:
+    if not addresses:
+        raise ConfigError("key-missing", f"[[publish]] of kind {kind} has no url", 'add url = "…"', key="publish.url")
+    if len(addresses) > 1:
         raise ConfigError(
-            "key-conflict" if addresses else "key-missing",
-            f"[[publish]] of kind {kind} has {' and '.join(addresses) or 'no url'}",
-            "keep one of them" if addresses else 'add url = "…"',
+            "key-conflict",
+            f"[[publish]] of kind {kind} has {' and '.join(addresses)}",
+            "keep one of them",
             key="publish.url",
         )
 

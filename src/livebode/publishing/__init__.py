@@ -1,5 +1,1 @@
 """Events and results of runs, sent to other systems: the [[publish]] sections of a configuration."""
-
-from livebode.publishing.publisher import Publisher
-
-__all__ = ["Publisher"]
