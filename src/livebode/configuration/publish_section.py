@@ -14,7 +14,7 @@ from livebode.configuration.message_template import check_template
 from livebode.configuration.section import ConfigurationSection, File
 from livebode.core import ConfigError
 
-Kind = Literal["webhook", "email", "prometheus", "mqtt", "syslog", "influxdb"]
+Kind = Literal["webhook", "email", "prometheus", "mqtt", "sparkplug", "syslog", "influxdb"]
 Part = Literal["parameters", "responses", "status"]
 Events = Literal["all", "alarms", "high", "medium", "low", "info"]
 
@@ -46,13 +46,15 @@ class SinkKind:
 
 
 _HTTP = {"http": 80, "https": 443}
+_MQTT = {"mqtt": 1883, "mqtts": 8883}
 _WEBHOOK = _SENDS | _TOKEN | _TLS | {"template", "url_env", "url_file", "secret_env", "secret_file"}
 _EMAIL = {"events", "template", "sender", "recipients", "group_s", "ca_file"} | _LOGIN
 SINK_KINDS: Mapping[Kind, SinkKind] = {
     "webhook": SinkKind(_HTTP, frozenset(_WEBHOOK), ("alarms",), ()),
     "email": SinkKind({"smtp": 587, "smtps": 465}, frozenset(_EMAIL), ("alarms",), ()),
     "prometheus": SinkKind(_HTTP, frozenset({"values", "interval_s", "certificate_file", "key_file"}), ()),
-    "mqtt": SinkKind({"mqtt": 1883, "mqtts": 8883}, frozenset(_SENDS | _LOGIN | _TLS | {"discovery"})),
+    "mqtt": SinkKind(_MQTT, frozenset(_SENDS | _LOGIN | _TLS | {"discovery"})),
+    "sparkplug": SinkKind(_MQTT, frozenset({"values", "interval_s"} | _LOGIN | _TLS), ()),
     "syslog": SinkKind({"udp": 514, "tcp": 601, "tls": 6514}, frozenset({"events", "template", "ca_file"}), values=()),
     "influxdb": SinkKind(_HTTP, frozenset(_SENDS | _TOKEN | _TLS)),
 }
@@ -67,8 +69,9 @@ class PublishSection(ConfigurationSection):
         Kind of the receiver.
     url
         Address of the receiver: http:// or https:// (webhook, influxdb), smtp:// or smtps:// (email), mqtt:// or
-        mqtts:// with the first levels of the topics as its path (mqtt), udp://, tcp:// or tls:// (syslog). Address on
-        which livebode listens: http://127.0.0.1:9464 (prometheus). Without user and password.
+        mqtts:// with the first levels of the topics as its path (mqtt) or group and node (sparkplug), udp://, tcp://
+        or tls:// (syslog). Address on which livebode listens: http://127.0.0.1:9464 (prometheus). Without user and
+        password.
     url_env
         Environment variable with the address, where it is a secret itself (webhook).
     url_file
@@ -95,11 +98,11 @@ class PublishSection(ConfigurationSection):
     recipients
         Addresses of the recipients (email).
     username
-        User name at the server (email, mqtt).
+        User name at the server (email, mqtt, sparkplug).
     password_env
-        Environment variable with the password (email, mqtt).
+        Environment variable with the password (email, mqtt, sparkplug).
     password_file
-        File with the password, relative to this file (email, mqtt).
+        File with the password, relative to this file (email, mqtt, sparkplug).
     token_env
         Environment variable with the token for the Authorization header (webhook, influxdb).
     token_file
@@ -112,7 +115,7 @@ class PublishSection(ConfigurationSection):
         Certificate of the authority that signed the receiver's certificate, relative to this file. Default: the
         authorities of the system.
     certificate_file
-        Certificate of livebode, relative to this file (webhook, mqtt, influxdb; prometheus: of its server).
+        Certificate of livebode, relative to this file (webhook, mqtt, sparkplug, influxdb; prometheus: of its server).
     key_file
         Private key of livebode, relative to this file.
     discovery

@@ -14,6 +14,7 @@ MODULES = {
     "email": "mail",
     "prometheus": "prometheus",
     "mqtt": "mqtt",
+    "sparkplug": "sparkplug",
     "syslog": "syslog",
     "influxdb": "influxdb",
 }
