@@ -14,7 +14,7 @@ from livebode.configuration.message_template import check_template
 from livebode.configuration.section import ConfigurationSection, File
 from livebode.core import ConfigError
 
-Kind = Literal["webhook", "email", "prometheus", "mqtt", "sparkplug", "syslog", "influxdb"]
+Kind = Literal["webhook", "email", "prometheus", "mqtt", "sparkplug", "syslog", "influxdb", "opcua"]
 Part = Literal["parameters", "responses", "status"]
 Events = Literal["all", "alarms", "high", "medium", "low", "info"]
 
@@ -57,6 +57,7 @@ SINK_KINDS: Mapping[Kind, SinkKind] = {
     "sparkplug": SinkKind(_MQTT, frozenset({"values", "interval_s"} | _LOGIN | _TLS), ()),
     "syslog": SinkKind({"udp": 514, "tcp": 601, "tls": 6514}, frozenset({"events", "template", "ca_file"}), values=()),
     "influxdb": SinkKind(_HTTP, frozenset(_SENDS | _TOKEN | _TLS)),
+    "opcua": SinkKind({"opc.tcp": 4840}, frozenset(_SENDS | _LOGIN | {"certificate_file", "key_file"})),
 }
 
 
@@ -70,8 +71,8 @@ class PublishSection(ConfigurationSection):
     url
         Address of the receiver: http:// or https:// (webhook, influxdb), smtp:// or smtps:// (email), mqtt:// or
         mqtts:// with the first levels of the topics as its path (mqtt) or group and node (sparkplug), udp://, tcp://
-        or tls:// (syslog). Address on which livebode listens: http://127.0.0.1:9464 (prometheus). Without user and
-        password.
+        or tls:// (syslog). Address on which livebode listens: http://127.0.0.1:9464 (prometheus),
+        opc.tcp://127.0.0.1:4840 (opcua). Without user and password.
     url_env
         Environment variable with the address, where it is a secret itself (webhook).
     url_file
@@ -98,11 +99,11 @@ class PublishSection(ConfigurationSection):
     recipients
         Addresses of the recipients (email).
     username
-        User name at the server (email, mqtt, sparkplug).
+        User name at the server (email, mqtt, sparkplug, opcua).
     password_env
-        Environment variable with the password (email, mqtt, sparkplug).
+        Environment variable with the password (email, mqtt, sparkplug, opcua).
     password_file
-        File with the password, relative to this file (email, mqtt, sparkplug).
+        File with the password, relative to this file (email, mqtt, sparkplug, opcua).
     token_env
         Environment variable with the token for the Authorization header (webhook, influxdb).
     token_file
@@ -115,7 +116,8 @@ class PublishSection(ConfigurationSection):
         Certificate of the authority that signed the receiver's certificate, relative to this file. Default: the
         authorities of the system.
     certificate_file
-        Certificate of livebode, relative to this file (webhook, mqtt, sparkplug, influxdb; prometheus: of its server).
+        Certificate of livebode, relative to this file (webhook, mqtt, sparkplug, influxdb; prometheus, opcua: of its
+        server).
     key_file
         Private key of livebode, relative to this file.
     discovery

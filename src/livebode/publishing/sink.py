@@ -17,6 +17,7 @@ MODULES = {
     "sparkplug": "sparkplug",
     "syslog": "syslog",
     "influxdb": "influxdb",
+    "opcua": "opcua",
 }
 """The module of each kind; it ends with SINK, and imports its library when the sink is created."""
 
