@@ -12,7 +12,7 @@ LATER_PYTHON ?= $(or $(lastword $(sort $(wildcard $(HOME)/.pyenv/versions/3.1[2-
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest publishing peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -192,12 +192,15 @@ fleet-scale: $(BUILT) ## costs of an axis of a fleet on this computer, and what 
 attacks: $(BUILT)  ## attack the dashboard, 45 s for each kind, and print what the owner and the record notice
 	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/dashboard/test_attacks_fault.py
 
+publishing: $(BUILT) ## latency of live axes while receivers of [[publish]] answer, are down, slow, or refuse; nothing is lost (2 min)
+	$(BIN)/python -m bench.publishing
+
 screenshots: $(BUILT)  ## pictures of dashboard and report in every state (light, phone, alarm, lost server …) in build/screenshots (5 min)
 	$(BIN)/python -m examples.screenshots
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends chromium clang fonts-wqy-microhei gcc-aarch64-linux-gnu gcc-arm-none-eabi libc6-dev-arm64-cross mosquitto nats-server openssh-server openssl nginx-light poppler-utils qemu-system-arm qemu-user systemd
+	apt-get install -y -qq --no-install-recommends chromium clang fonts-wqy-microhei gcc-aarch64-linux-gnu gcc-arm-none-eabi libc6-dev-arm64-cross mosquitto nats-server openssh-server openssl nginx-light poppler-utils prometheus prometheus-alertmanager qemu-system-arm qemu-user systemd
 
 catalogues: $(BUILT)  ## after a change of a sentence of report or dashboard: update the catalogues, list what lacks a translation
 	$(BIN)/python -m tools.catalogues

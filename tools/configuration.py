@@ -54,6 +54,7 @@ MORE = {
     "fit": "See [fits](../explanation/fits.md).",
     "monitoring": "See [monitoring](../how-to/monitoring.md).",
     "serve": "See [the dashboard](../how-to/dashboard.md).",
+    "[publish]": "[Connections](../how-to/connect/index.md) has a page for each kind.",
     "belt": "See [the simulated axis](axis.md).",
     "measured": "A limit on a quantity whose extremes are not known is rejected.",
     "cluster": "See [archives](../how-to/archive.md).",
@@ -92,7 +93,7 @@ def _tables(file: Schema, name: str, table: Schema, needed: Schema) -> Iterator[
         if key == "loop" and file["title"] != "axis.toml":
             yield f"### [loop] of a measured axis\n\n{LOOP}"
         elif "$ref" in value.get("items", {}):
-            yield from _tables(file, f"[{name}.{key}]", _resolved(file, value["items"]), {})
+            yield from _tables(file, f"[{name}.{key}]" if name else f"[{key}]", _resolved(file, value["items"]), {})
         elif "properties" in value:
             yield from _tables(file, f"{name}.{key}" if name else key, value, needed.get("properties", {}).get(key, {}))
 

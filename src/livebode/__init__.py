@@ -41,7 +41,7 @@ Names by subject:
 - Simulation: BeltAxis, SimulatedAxis, Strokes
 - Examples: example_axis, example_responses, example_run
 - Errors: LivebodeError (a ValueError) and its kinds ArchiveError, BaselineError, ConfigError, DesignError, ExtraError,
-  FitError, FleetError, GridError, LocationError, OutputError, RecordError, RecordingError, ServerError,
+  FitError, FleetError, GridError, LocationError, OutputError, PublishError, RecordError, RecordingError, ServerError,
   SignalError, SimulationError, SourceError, StateError, UsageError
 
 Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the true value with probability
@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         OutputError,
         Parameters,
         PositionPD,
+        PublishError,
         RecordError,
         RecordingError,
         Response,
@@ -141,6 +142,7 @@ _HOME = {
         "RecordingError",
         "RecordError",
         "OutputError",
+        "PublishError",
         "LivebodeError",
         "LocationError",
         "FitError",
@@ -202,6 +204,7 @@ __all__ = [
     "Parameters",
     "PhysicalModel",
     "PositionPD",
+    "PublishError",
     "Rational",
     "RecordError",
     "RecordingError",

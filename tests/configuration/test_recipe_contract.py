@@ -24,7 +24,7 @@ NEEDED: dict[str, Any] = {
     "loop.position": {"gain": 1.0, "rate_hz": 4000},
     "loop.position_pd": {"position_gain": 1.0, "velocity_gain": 1.0, "rate_hz": 4000},
 }
-APART = {"serve", "record", "report", "machine"}
+APART = {"serve", "record", "report", "machine", "publish"}
 READING = {"time", "clock", "from", "to", "skip_periods", "rate_hz", "kinds"}
 FILES = {("monitoring", "baseline"), ("source", "dbc")}
 WHOLE = """

@@ -13,9 +13,9 @@ from livebode.core import Event, LivebodeError
 from livebode.dashboard.alarm import CHATTER_S, CHATTER_TIMES, AlarmShelf
 from livebode.dashboard.alarm_actions import acknowledgement, shelving, unshelving
 from livebode.dashboard.alarm_history import ROWS_MAX
-from livebode.dashboard.alarm_kinds import ALARMS, RETURNS, SOURCE
 from livebode.dashboard.alarm_requests import NAME_MAX, TEXT_MAX, alarm_request
 from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id
+from livebode.monitoring.alarm_kinds import ALARMS, RETURNS, SOURCE
 from livebode.records.segments.json_lines import from_line, to_line
 from livebode.runtime.readiness import ENDED, SUPPRESSED
 

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from livebode.core import ServerError
 from livebode.dashboard.alarm import AlarmStatus
-from livebode.dashboard.alarm_kinds import ALARMS
 from livebode.dashboard.alarm_requests import AlarmRequest
 from livebode.dashboard.fleet_alarms import CONDITIONS, FleetAct, FleetAlarms
 from livebode.dashboard.fleet_board import LOOKS, LOST_S, FleetBoard
@@ -26,6 +25,7 @@ from livebode.fleet.status_message import (
     encode_names,
     encode_status,
 )
+from livebode.monitoring.alarm_kinds import ALARMS
 from tests.support.fleet_pages import expected_looks
 
 NOW = 1_800_000_000.0

@@ -116,8 +116,8 @@ def test_no_secret_of_a_configuration_is_in_the_bundle(tmp_path: Path, source: s
 )
 def test_a_secret_of_the_configuration_is_removed_from_every_text(tmp_path: Path, word: str, key: str) -> None:
     secrets = Secrets(tmp_path)
-    section = "source" if key.startswith("password") else "serve"
-    secrets.configuration({section: {key: word}})
+    section = {"password": "source", "url": "publish", "secret": "publish"}.get(key.partition("_")[0], "serve")
+    secrets.configuration({section: [{key: word}] if section == "publish" else {key: word}})
     if word in REMOVED or (tmp_path / word).is_file():
         return
     assert word not in secrets.text(f"a message with {word} in it").replace(REMOVED, "")

@@ -9,7 +9,6 @@ from functools import cache
 
 import pytest
 
-from livebode.dashboard.alarm_kinds import ALARMS, RETURNS
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.fitting.extended import WORDS as EFFECTS
 from livebode.fitting.extended import Extended
@@ -19,6 +18,7 @@ from livebode.language import available
 from livebode.language.recorded import NAMES, SENTENCES
 from livebode.margins.margins import NAMES as MARGINS
 from livebode.margins.margins import WORDS as MARGIN_WORDS
+from livebode.monitoring.alarm_kinds import ALARMS, RETURNS
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import WHAT
 from tools.catalogues import FOLDER, PACKAGE, STATIC, catalogues, extracted, json_text, po_text, translated, updated

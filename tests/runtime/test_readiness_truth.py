@@ -19,7 +19,7 @@ from livebode.analysis.averaged import mean_of
 from livebode.configuration import Axis
 from livebode.configuration.ready import ReadyCondition
 from livebode.core import Block, Channel, ConfigError, Event, Lines, SpectraLayout
-from livebode.dashboard.alarm_kinds import ALARMS
+from livebode.monitoring.alarm_kinds import ALARMS
 from livebode.preparation.spectra_plan import check_spectra
 from livebode.records import RunRecord
 from livebode.reporting.report_data import read

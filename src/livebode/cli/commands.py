@@ -36,6 +36,7 @@ SUMMARIES: Mapping[str, str] = {
     "recording.",
     "archive": "Track every recording of an archive on all cores or a cluster, and keep the results in one lake.",
     "fleet": "Track the axes of a fleet from a log on several workers: every result once, also when a worker dies.",
+    "publish": "List the receivers of events and results in a configuration; --test sends a message to each.",
     "doctor": "Check this computer, a configuration and whether its machine can be reached.",
     "schema": "Print the JSON Schema of axis.toml, experiment.toml or archive.toml: an editor uses it to complete "
     "and check the keys.",

@@ -16,6 +16,7 @@ from livebode.cli.band import parsed_band
 from livebode.cli.notices import NoticePrinter
 from livebode.cli.picture_support import tell_how_to_draw
 from livebode.cli.pictures import drawing, load_beside, show, tracked_amount
+from livebode.cli.publishing import published, publishing_to
 from livebode.cli.remote import recorded_at
 from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
@@ -30,6 +31,7 @@ from livebode.sources.formats import read_head
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from livebode.publishing.publisher import Publisher
     from livebode.runtime import OutputOnlyOutcome
 
 T = TypeVar("T")
@@ -78,12 +80,17 @@ def run_targets(
             _run_output_only(alone, directory, force, as_json, serve, send)
             return
         with served(serve, _serving(axes), port, names, stays=not live) as subscribers_of:
-            if alone is not None and not live:
-                outcome = _run(alone, directory, force, as_json, subscribers_of(target.stem))
-                send()
-                _show(outcome, as_json)
-            else:
-                _run_axes(axes, directory, force, as_json, file, lambda name: subscribers_of(name or target.stem), send)
+            publishing = published(axes, directory, target.stem, edited=live and file is not None)
+            with publishing as publisher:
+                if alone is not None and not live:
+                    outcome = _run(alone, directory, force, as_json, subscribers_of(target.stem), publisher)
+                    send()
+                    _show(outcome, as_json)
+                else:
+                    _run_axes(
+                        axes, directory, force, as_json, file,
+                        lambda name: subscribers_of(name or target.stem), send, publisher,
+                    )  # fmt: skip
 
 
 def _file(target: Location, over: Mapping[str, Mapping[str, Any]]) -> ConfigurationFile | None:
@@ -164,12 +171,21 @@ def _axis(recordings: list[Location], specified: dict[str, dict[str, Any]]) -> A
     return Axis.of(specified | {"source": specified.get("source", {}) | {"log": log}}, "the options")
 
 
-def _run(axis: Axis, directory: Path, force: bool, quiet: bool, subscribers: tuple[Subscriber, ...]) -> Outcome:
+def _run(
+    axis: Axis,
+    directory: Path,
+    force: bool,
+    quiet: bool,
+    subscribers: tuple[Subscriber, ...],
+    publisher: Publisher | None,
+) -> Outcome:
     """Track one recording."""
-    return _with_progress(
-        lambda own: run(axis, Destination(directory, _drawing(axis), force, (*subscribers, *own), prepare=load_beside)),
-        quiet,
-    )
+
+    def job(own: tuple[Subscriber, ...]) -> Outcome:
+        to = Destination(directory, _drawing(axis), force, (*subscribers, *own), prepare=load_beside)
+        return run(axis, publishing_to(to, publisher, ""))
+
+    return _with_progress(job, quiet)
 
 
 def _run_output_only(
@@ -233,6 +249,7 @@ def _run_axes(
     file: ConfigurationFile | None,
     subscribers_of: SubscribersOf,
     send: Callable[[], None],
+    publisher: Publisher | None,
 ) -> None:
     """Track live sources or several axes until all have ended."""
     from livebode.cli.axes_terminal import AxesTerminal, plain
@@ -240,11 +257,12 @@ def _run_axes(
 
     def to(name: str, axis: Axis) -> Destination:
         subscribers = (*subscribers_of(name), shown.subscriber(name))
-        return Destination(directory / name, _drawing(axis), force, subscribers)
+        return publishing_to(Destination(directory / name, _drawing(axis), force, subscribers), publisher, name)
 
     gc.freeze()  # what is loaded remains: a search through it would stop all axes for tens of milliseconds
     shown = AxesTerminal(quiet=as_json)
-    session = Session(axes, to, report=shown.print_event, leave=shown.leave, file=file)
+    prepare = {} if publisher is None else {"prepare": publisher.prepare}
+    session = Session(axes, to, report=shown.print_event, leave=shown.leave, file=file, **prepare)
     shown.run(session)
     send()
     if session.ended_by and all(thread.ended_early for thread in session.all):

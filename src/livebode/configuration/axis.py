@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.lines_section import LinesSection
@@ -15,6 +15,7 @@ from livebode.configuration.monitoring_section import MonitoringSection
 from livebode.configuration.motion_section import MotionSection
 from livebode.configuration.output_only import check_output_only
 from livebode.configuration.output_only_section import OutputOnlySection
+from livebode.configuration.publish_section import PublishSection, check_publish
 from livebode.configuration.ready import ReadyCondition, ready_condition
 from livebode.configuration.record_section import RecordSection
 from livebode.configuration.report_section import ReportSection, report_error
@@ -27,9 +28,13 @@ from livebode.core import ConfigError, nearest_name
 from livebode.sources.live import SourceSettings, checked_address
 from livebode.sources.live.settings import check_keys
 
+NOT_RECORDED = {"serve", "publish"}
+"""Sections that are about this computer and its network, and change no result: run.json has none of them."""
+SINKS_MAX = 32
 MAY_BE_SECRET = {
     *("url", "username", "password_env", "password_file"),
     *("token_env", "token_file", "viewer_token_env", "viewer_token_file"),
+    *("url_env", "url_file", "secret_env", "secret_file"),
 }
 
 
@@ -64,6 +69,8 @@ class Axis(ConfigurationSection):
         The first page of the report, and the limits that the machine must meet.
     machine
         Which machine it is.
+    publish
+        Receivers of events and results.
     """
 
     source: SourceSettings
@@ -79,6 +86,7 @@ class Axis(ConfigurationSection):
     serve: ServeSection = ServeSection()
     report: ReportSection | None = None
     machine: MachineSection | None = None
+    publish: Annotated[list[PublishSection], Field(max_length=SINKS_MAX)] = []
 
     @classmethod
     def read(cls, path: Path) -> Axis:
@@ -121,6 +129,10 @@ class Axis(ConfigurationSection):
             check_keys(axis.source, "replay")
         if axis.output_only is not None:
             check_output_only(axis, origin)
+        try:
+            check_publish(axis.publish)
+        except ConfigError as error:
+            raise error.at(origin) from None
         return axis
 
     @property
@@ -132,6 +144,8 @@ class Axis(ConfigurationSection):
     def beside(self, folder: Path) -> Axis:
         """The same with relative paths from `folder`."""
         axis = self.model_copy(update={"source": self.source.beside(folder), "serve": self.serve.beside(folder)})
+        if self.publish:
+            axis = axis.model_copy(update={"publish": [section.beside(folder) for section in self.publish]})
         if self.report is not None:
             axis = axis.model_copy(update={"report": self.report.beside(folder)})
         baseline = axis.monitoring.baseline
@@ -198,7 +212,7 @@ def _first_of(error: ValidationError) -> ConfigError:
 def nearest(loc: tuple[int | str, ...]) -> str:
     """Suggestion for an unknown key at this place of an axis."""
     section: Any = Axis
-    for part in loc[:-1]:
+    for part in (part for part in loc[:-1] if isinstance(part, str)):
         annotation = section.model_fields[part].annotation
         section = next(
             c

@@ -9,17 +9,17 @@ from livebode.configuration.axis import Axis
 from livebode.records.content import content_sha256
 
 _READING = {"time", "clock", "from_", "to", "skip_periods", "dbc", "rate_hz", "kinds"}
-_APART = {"source", "serve", "record", "report", "machine"}
+_APART = {"source", "serve", "record", "report", "machine", "publish"}
 _DIGITS = 16
 
 
 def recipe_id(axis: Axis) -> str:
     """The name of a recipe: the same recording gives the same results with each configuration of this name.
 
-    16 hexadecimal digits of the SHA-256 of the configuration in JSON. Source, machine, [record], [report] and [serve]
-    do not count, except how a recording is read (its time column, part, rate, kinds and DBC file). A baseline and a
-    DBC file count by their content. A default counts as omitted, so that a new setting of a later version changes no
-    name.
+    16 hexadecimal digits of the SHA-256 of the configuration in JSON. Source, machine, [record], [report], [serve] and
+    [[publish]] do not count, except how a recording is read (its time column, part, rate, kinds and DBC file). A
+    baseline and a DBC file count by their content. A default counts as omitted, so that a new setting of a later
+    version changes no name.
 
     Raises
     ------

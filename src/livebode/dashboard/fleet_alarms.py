@@ -10,9 +10,9 @@ from typing import Any, get_args
 import numpy as np
 
 from livebode.dashboard.alarm import AlarmShelf, AlarmState
-from livebode.dashboard.alarm_kinds import ALARMS
 from livebode.dashboard.alarm_requests import MINUTES_MAX, NAME_MAX, TEXT_MAX, Act
 from livebode.fleet.status_message import ACTIVE, NOT_READY
+from livebode.monitoring.alarm_kinds import ALARMS
 
 CONDITIONS: tuple[AlarmState, ...] = (
     "normal", "unacknowledged", "returned", "acknowledged", "suppressed", "shelved",

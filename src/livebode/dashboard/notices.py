@@ -12,7 +12,7 @@ from typing import Any
 from livebode.core import Event
 from livebode.dashboard.alarm import OPEN, AlarmShelf, AlarmState, AlarmStatus, number_in, text_in
 from livebode.dashboard.alarm_history import AlarmHistory, What
-from livebode.dashboard.alarm_kinds import ALARMS, FAR, PRIORITIES, RETURNS, SOURCE, cause_of
+from livebode.monitoring.alarm_kinds import ALARMS, FAR, PRIORITIES, RETURNS, SOURCE, cause_of
 from livebode.records.grouped_events import each_event, event_counts, group_of
 from livebode.runtime.readiness import ENDED, SUPPRESSED
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from livebode.core.clock import RunClock
 from livebode.dashboard.alarm import OPEN
-from livebode.dashboard.alarm_kinds import PRIORITIES, SOURCE
 from livebode.dashboard.message_times import times_in
+from livebode.monitoring.alarm_kinds import PRIORITIES, SOURCE
 
 if TYPE_CHECKING:
     from livebode.dashboard.alarm import AlarmState, AlarmStatus

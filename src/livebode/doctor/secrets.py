@@ -73,6 +73,8 @@ class Secrets:
         return text
 
     def _section(self, table: Any, model: type[BaseModel]) -> Any:
+        if isinstance(table, list):
+            return [self._section(one, model) for one in table]
         if not isinstance(table, Mapping):
             return self._removed(table)
         return self._fields(table, model)

@@ -50,6 +50,8 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> ChangeRequest 
     if old == new:
         return None
     sections = tuple(name for name in type(new).model_fields if getattr(old, name) != getattr(new, name))
+    if sections == ("publish",):
+        return ChangeRequest(sections)
     if source is None and old.source.live:
         raise ConfigError(
             "change-too-early",
@@ -79,6 +81,6 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> ChangeRequest 
             keys=["serve"],
         )
     record, before = new.record or RecordSection(), old.record or RecordSection()
-    if sections == ("record",) and record.samples == before.samples:
+    if set(sections) <= {"record", "publish"} and record.samples == before.samples:
         return ChangeRequest(sections, record=record)
     return ChangeRequest(sections, pipeline=Pipeline.live(new, source))

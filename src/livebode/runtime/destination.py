@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from livebode.core import Model, Responses
 from livebode.runtime.documents import Subscriber
@@ -37,6 +38,8 @@ class Destination:
         Record of a recording's run in place of a run directory. `draw` and `force` then have no effect.
     prepare
         Called once when a recording has been opened: loads, beside the run, what `draw` needs.
+    findings
+        Called at the end of the run: entries of run.json about its subscribers.
     """
 
     directory: Path
@@ -45,3 +48,4 @@ class Destination:
     subscribers: tuple[Subscriber, ...] = ()
     record: Recorder | None = None
     prepare: Callable[[], None] = nothing
+    findings: Callable[[], Mapping[str, Any]] = dict

@@ -33,6 +33,7 @@ CAUSES = {
         "fit": ("fit-failed", "fit-resumed"),
         "backlog": ("backlog", "backlog-cleared"),
         "thinned": ("thinned",),
+        "publishing": ("sink-down", "sink-up", "sink-full", "sink-refused"),
         "readiness": ("suppressed", "suppression-ended"),
     }.items()
     for kind in kinds

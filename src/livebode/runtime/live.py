@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from livebode.configuration.axis import Axis
+from livebode.configuration.axis import NOT_RECORDED, Axis
 from livebode.configuration.record_section import RecordSection
 from livebode.core import ConfigError, Event, LivebodeError
 from livebode.core.clock import moments_by
@@ -120,7 +120,7 @@ class _Succession:
         assert axis is not None
         about = {
             # Most keys of a source apply to other kinds of source.
-            "configuration": axis.model_dump(mode="json", exclude={"serve", "source"}, by_alias=True)
+            "configuration": axis.model_dump(mode="json", exclude=NOT_RECORDED | {"source"}, by_alias=True)
             | {"source": axis.source.model_dump(mode="json", exclude_defaults=True, by_alias=True)},
             **provenance(axis),
             "found": {"format": self._source.format, "rate_from": "the sender", "clock": "relative"},

@@ -10,7 +10,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from livebode.configuration.axis import Axis
+from livebode.configuration.axis import NOT_RECORDED, Axis
 from livebode.configuration.recording import open_recording
 from livebode.core import Event, Parameters, SignalError
 from livebode.core.clock import RunClock, moments_by
@@ -135,7 +135,7 @@ class _OutputOnlyRun:
         run_s, recorded_s = time.perf_counter() - started, self._tracker.counts["samples"] / settings.rate_hz
         return {
             "output_only": True,
-            "configuration": self._axis.model_dump(mode="json", exclude={"serve"}, by_alias=True),
+            "configuration": self._axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True),
             "found": found,
             **self._provenance,
             "recorded": recorded([RecordedSpan(log.path, log.clock_kind, self._from_s, self._at[1])]),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from livebode.configuration.axis import Axis
+from livebode.configuration.axis import NOT_RECORDED, Axis
 from livebode.configuration.recording import open_even_or_uneven
 from livebode.core import Event
 from livebode.core.clock import RunClock, moments_by
@@ -43,7 +43,7 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     to.prepare()
     of = examined(axis, log, pipeline.follower)
     settings = pipeline.follower.settings
-    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": of.found}
+    about = {"configuration": axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": of.found}
     about |= provenance(axis)
     if settings.quantity == "plant" and settings.periodic and not settings.average:
         pipeline = replace(pipeline, drift=DriftTest(settings.lines))

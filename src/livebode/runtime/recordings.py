@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from livebode.configuration.axis import Axis
+from livebode.configuration.axis import NOT_RECORDED, Axis
 from livebode.configuration.recording import open_recording
 from livebode.core import Block, Channel, Event, RecordingError
 from livebode.core.clock import RunClock, moments_by
@@ -90,7 +90,7 @@ def run_recordings(axis: Axis, to: Destination, control: RunControl) -> Outcome:
         "realisations": differ,
     }
     found.pop("part", None)
-    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": found}
+    about = {"configuration": axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": found}
     about |= provenance(axis, [part.sha256 for part in parts])
     date = recorded([_span(part) for part in parts])
     noticed = [_named(event, part) for part in parts for event in part.of.noticed]

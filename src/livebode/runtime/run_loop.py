@@ -404,6 +404,7 @@ class RunLoop:
             self._stream.publish_all(between_events(self._done["between"], *self.position))
         self._stream.finish_groups()
         self._done |= self._found_on_the_way
+        self._done |= self.to.findings()
         if self._live:
             self._done["recorded"] = self._date(self.position[1])
         elif self._recorded is not None:

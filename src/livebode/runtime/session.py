@@ -17,7 +17,7 @@ from livebode.core.ending import ENDING, Handler, handled
 from livebode.runtime.allocation import FreeMemory, share_between_threads
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
-from livebode.runtime.destination import Destination
+from livebode.runtime.destination import Destination, nothing
 from livebode.runtime.service_manager import ServiceManager
 from livebode.runtime.status import Status
 
@@ -25,6 +25,11 @@ TICK_S = 0.1
 LOOK_S = 1.0
 """Interval of checks of the file."""
 _logger = logging.getLogger(__name__)
+
+
+def nothing_to_apply(_: Axes) -> Callable[[], None]:
+    """Nothing belongs to the whole session."""
+    return nothing
 
 
 class Session:
@@ -46,6 +51,8 @@ class Session:
         File of `axes`, if they may change.
     leave
         Called at the second signal with its number and a message for each unfinished run; it does not return.
+    prepare
+        Called with the axes of an edited file: checks what belongs to the whole session, and returns what applies it.
     """
 
     def __init__(
@@ -56,7 +63,9 @@ class Session:
         report: Callable[[str, Event], None],
         leave: Callable[[int, Mapping[str, Event]], None],
         file: ConfigurationFile | None = None,
+        prepare: Callable[[Axes], Callable[[], None]] = nothing_to_apply,
     ) -> None:
+        self._prepare = prepare
         self._to, self._report_event, self._leave, self._file = to, report, leave, file
         self.threads: dict[str, AxisThread] = {}
         """The axes of the present configuration, by name."""
@@ -130,6 +139,7 @@ class Session:
                 return
             self._postponed = ""
             changes = self._checked(axes)
+            applied = self._prepare(axes)
         except (LivebodeError, MemoryError) as error:
             why = str(error) or "there is not enough memory for it"
             self._report_to_axes(
@@ -140,6 +150,7 @@ class Session:
             if asked:
                 self._report_to_axes("configuration-applied", "the configuration is the same", record=False)
             return
+        applied()
         self._apply(axes, changes)
 
     def _finishing(self, axes: Axes) -> str:

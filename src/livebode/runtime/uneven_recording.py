@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from livebode.configuration.axis import Axis
+from livebode.configuration.axis import NOT_RECORDED, Axis
 from livebode.core import Event
 from livebode.core.clock import RunClock, moments_by
 from livebode.estimation.uneven_tracker import UnevenTracker
@@ -45,7 +45,7 @@ def run_uneven(axis: Axis, log: UnevenLog, to: Destination, control: RunControl,
     found |= {"left_out_samples": source.first - part.first, "clocks": clock_facts(part, signals)}
     if part.is_part:
         found["part"] = {"first": part.first, "stop": part.stop}
-    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}, by_alias=True), "found": found}
+    about = {"configuration": axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": found}
     about |= provenance(axis)
     dates = [part.origin_s + sample / part.rate_hz for sample in (part.first, part.stop)]
     date = recorded([RecordedSpan(part.path, part.clock_kind, *dates)])

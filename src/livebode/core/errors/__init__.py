@@ -15,6 +15,7 @@ from livebode.core.errors.fleet import FleetError
 from livebode.core.errors.grid import GridError
 from livebode.core.errors.location import LocationError
 from livebode.core.errors.output import OutputError
+from livebode.core.errors.publish import PublishError
 from livebode.core.errors.record import RecordError
 from livebode.core.errors.recording import RecordingError
 from livebode.core.errors.server import ServerError
@@ -37,6 +38,7 @@ __all__ = [
     "LivebodeError",
     "LocationError",
     "OutputError",
+    "PublishError",
     "RecordError",
     "RecordingError",
     "ServerError",

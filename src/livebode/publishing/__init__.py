@@ -1,0 +1,1 @@
+"""Events and results of runs, sent to other systems: the [[publish]] sections of a configuration."""
