@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import threading
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 
 from livebode.core import Event
 from livebode.publishing import outbox
+from tests.support.forked import server
 from tests.support.receivers import HttpReceiver, PublishedAxis, free_port, until, webhook
 
 
@@ -40,6 +43,27 @@ def test_events_of_an_ended_process_are_sent_by_the_next_one(tmp_path: Path) -> 
     with HttpReceiver(port) as receiver, PublishedAxis(tmp_path, webhook(port)):
         until(lambda: len(receiver.posted) == 2, "the events of before")
     assert [content["sample"] for content in receiver.contents] == [7, 8]
+
+
+def killed_with_events(folder: Path, port: int) -> None:
+    """A process that ends by SIGKILL as soon as its events are on disk."""
+    axis = PublishedAxis(folder, webhook(port))
+    for number in range(3):
+        axis.change(2.0, number)
+    until(lambda: axis.counts("hook")["events_waiting"] == 3, "the events on disk")
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_events_of_a_killed_process_are_sent_by_the_next_one(tmp_path: Path) -> None:
+    port = free_port()
+    process = server().Process(target=killed_with_events, args=(tmp_path, port))
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+    with HttpReceiver(port) as receiver, PublishedAxis(tmp_path, webhook(port)) as axis:
+        until(lambda: len(receiver.posted) == 3, "the events of before")
+        until(lambda: axis.counts("hook")["events_delivered"] == 3, "the confirmation")
+    assert [content["sample"] for content in receiver.contents] == [0, 1, 2]
 
 
 def test_a_receiver_that_does_not_answer_holds_up_neither_the_axis_nor_other_receivers(tmp_path: Path) -> None:
