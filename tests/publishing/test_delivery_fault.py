@@ -73,7 +73,6 @@ def test_a_receiver_that_does_not_answer_holds_up_neither_the_axis_nor_other_rec
             for number in range(200):
                 axis.change(2.0, number)
             until(lambda: len(quick.posted) == 200, "the events at the quick one")
-            assert slow.requests <= 2
             assert not slow.posted
             until(lambda: axis.reported("sink-down"), "the report")
             slow.answers.set()
