@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +75,6 @@ def test_an_edit_adds_and_removes_a_receiver_in_place_and_a_wrong_one_is_refused
             until(lambda: any(one["type"] == "values" for one in receiver.contents), "results")
             running.edit(text)
             until(lambda: len(running_events(running)) == 2, "the second change")
-            until(lambda: receiver.requests == receiver.requests, "nothing")
             code, _, err = running.end()
         assert code == 0, err
         assert not (running.out / "x-2").exists()  # the same run, without another directory
@@ -97,4 +95,4 @@ def test_a_receiver_that_is_down_is_in_the_record_of_a_live_run(tmp_path: Path) 
     assert code == 0, err
     assert event.details["sink"] == "webhook 127.0.0.1"
     assert "webhook 127.0.0.1 does not take messages: no connection: Connection refused" in err
-    assert json.dumps(summary_of(running.out / "x")["published"])
+    assert summary_of(running.out / "x")["published"]["webhook 127.0.0.1"]["rounds"] == 0

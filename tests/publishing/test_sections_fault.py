@@ -7,19 +7,14 @@ from typing import Any
 
 import pytest
 
-from livebode.configuration import Axis
 from livebode.core import ConfigError
 from livebode.publishing.publisher import sections_of
 from livebode.publishing.sink import open_sink
 from tests.support.command import livebode
 from tests.support.errors import refused
-from tests.support.receivers import MEASURED, HttpReceiver
+from tests.support.receivers import HttpReceiver, configured
 
 SECRET = "s3cret-of-the-plant"
-
-
-def axis(*sections: dict[str, Any]) -> Axis:
-    return Axis.of(MEASURED | {"publish": list(sections)}, "axis.toml")
 
 
 HOOK = {"kind": "webhook", "url": "https://hooks.example.com/a/b"}
@@ -48,7 +43,7 @@ HOOK = {"kind": "webhook", "url": "https://hooks.example.com/a/b"}
 )
 def test_a_section_that_cannot_be_used_is_refused(section: dict[str, Any], code: str, words: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        axis(section)
+        configured(section)
     assert caught.value.code == f"config.{code}"
     assert words in str(caught.value)
     assert SECRET not in f"{caught.value} {caught.value.facts}"
@@ -56,18 +51,18 @@ def test_a_section_that_cannot_be_used_is_refused(section: dict[str, Any], code:
 
 def test_two_receivers_have_two_names() -> None:
     with refused(ConfigError, "key-conflict", value="webhook hooks.example.com"):
-        axis(HOOK, HOOK | {"events": ["all"]})
-    assert axis(HOOK, HOOK | {"name": "second"}).publish[1].label == "second"
+        configured(HOOK, HOOK | {"events": ["all"]})
+    assert configured(HOOK, HOOK | {"name": "second"}).publish[1].label == "second"
     with refused(ConfigError, "key-conflict"):
-        sections_of({"a": axis(HOOK), "b": axis(HOOK | {"events": ["high"]})})
-    assert len(sections_of({"a": axis(HOOK), "b": axis(HOOK)})) == 1  # one receiver serves both
+        sections_of({"a": configured(HOOK), "b": configured(HOOK | {"events": ["high"]})})
+    assert len(sections_of({"a": configured(HOOK), "b": configured(HOOK)})) == 1  # one receiver serves both
 
 
 def test_secrets_come_from_a_file_or_the_environment_and_their_absence_names_the_key_only(tmp_path: Path) -> None:
-    (section,) = axis(HOOK | {"token_env": SECRET}).publish
+    (section,) = configured(HOOK | {"token_env": SECRET}).publish
     with refused(ConfigError, "secret-missing", key="publish.token_env"):
         open_sink(section)
-    (section,) = axis(HOOK | {"secret_file": "absent"}).beside(tmp_path).publish
+    (section,) = configured(HOOK | {"secret_file": "absent"}).beside(tmp_path).publish
     with refused(ConfigError, "file-unreadable", key="publish.secret_file"):
         open_sink(section)
 

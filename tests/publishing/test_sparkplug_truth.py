@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from livebode.core import ConfigError
 from livebode.publishing.sink import open_sink
 from livebode.publishing.sparkplug_payload import BOOLEAN, DOUBLE, STRING, UINT64, Metric, payload
-from tests.publishing.test_sections_fault import axis as configured
 from tests.support.errors import refused
 from tests.support.peers.broker import Mosquitto, publisher, stop
-from tests.support.receivers import PublishedAxis, until
+from tests.support.receivers import PublishedAxis, configured, until
 
 UINT, ULONG, REAL, TRUTH, TEXT, PART = 13, 4, 1, 8, 9, 11  # types of a field in descriptor.proto
 MESSAGES = {

@@ -22,6 +22,11 @@ MEASURED = {"source": {"log": "log.parquet"}, "signals": {"output": "y"}}
 BEGUN_UNIX_S = 1.8e9
 
 
+def configured(*sections: Mapping[str, Any], **axis: Any) -> Axis:
+    """The smallest axis with these sections."""
+    return Axis.of(MEASURED | axis | {"publish": [dict(one) for one in sections]}, "axis.toml")
+
+
 class HttpReceiver:
     """A server of HTTP whose answer a test chooses; it has what was posted to it.
 
@@ -96,7 +101,7 @@ class PublishedAxis:
         self.outbox, self.said = folder / "run.outbox.sqlite", []
         self.control = RunControl()
         self.name = name
-        self.axes = {name: Axis.of(MEASURED | axis | {"publish": [dict(one) for one in sections]}, "test")}
+        self.axes = {name: configured(*sections, **axis)}
         self.publisher = Publisher(self.axes, self.outbox, self.said.append, alone=name)
         self.feed: AxisFeed = self.publisher.subscriber(name)
         self.feed(RunStarted(folder / "run", {}, self.control, None))  # type: ignore[arg-type]

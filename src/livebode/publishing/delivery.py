@@ -1,4 +1,4 @@
-"""Delivery: a thread that sends events and results to one receiver, and repeats what it did not take."""
+"""DeliveryThread: a thread that sends events and results to one receiver, and repeats what it did not take."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from livebode.core import LivebodeError, PublishError
 from livebode.publishing.feed import AxisFeed
 from livebode.publishing.messages import AxisValues, EventMessage
 from livebode.publishing.outbox import Outbox
-from livebode.publishing.sink import Sink
+from livebode.publishing.sink import SinkConnection
 from livebode.sources.live.pauses import Pauses
 
 DOWN_AFTER = 2
@@ -26,7 +26,7 @@ _logger = logging.getLogger(__name__)
 Report = Callable[[Sequence[AxisFeed], str, str, dict[str, Any]], None]
 
 
-class Delivery:
+class DeliveryThread:
     """Sends to one receiver in a thread of its own.
 
     Events are sent in their order, each until the receiver has it (`Outbox`). Results are sent at most every
@@ -45,7 +45,7 @@ class Delivery:
         Called with feeds, kind, sentence and details when the receiver is down, again up, or events were lost.
     """
 
-    def __init__(self, section: PublishSection, sink: Sink, outbox: Outbox | None, report: Report) -> None:
+    def __init__(self, section: PublishSection, sink: SinkConnection, outbox: Outbox | None, report: Report) -> None:
         self.section, self._sink, self._outbox, self._report = section, sink, outbox, report
         self.feeds: tuple[AxisFeed, ...] = ()
         """The axes whose results are sent."""

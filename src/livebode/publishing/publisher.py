@@ -10,10 +10,10 @@ from typing import Any, Self
 from livebode.configuration.axis import Axis
 from livebode.configuration.publish_section import PublishSection
 from livebode.core import ConfigError
-from livebode.publishing.delivery import Delivery
+from livebode.publishing.delivery import DeliveryThread
 from livebode.publishing.feed import AxisFeed
 from livebode.publishing.outbox import Outbox
-from livebode.publishing.sink import Sink, open_sink
+from livebode.publishing.sink import SinkConnection, open_sink
 
 CLOSE_S = 5.0
 """Longest time at the end in which events that wait are sent."""
@@ -44,7 +44,7 @@ class Publisher:
         self._path, self._say, self._alone = outbox, say, alone
         self._outbox: Outbox | None = None
         self._feeds: dict[str, AxisFeed] = {}
-        self._deliveries: dict[str, Delivery] = {}
+        self._deliveries: dict[str, DeliveryThread] = {}
         self.prepare(axes)()
 
     def __enter__(self) -> Self:
@@ -73,7 +73,7 @@ class Publisher:
         """Entry ``published`` of an axis's run.json; none without receivers."""
         feed = self._feeds[name]
         receivers = feed.receivers
-        found = {one.section.label: one.counts(feed.name) for one in receivers if isinstance(one, Delivery)}
+        found = {one.section.label: one.counts(feed.name) for one in receivers if isinstance(one, DeliveryThread)}
         return {"published": found} if found else {}
 
     def close(self, patience_s: float = CLOSE_S) -> None:
@@ -90,11 +90,13 @@ class Publisher:
         if self._outbox is not None:
             self._outbox.close()
 
-    def _apply(self, axes: Mapping[str, Axis], sections: Mapping[str, PublishSection], new: Mapping[str, Sink]) -> None:
+    def _apply(
+        self, axes: Mapping[str, Axis], sections: Mapping[str, PublishSection], new: Mapping[str, SinkConnection]
+    ) -> None:
         for label in [label for label in self._deliveries if label in new or label not in sections]:
             self._deliveries.pop(label).end(0.0)
         for label, sink in new.items():
-            self._deliveries[label] = Delivery(sections[label], sink, self._outbox, self._report)
+            self._deliveries[label] = DeliveryThread(sections[label], sink, self._outbox, self._report)
         for name, axis in axes.items():
             machine = "" if axis.machine is None else axis.machine.path
             feed = self._feeds.setdefault(name, AxisFeed(name or self._alone, machine))

@@ -1,4 +1,4 @@
-"""Sink: a receiver of events and results, as its kind implements it."""
+"""SinkConnection: a receiver of events and results, as its kind implements it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MODULES = {
 """The module of each kind; it ends with SINK, and imports its library when the sink is created."""
 
 
-class Sink(Protocol):
+class SinkConnection(Protocol):
     """A receiver; used by one thread only. Its constructor takes the section, and does not connect.
 
     The constructor raises ConfigError for what the section names and cannot be used, such as a file, and ExtraError
@@ -45,8 +45,8 @@ class Sink(Protocol):
         """Close the connection."""
 
 
-def open_sink(section: PublishSection) -> Sink:
-    """The sink of a section; see `Sink` for what it raises."""
+def open_sink(section: PublishSection) -> SinkConnection:
+    """The sink of a section; see `SinkConnection` for what it raises."""
     module = import_module(f"livebode.publishing.{MODULES[section.kind]}")
-    sink: Sink = module.SINK(section)
+    sink: SinkConnection = module.SINK(section)
     return sink
