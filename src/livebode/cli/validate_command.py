@@ -56,8 +56,8 @@ def validate_command(
     machine whose plant changes with position. The channels default to those of the run. A model whose simulation is
     not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was.
     """
-    from livebode.configuration.fit_section import FitSection
     from livebode.cli.picture_support import tell_how_to_draw
+    from livebode.configuration.fit_section import FitSection
     from livebode.configuration.recorded import recorded_configuration
     from livebode.records import RunRecord, to_json
 
