@@ -18,7 +18,7 @@ from tools.release.builds import built
 
 # Only wheels: a package that has to be compiled is not what a user gets. nkeys is one module of Python without a wheel.
 LOWEST = ("--resolution", "lowest-direct", "--only-binary", ":all:", "--no-binary", "nkeys")
-TESTS = ("pytest", "pytest-xdist", "hypothesis", "scipy-stubs")
+TESTS = ("blark", "hypothesis", "playwright", "pytest", "pytest-xdist")
 PARTS = ("core", "kernel", "estimation", "excitation", "fitting", "margins", "records", "export", "sources", "runtime")
 
 

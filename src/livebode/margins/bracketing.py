@@ -74,4 +74,5 @@ def find_minima(function: Function, low: Floats, high: Floats, width: float) -> 
     middle, quarter = (low + high) / 2, (high - low) / 4
     before, at, after = (function(x) for x in (low, middle, high))
     bend = before - 2 * at + after
-    return middle + quarter * np.divide(before - after, bend, out=np.zeros_like(bend), where=bend > 0).clip(-2, 2)
+    share = np.divide(before - after, bend, out=np.zeros_like(bend), where=bend > 0).clip(-2, 2)
+    return np.asarray(middle + quarter * share)
