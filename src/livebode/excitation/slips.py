@@ -143,7 +143,7 @@ class _Search:
 
 
 def _row_energies(blocks: Floats, minus: Floats | None = None) -> Floats:
-    """The sum of squares of each row, or of the difference of two; some rows at a time, as it needs memory of its own."""
+    """The sum of squares of each row, or of the difference of two; some rows at a time, to need little memory."""
     found = np.empty(len(blocks))
     for at in range(0, len(blocks), _TOGETHER):
         rows = slice(at, at + _TOGETHER)
