@@ -18,8 +18,8 @@ _USAGE_ERROR, _INTERRUPTED = 2, 130
 _COMPLETION = "_LIVEBODE_COMPLETE"
 """The variable with which a shell asks for completions; the command line is then empty."""
 OBJECTS_NEW = 100_000
-"""Objects of Python after which cycles without a reference are searched: what a command loads remains until its end,
-and searching it again and again, for the last time at exit, takes a twentieth of the run of a recording."""
+"""New objects of Python after which cycles without a reference are searched: what a command loads remains until its
+end, and searching it again and again, for the last time at exit, takes a twentieth of the run of a recording."""
 
 
 def main() -> None:

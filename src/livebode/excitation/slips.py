@@ -65,8 +65,7 @@ class _Search:
     def __init__(self, blocks: Floats) -> None:
         self._x, self._blocks, self._period = blocks.ravel(), blocks, blocks.shape[1]
         self._spectra = np.fft.rfft(blocks, axis=1)
-        self._energy = np.sum(blocks**2, axis=1)
-        change = np.sum(np.diff(blocks, axis=0) ** 2, axis=1)
+        self._energy, change = _row_energies(blocks), _row_energies(blocks[1:], blocks[:-1])
         self._noise = float(np.quantile(change, 0.25)) / 2  # of a period: jumps are in fewer than three of four pairs
 
     def slips(self) -> list[Slip]:
@@ -141,6 +140,16 @@ class _Search:
         old = (part - expected[(n + shift) % self._period]) ** 2
         new = (part - expected[(n + leapt) % self._period]) ** 2
         return int(first + np.argmin(np.concatenate(([0.0], np.cumsum(old - new)))))
+
+
+def _row_energies(blocks: Floats, minus: Floats | None = None) -> Floats:
+    """The sum of squares of each row, or of the difference of two; some rows at a time, to need little memory."""
+    found = np.empty(len(blocks))
+    for at in range(0, len(blocks), _TOGETHER):
+        rows = slice(at, at + _TOGETHER)
+        part = blocks[rows] if minus is None else blocks[rows] - minus[rows]
+        found[rows] = np.sum(part**2, axis=1)
+    return found
 
 
 def _folded(shift: int, period: int) -> int:

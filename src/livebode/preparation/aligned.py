@@ -12,7 +12,7 @@ from livebode.estimation import Settings
 from livebode.excitation import Slip, find_slips
 from livebode.sources import Log
 
-_PART = 1 << 20  # samples per search
+_PART = 1 << 18  # samples per search
 _OVERLAP = 8  # periods common to two parts, so that a phase slip at their border is detected
 _LISTED_MAX = 1000
 
@@ -69,15 +69,18 @@ def _whole_parts(log: Log, channel: str, size: int) -> Iterator[np.ndarray]:
         parts += [np.full(block.start - stop, np.nan), block[channel]]
         held, stop = held + block.stop - stop, block.stop
         if held >= size:
-            yield np.concatenate(parts)
-            parts, held = [], 0
+            whole = np.concatenate(parts)
+            parts, held = [], 0  # first: a part is several megabytes
+            yield whole
+            del whole
     if parts:
         yield np.concatenate(parts)
 
 
 def bridged(x: np.ndarray) -> np.ndarray:
     """The same, 0 for missing samples."""
-    return np.where(np.isfinite(x), x, 0.0)
+    known = np.isfinite(x)
+    return x if known.all() else np.where(known, x, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

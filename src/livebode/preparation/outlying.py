@@ -17,7 +17,7 @@ from livebode.preparation.transients import (
     EXAMINED_MIN,
     EXAMINED_SAMPLES_MAX,
     SHARE_MAX,
-    Periods,
+    CutPeriods,
     excited_bins,
     moves,
 )
@@ -81,7 +81,9 @@ def _outlying(signals: Mapping[str, Floats], settings: Settings, last: bool) -> 
     names = [name for role in settings.roles if (name := settings.channel(role)) and name not in settings.spikes]
     strange = np.zeros(count, dtype=np.bool_)
     reference = settings.excitation if settings.method.reference == "excitation" else None
-    periods = {name: Periods.of(signals[name], window) for name in dict.fromkeys([*names, *filter(None, [reference])])}
+    periods = {
+        name: CutPeriods.of(signals[name], window) for name in dict.fromkeys([*names, *filter(None, [reference])])
+    }
     for name in names:
         strange[periods[name].whole[periods[name].unlike(excited_bins(settings))]] = True
     silent = np.zeros(count, dtype=np.bool_)
@@ -91,7 +93,7 @@ def _outlying(signals: Mapping[str, Floats], settings: Settings, last: bool) -> 
     return silent | (returning if np.count_nonzero(returning & ~silent) <= SHARE_MAX * count else silent)
 
 
-def _silent(excitation: Periods) -> Flags:
+def _silent(excitation: CutPeriods) -> Flags:
     """Periods in which the excitation does not run."""
     blocks = excitation.blocks
     typical = medians(blocks, axis=0)

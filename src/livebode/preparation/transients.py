@@ -55,14 +55,14 @@ def transient_periods(signals: Mapping[str, Floats], settings: Settings) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Periods:
+class CutPeriods:
     """Periods of a signal without their drift, (periods, window), and the numbers of those without missing samples."""
 
     blocks: Floats
     whole: NDArray[np.intp]
 
     @classmethod
-    def of(cls, x: Floats, window: int) -> Periods:
+    def of(cls, x: Floats, window: int) -> CutPeriods:
         """Those of a signal, NaN for missing samples; none if less than one period is known."""
         known = np.isfinite(x)
         if np.count_nonzero(known) < window:
@@ -78,7 +78,7 @@ class Periods:
 
 
 def _transient(x: Floats, window: int, excited: NDArray[np.bool_]) -> int:
-    periods = Periods.of(x, window)
+    periods = CutPeriods.of(x, window)
     whole, strange = periods.whole, periods.unlike(excited)
     count = leading(strange) if whole.size else 0
     return int(whole[count - 1]) + 1 if count else 0

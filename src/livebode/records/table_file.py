@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from livebode.records.parquet_part import ParquetPart, sha256_of_next
 
-_GROUP_ROWS = 1 << 17  # two groups at a time are in memory: one fills, one is written
+_GROUP_ROWS = 1 << 15  # two groups at a time are in memory: one fills, one is written
 
 
 @dataclass(frozen=True)
