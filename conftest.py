@@ -67,10 +67,11 @@ def pytest_sessionfinish() -> None:
 def pytest_collect_file(
     file_path: Path, parent: pytest.Collector
 ) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
-    """Examples are in src alone: a test's file is not searched for them."""
+    """Examples are in src alone: a test's file is not searched for them, nor are the modules that have none."""
     found = yield
     own = parent.config.rootpath / "tests"
-    return [one for one in found if not (isinstance(one, DoctestModule) and file_path.is_relative_to(own))]
+    none = file_path.is_relative_to(own) or (file_path.suffix == ".py" and b">>>" not in file_path.read_bytes())
+    return [one for one in found if not (none and isinstance(one, DoctestModule))]
 
 
 @pytest.fixture(autouse=True)
