@@ -37,6 +37,11 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return whole_run(tmp_path_factory.mktemp("whole") / "run")
 
 
+@pytest.fixture(scope="module")
+def without_loop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return whole_run(tmp_path_factory.mktemp("whole") / "other", loop=None)
+
+
 def shown_s(tab: Tab) -> float:
     return float(tab.js("bode.curves.measured.frame.timeS[0]"))
 
@@ -366,19 +371,19 @@ def test_a_finished_run_is_only_looked_at(browser: Browser, whole: Path) -> None
 
 
 @contextlib.contextmanager
-def two_axes(browser: Browser, whole: Path, folder: Path) -> Iterator[Tab]:
+def two_axes(browser: Browser, whole: Path, without_loop: Path) -> Iterator[Tab]:
     """A page of two finished runs, of which the second does not describe its loop."""
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
-    dashboard.view(whole_run(folder / "other", loop=None))
+    dashboard.view(without_loop)
     with dashboard, Tab(browser, dashboard.url) as tab:
         yield tab
 
 
 def test_an_axis_without_a_loop_shows_the_plant_beside_other_axes(
-    browser: Browser, whole: Path, tmp_path: Path
+    browser: Browser, whole: Path, without_loop: Path
 ) -> None:
-    with two_axes(browser, whole, tmp_path) as tab:
+    with two_axes(browser, whole, without_loop) as tab:
         assert tab.page.locator("#axis option").all_inner_texts() == ["run", "other"]
         tab.page.keyboard.press("4")
         tab.until("page.quantity === 'sensitivity' && bode.curves.measured")
@@ -396,9 +401,9 @@ def test_an_axis_without_a_loop_shows_the_plant_beside_other_axes(
 
 
 def test_back_returns_to_the_axis_quantity_and_plot_before_and_a_zoom_is_no_entry(
-    browser: Browser, whole: Path, tmp_path: Path
+    browser: Browser, whole: Path, without_loop: Path
 ) -> None:
-    with two_axes(browser, whole, tmp_path) as tab:
+    with two_axes(browser, whole, without_loop) as tab:
         page, entries = tab.page, "history.length"
         first = tab.js(entries)
         page.keyboard.press("4")
@@ -416,9 +421,9 @@ def test_back_returns_to_the_axis_quantity_and_plot_before_and_a_zoom_is_no_entr
 
 
 def test_a_late_answer_to_an_earlier_request_does_not_change_the_chosen_axis(
-    browser: Browser, whole: Path, tmp_path: Path
+    browser: Browser, whole: Path, without_loop: Path
 ) -> None:
-    with two_axes(browser, whole, tmp_path) as tab:
+    with two_axes(browser, whole, without_loop) as tab:
         for key in "42424242":  # another quantity, and in the same moment another axis: the answers cross the wishes
             tab.js(f"document.body.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}', bubbles: true }}))")
             tab.page.locator("#axis").select_option("1")
