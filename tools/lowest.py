@@ -17,7 +17,8 @@ from tools.profiles import install
 from tools.release.builds import built
 
 # Only wheels: a package that has to be compiled is not what a user gets. nkeys is one module of Python without a wheel.
-LOWEST = ("--resolution", "lowest-direct", "--only-binary", ":all:", "--no-binary", "nkeys")
+BINARY = ("--only-binary", ":all:", "--no-binary", "nkeys")
+LOWEST = ("--resolution", "lowest-direct", *BINARY)
 TESTS = ("blark", "hypothesis", "playwright", "pytest", "pytest-xdist")
 PARTS = ("core", "kernel", "estimation", "excitation", "fitting", "margins", "records", "export", "sources", "runtime")
 
@@ -40,7 +41,7 @@ def main() -> int:
         )
         print(lowest.read_text("utf-8"))
         dev = pinned(Path("requirements-dev.lock"), TESTS)
-        python = install(root / "environment", wheel, "", "--no-build", "--no-binary", "nkeys", "-r", str(lowest), *dev)
+        python = install(root / "environment", wheel, "", *BINARY, "-r", str(lowest), *dev)
         parts = [f"tests/{part}" for part in sys.argv[1:] or PARTS]
         # An old package warns about a newer one: that is no error here.
         pytest = ["-q", "-n", "auto", "--dist", "worksteal", "-o", "filterwarnings=default", *parts]
