@@ -13,7 +13,6 @@ import multiprocessing
 import platform
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Sequence
 from ctypes import c_double
@@ -168,7 +167,7 @@ def track(
 ) -> None:
     """A process with a share of the axes: a Session, and what it measured."""
     if not hall.turns:
-        turns.FREE = threading.Semaphore(len(members))
+        turns.Turn.begin = lambda _: None  # type: ignore[method-assign]
     names = {f"x{i}": i for i in members}
     clocks = {name: ResponseClock(hall, i, sent_s) for name, i in names.items()}
     marks: list[tuple[float, float]] = []

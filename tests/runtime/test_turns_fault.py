@@ -6,6 +6,7 @@ import threading
 from pathlib import Path
 
 from livebode.records import RunRecord
+from livebode.runtime import turns
 from livebode.runtime.turns import Turn
 from tests.support.live_session import LiveSession, Stuck
 from tests.support.peers.peer import PATIENCE_S, SAMPLES, batches, until
@@ -34,6 +35,41 @@ def test_one_axis_computes_at_a_time_and_an_error_leaves_the_turn_to_the_next() 
     for thread in threads:
         thread.join(PATIENCE_S)
     assert together == [1] * 800
+
+
+def test_the_turn_goes_to_the_axis_that_has_waited_longest() -> None:
+    order: list[int] = []
+
+    def work(number: int) -> None:
+        with Turn() as turn:
+            turn.begin()
+            order.append(number)
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(8)]
+    with Turn() as first:
+        first.begin()
+        for number, thread in enumerate(threads):
+            thread.start()
+            until(lambda number=number: turns.waiting() == number + 1, "it to wait")
+    for thread in threads:
+        thread.join(PATIENCE_S)
+    assert order == list(range(8))
+
+
+def test_a_turn_that_was_too_long_is_passed_on_and_its_end_takes_none_from_another(monkeypatch) -> None:
+    monkeypatch.setattr(turns, "TURN_S_MAX", 0.01)
+    late, other, third = Turn(), Turn(), Turn()
+    late.begin()
+    other.begin()  # returns although the late one has not ended
+    late.end()
+    waits = threading.Thread(target=third.begin)
+    waits.start()
+    until(lambda: turns.waiting() == 1 or not waits.is_alive(), "it to wait or to be passed over")
+    other.end()
+    waits.join(PATIENCE_S)
+    third.end()
+    assert not waits.is_alive()
+    assert turns.waiting() == 0
 
 
 def test_an_axis_that_does_not_return_does_not_stop_another(tmp_path: Path) -> None:

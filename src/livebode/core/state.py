@@ -14,6 +14,7 @@ import struct
 import sys
 import zlib
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple, NoReturn, Protocol
 
 import numpy as np
@@ -145,7 +146,7 @@ def encode(stage: Stage, values: Mapping[str, Any], identity: str = "") -> bytes
         "arrays": {name: (array.dtype.str, array.shape) for name, array in arrays.items()},
         "parts": {name: len(part) for name, part in parts.items()},
     }
-    text = json.dumps(description, separators=(",", ":"), default=_item).encode()
+    text = _to_json(description).encode()
     check = zlib.crc32(text)
     for array in arrays.values():
         check = zlib.crc32(array.data, check) if array.size else check
@@ -319,5 +320,9 @@ def _item(value: Any) -> Any:
     return value.item()
 
 
+_to_json = json.JSONEncoder(separators=(",", ":"), default=_item).encode
+
+
+@lru_cache(maxsize=256)  # a live axis asks for the same twice a second
 def _fingerprint(identity: str) -> str:
     return hashlib.sha256(identity.encode()).hexdigest()[:32] if identity else ""

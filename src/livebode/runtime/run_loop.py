@@ -171,6 +171,8 @@ class RunLoop:
                     self._report_in_silence()
                 else:
                     for piece in self._recorder.pieces(block):
+                        if self._live:
+                            self._turn.begin()  # a piece after the first one has none yet
                         self._process(piece)
                 self._turn.end()
                 if self._control.changing:

@@ -47,8 +47,7 @@ class Inbox:
     @property
     def ended(self) -> bool:
         """Whether the queue is empty and closed."""
-        with self._changed:
-            return self._closed and not self._batches
+        return self._closed and not self._batches  # nothing is added after it was closed
 
     def put(self, batch: AnyBatch, wait: bool) -> bool:
         """Whether it was accepted. A full inbox rejects batches until a quarter is free, or with `wait` waits."""
@@ -87,6 +86,17 @@ class Inbox:
             batch = self._batches.popleft()
             self._count(batch, -1)
             return batch
+
+    def get_waiting(self, samples_max: int) -> list[AnyBatch]:
+        """The oldest batches that wait, with at most so many samples together, or one; none if none waits."""
+        taken: list[AnyBatch] = []
+        with self._changed:
+            while self._batches and (not taken or self._batches[0].samples <= samples_max):
+                batch = self._batches.popleft()
+                samples_max -= batch.samples
+                taken.append(batch)
+                self._count(batch, -1)
+        return taken
 
     def close(self) -> None:
         """Close the queue; its contents can still be read."""

@@ -21,7 +21,6 @@ from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
 from livebode.sources.live.inbox import Inbox
-from livebode.sources.live.joined import joined
 from livebode.sources.live.pauses import Pauses
 from livebode.sources.live.position import Position
 from livebode.sources.live.sequencer import Sequencer
@@ -247,9 +246,10 @@ class LiveSource(ABC):
                 continue
             if self._inbox.wait(TICK_S):
                 turn()
-            self._take(0.0)
             if self.paced and not self.waits:
                 self._take_waiting()
+            else:
+                self._take(0.0)
             if not self._ready:
                 yield None
         yield from self._sequencer.finish()
@@ -263,13 +263,9 @@ class LiveSource(ABC):
             self._ready += self._sequencer.push(batch)
 
     def _take_waiting(self) -> None:
-        """Take what else waits, and join the Blocks that follow each other."""
-        while self._ready and self._ready[-1].stop - self._ready[0].start < TOGETHER_S * self.rate_hz:
-            batch = self._inbox.get(0.0)
-            if batch is None:
-                break
-            self._ready += self._sequencer.push(batch)
-        self._ready = deque(joined(list(self._ready)))
+        """Take what waits; what follows each other is one Block."""
+        batches = self._inbox.get_waiting(round(TOGETHER_S * self.rate_hz))
+        self._ready += self._sequencer.push_together(batches) if batches else self._sequencer.poll(time.monotonic())
 
     def _check_kinds(self) -> None:
         """SourceError if a kind is declared for a channel that the stream does not have."""
