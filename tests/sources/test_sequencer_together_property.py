@@ -53,9 +53,7 @@ def plain(blocks: list[LiveBlock]) -> list[tuple[object, ...]]:
 )
 def test_batches_that_wait_give_the_blocks_of_one_by_one(spectra, stamped, lengths, bound, restart, data):
     edges = [0, *np.cumsum(lengths).tolist()]
-    sent = [
-        batch_of(spectra, a, b, 1 + (number >= restart), stamped) for number, (a, b) in enumerate(pairwise(edges))
-    ]
+    sent = [batch_of(spectra, a, b, 1 + (number >= restart), stamped) for number, (a, b) in enumerate(pairwise(edges))]
     kept = [batch for batch in sent if not data.draw(st.sampled_from([0, 0, 0, 0, 1]))] or sent
     order, cuts = displaced(kept, bound, data), data.draw(st.lists(st.integers(0, len(kept)), max_size=6))
     events = SourceEvents(), SourceEvents()

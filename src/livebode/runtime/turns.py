@@ -1,92 +1,167 @@
-"""Turn: at most one axis of a process computes at a time, in the order in which they asked.
+"""Turns: one thread does the steps of all axes of a process, in the order in which these have something to do.
 
 Python runs one thread at a time, and another one takes over wherever a function in C lets go of the interpreter: many
-times in a Block. Axes that compute at once are therefore all late. In turns each one is interrupted by the receiver
-alone, and the batches that arrive while it waits are one Block. An ordinary lock gives the turn to any of those that
-wait, so that some are late several times in a row. `python -m bench.hall` measures it.
+times in a Block. Threads of axes that compute at once are therefore all late, and waking a thread for each Block costs
+as much as the Block. So the thread of one axis leads: it does the steps of all axes, and the threads of the others
+wait. The batches that arrive while an axis waits for its turn are one Block. `python -m bench.hall` measures it.
 """
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections import deque
-from typing import Self
+from collections.abc import Iterator
+from contextvars import copy_context
+from math import inf
 
-TURN_S_MAX = 1.0
-"""Longest turn that others wait for: an axis that does not return, as on a network drive, delays them but does not stop
+TICK_S = 0.1
+"""An axis without samples has a step in this interval."""
+STEP_S_MAX = 1.0
+"""Longest step that others wait for: an axis that does not return, as on a network drive, delays them but does not stop
 them."""
 
 
 class Turn:
-    """The turn of one axis to compute. Used as a context manager around all of its turns, the last of which it ends."""
+    """The steps of one axis, each of which says whether the next one is due at once, or only when samples come.
 
-    def __init__(self) -> None:
-        self._given = threading.Lock()
-        self._given.acquire()
+    Parameters
+    ----------
+    steps
+        They are done in any thread, but in the context in which this was created.
+    """
 
-    def begin(self) -> None:
-        """Wait for the turn, unless it has begun."""
-        if _line.asks(self):
-            while not self._given.acquire(timeout=TURN_S_MAX):
-                _line.pass_over()
+    def __init__(self, steps: Iterator[bool]) -> None:
+        self._steps, self._context = steps, copy_context()
+        self.ended = False
+        self.error: BaseException | None = None
+        """What the last step raised."""
+        self.waits = self.works = self.asked_again = False
+        self.stepped_s = -inf
+        self.called = threading.Event()
+        """Its thread leads from now, or the last step was done."""
 
-    def end(self) -> None:
-        """Leave the turn to the axis that has waited longest."""
-        _line.leaves(self)
+    def ask(self) -> None:
+        """A step is due. Any thread may call it, at any time."""
+        _lines[0].ask(self)
 
-    def give(self) -> None:
-        """Let `begin` return."""
-        self._given.release()
+    def run(self) -> None:
+        """Do the steps until the last one, and those of others; raises what a step raised."""
+        _lines[0].run(self)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.end()
+    def step(self) -> bool:
+        """Do one; whether the next one is due."""
+        try:
+            due = self._context.run(next, self._steps, None)
+        except BaseException as error:  # it belongs to the thread of this axis
+            due, self.error = None, error
+        self.ended = due is None
+        return bool(due)
 
 
 class _Line:
-    """Who has the turn, and who waits for it."""
+    """The turns of a process, and which of their threads leads."""
 
     def __init__(self) -> None:
-        self._changing = threading.Lock()
-        self._now: Turn | None = None
-        self._since_s = 0.0
-        self.waiting: deque[Turn] = deque()
+        self._changed = threading.Condition(threading.Lock())
+        self._all: dict[Turn, None] = {}
+        self._asked: deque[Turn] = deque()
+        self._leader: Turn | None = None
+        self._since_s = inf  # when the leader began a step
+        self._ticked_s = -inf
 
-    def asks(self, turn: Turn) -> bool:
-        """Whether it has to wait; `give` is then called when it has the turn."""
-        with self._changing:
-            if self._now is turn:
-                return False
-            if self._now is not None:
-                self.waiting.append(turn)
-                return True
-            self._now, self._since_s = turn, time.monotonic()
-            return False
+    def ask(self, turn: Turn) -> None:
+        with self._changed:
+            if self._append(turn):
+                self._changed.notify()  # only the leader waits for it
 
-    def leaves(self, turn: Turn) -> None:
-        """No effect if it does not have the turn, or has lost it."""
-        with self._changing:
-            if self._now is turn:
-                self._next()
+    def _append(self, turn: Turn) -> bool:
+        """Whether it waits from now."""
+        turn.asked_again |= turn.works
+        new = not (turn.waits or turn.works or turn.ended)
+        if new:
+            turn.waits = True
+            self._asked.append(turn)
+        return new
 
-    def pass_over(self) -> None:
-        """The next one has the turn if the present one had it for too long; that continues without it."""
-        with self._changing:
-            if time.monotonic() - self._since_s >= TURN_S_MAX:
-                self._next()
+    def run(self, turn: Turn) -> None:
+        with self._changed:
+            self._all[turn] = None
+        self.ask(turn)
+        try:
+            while not turn.ended:
+                if self._leads(turn):
+                    self._work(turn)
+                elif not turn.called.wait(STEP_S_MAX):
+                    self._replace_leader()
+        finally:
+            self._leave(turn)
+        if turn.error is not None:
+            raise turn.error
 
-    def _next(self) -> None:
-        self._now, self._since_s = (self.waiting.popleft() if self.waiting else None), time.monotonic()
-        if self._now is not None:
-            self._now.give()
+    def _leads(self, turn: Turn) -> bool:
+        with self._changed:
+            turn.called.clear()
+            if self._leader is None and not turn.ended:
+                self._leader = turn
+            return self._leader is turn
+
+    def _replace_leader(self) -> None:
+        """Another thread may lead if a step takes too long; that one still does the step."""
+        with self._changed:
+            if time.monotonic() - self._since_s >= STEP_S_MAX:
+                self._leader, self._since_s = None, inf
+
+    def _leave(self, turn: Turn) -> None:
+        """The thread of another axis leads, if this one did."""
+        with self._changed:
+            del self._all[turn]
+            turn.ended = True
+            if self._leader in (turn, None):
+                self._leader = None
+                for other in self._all:
+                    if not other.ended:
+                        other.called.set()
+                        break
+
+    def _work(self, turn: Turn) -> None:
+        """Do steps of all axes, until this one ended or another thread leads."""
+        while not turn.ended and (one := self._next(turn)) is not None:
+            due = one.step()
+            with self._changed:
+                one.works = False
+                if one.ended:
+                    one.called.set()
+                elif due or one.asked_again:
+                    self._append(one)
+
+    def _next(self, leader: Turn) -> Turn | None:
+        """The axis that has waited longest, as soon as there is one; None if this thread does not lead any more."""
+        with self._changed:
+            while self._leader is leader:
+                self._since_s = now_s = time.monotonic()
+                if now_s - self._ticked_s >= TICK_S:
+                    self._tick(now_s)
+                if self._asked:
+                    one = self._asked.popleft()
+                    one.waits, one.works, one.asked_again, one.stepped_s = False, True, False, now_s
+                    return one
+                self._since_s = inf
+                self._changed.wait(self._ticked_s + TICK_S - now_s)
+        return None
+
+    def _tick(self, now_s: float) -> None:
+        self._ticked_s = now_s
+        for turn in self._all:
+            if now_s - turn.stepped_s >= TICK_S:
+                self._append(turn)
 
 
-_line = _Line()
+_lines = [_Line()]
+if hasattr(os, "register_at_fork"):  # the threads do not exist in a child
 
+    def _renew() -> None:
+        _lines[0] = _Line()
 
-def waiting() -> int:
-    """How many axes wait for their turn."""
-    return len(_line.waiting)
+    os.register_at_fork(after_in_child=_renew)

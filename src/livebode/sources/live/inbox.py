@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Callable
 
 from livebode.sources.live.spectra_batch import AnyBatch
 
@@ -34,6 +35,8 @@ class Inbox:
         self._changed = threading.Condition()
         self._closed = False
         self._full = False
+        self.listener: Callable[[], None] = lambda: None
+        """Called when a batch was added, or the queue was closed."""
 
     @property
     def seconds(self) -> float:
@@ -59,7 +62,8 @@ class Inbox:
                 return False
             self._batches.append(batch)
             self._count(batch, 1)
-            return True
+        self.listener()
+        return True
 
     def _has_room(self, batch: AnyBatch, share: float = 1.0) -> bool:
         size, seconds = self._bytes + _size_bytes(batch), self._seconds + _seconds(batch)
@@ -103,6 +107,7 @@ class Inbox:
         with self._changed:
             self._closed = True
             self._changed.notify_all()
+        self.listener()
 
 
 def _size_bytes(batch: AnyBatch) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 from livebode.core.state import Stage, StatefulBase
@@ -365,7 +364,7 @@ class Sequencer(StatefulBase):
     def _state(self) -> dict[str, Any]:
         return {name.lstrip("_"): getattr(self, name) for name in _PLAIN} | {
             "left": list(self._left.items()),
-            "resumed": None if self._resumed is None else asdict(self._resumed),
+            "resumed": None if self._resumed is None else self._resumed.to_plain(),
             "position": self._events.position,
             "waiting": batches_to_state(list(self._waiting.values())),
             "schema": self.schema,
