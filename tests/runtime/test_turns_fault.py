@@ -6,13 +6,17 @@ import threading
 from collections.abc import Iterator
 from contextvars import ContextVar
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from livebode.records import RunRecord
+from livebode.records.segments.store import Store
+from livebode.runtime import Document, Subscriber
+from livebode.runtime.documents import TrackerResults
 from livebode.runtime.turns import Turn
 from tests.support.live_session import LiveSession, Stuck
-from tests.support.peers.peer import PATIENCE_S, SAMPLES, batches, until
+from tests.support.peers.peer import PATIENCE_S, RATE_HZ, SAMPLES, batches, until
 from tests.support.peers.plain import TcpPeer
 
 OWN = ContextVar("of a thread", default=-1)
@@ -136,3 +140,38 @@ def test_an_axis_that_does_not_return_does_not_stop_another(tmp_path: Path) -> N
             until(lambda: other.control.source and not other.control.source.waiting_s, "the other axis to track")
         stuck.released.set()
     assert RunRecord.open(other.run).summary["counts"]["samples"] == 60 * SAMPLES
+
+
+def test_an_axis_waits_for_its_own_disk_and_another_does_not(tmp_path: Path, monkeypatch) -> None:
+    answers, commit, reached = threading.Event(), Store.commit, {"a": 0, "b": 0}
+
+    def slow(store: Store, *args: Any) -> bool:
+        if store.path.parent.name == "a":
+            answers.wait(PATIENCE_S)
+        return commit(store, *args)
+
+    def following(name: str) -> Subscriber:
+        def take(document: Document) -> None:
+            if isinstance(document, TrackerResults):
+                reached[name] = document.block.stop
+
+        return take
+
+    monkeypatch.setattr(Store, "commit", slow)
+    sent, folders = batches(200, first=0), [tmp_path / name for name in "ab"]
+    for folder in folders:
+        folder.mkdir()
+    with TcpPeer(folders[0]) as a, TcpPeer(folders[1]) as b, LiveSession(folders[0], a, following("a")) as waiting:
+        a.wait_ready()
+        for batch in sent:
+            a.send(batch)
+        until(lambda: reached["a"] >= 0.75 * RATE_HZ, "it to be ahead of its record")
+        with LiveSession(folders[1], b, following("b")) as other:
+            b.wait_ready()
+            for batch in sent:
+                b.send(batch)
+            until(lambda: reached["b"] == 200 * SAMPLES, "the other axis to track")
+        assert reached["a"] <= RATE_HZ
+        answers.set()
+        until(lambda: reached["a"] == 200 * SAMPLES, "it to track the rest")
+    assert [RunRecord.open(run.run).summary["counts"]["samples"] for run in (waiting, other)] == 2 * [200 * SAMPLES]
