@@ -18,6 +18,8 @@ from math import inf
 
 TICK_S = 0.1
 """An axis without samples has a step in this interval."""
+TURN_S = 0.01
+"""An axis whose next step is due at once does it, until it had the turn for so long: its state is in the cache."""
 STEP_S_MAX = 1.0
 """Longest step that others wait for: an axis that does not return, as on a network drive, delays them but does not stop
 them."""
@@ -128,7 +130,9 @@ class _Line:
     def _work(self, turn: Turn) -> None:
         """Do steps of all axes, until this one ended or another thread leads."""
         while not turn.ended and (one := self._next(turn)) is not None:
-            due = one.step()
+            due, until_s = one.step(), one.stepped_s + TURN_S
+            while due and time.monotonic() < until_s:
+                due = one.step()
             with self._changed:
                 one.works = False
                 if one.ended:
