@@ -81,6 +81,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.nonperiodic
 	$(BIN)/python -m bench.live
 	$(BIN)/python -m bench.hall
+	$(BIN)/python -m bench.live_blocks
 	$(BIN)/python -m bench.overload
 	$(BIN)/python -m bench.segments
 	$(BIN)/python -m bench.start

@@ -116,7 +116,7 @@ def run(
     with (
         TemporaryDirectory() as into,
         dashboard,
-        _sources(lambda given: Machine(given, samples, batches, times, next(hub), waiting_max)),
+        sources_from(lambda given: Machine(given, samples, batches, times, next(hub), waiting_max)),
     ):
         session = Session(
             dict.fromkeys(hubs, found),
@@ -135,7 +135,7 @@ def run(
 
 
 @contextmanager
-def _sources(source_of: Callable[[SourceSettings], LiveSource]) -> Iterator[None]:
+def sources_from(source_of: Callable[[SourceSettings], LiveSource]) -> Iterator[None]:
     before, live.source_of = live.source_of, source_of  # type: ignore[assignment]
     try:
         yield

@@ -13,7 +13,6 @@ import multiprocessing
 import platform
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Sequence
 from ctypes import c_double
@@ -31,7 +30,7 @@ from bench.job import LINES, RATE_HZ, WINDOW, signals
 from bench.live import BATCH, CHANNELS, CORES, HOP, free_ports, show, wake
 from livebode.configuration import Axis
 from livebode.core import Block, Responses, SpectraLayout
-from livebode.runtime import Destination, Document, Session, turns
+from livebode.runtime import Destination, Document, Session
 from livebode.runtime.documents import TrackerResults
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples, encode_spectra, encode_spectra_layout
 from livebode.sources.live.kernel_drive import KernelDrive
@@ -52,14 +51,11 @@ class Hall:
     axes: int
     spectra: bool = False
     processes: int = 1
-    turns: bool = True
-    """Whether the axes of a process compute in turns, as in `livebode run`; else all at once, as threads do."""
 
     @property
     def name(self) -> str:
         what = "spectra, 20/s" if self.spectra else "samples, 4 kHz, 25 ms"
-        how = f"{self.processes} process{'es' * (self.processes > 1)}{', not in turns' * (not self.turns)}"
-        return f"{self.axes} axes, {what}, {how}"
+        return f"{self.axes} axes, {what}, {self.processes} process{'es' * (self.processes > 1)}"
 
     @property
     def step(self) -> int:
@@ -69,7 +65,6 @@ class Hall:
 
 HALLS = (
     Hall(64),
-    Hall(64, turns=False),
     Hall(64, processes=2),
     Hall(256, spectra=True),
     Hall(256, spectra=True, processes=2),
@@ -167,8 +162,6 @@ def track(
     hall: Hall, members: Sequence[int], ports: list[int], sent_s: Any, seconds: float, results: Connection
 ) -> None:
     """A process with a share of the axes: a Session, and what it measured."""
-    if not hall.turns:
-        turns.FREE = threading.Semaphore(len(members))
     names = {f"x{i}": i for i in members}
     clocks = {name: ResponseClock(hall, i, sent_s) for name, i in names.items()}
     marks: list[tuple[float, float]] = []
@@ -258,15 +251,10 @@ def main() -> None:
     parser.add_argument("--axes", type=int, help="only so many axes, in place of all the measurements")
     parser.add_argument("--spectra", action="store_true", help="with --axes: they send spectra")
     parser.add_argument("--processes", type=int, default=1, help="with --axes: so many processes share them")
-    parser.add_argument("--at-once", action="store_true", help="with --axes: they do not compute in turns")
     options = parser.parse_args()
     locked = getattr(sys, "_is_gil_enabled", lambda: True)()
     print(f"Python {platform.python_version()}, {'with' if locked else 'without'} the interpreter lock")
-    halls = (
-        HALLS
-        if options.axes is None
-        else (Hall(options.axes, options.spectra, options.processes, not options.at_once),)
-    )
+    halls = HALLS if options.axes is None else (Hall(options.axes, options.spectra, options.processes),)
     for hall in halls:
         report(hall, measure(hall, options.seconds))
 

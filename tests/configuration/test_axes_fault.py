@@ -196,7 +196,7 @@ def test_odd_configurations_give_axes_or_a_sentence(tmp_path: Path) -> None:
          {"key": "source.log", "value": "datetime.date(1979, 5, 27)"}),
         (b"[source]\nlog = \"a\\u0000b\"\n[signals]\noutput = 'y'", "value-invalid", {"key": "source.log"}),
         (b"[lines]\n" + b"\n".join(b"k%d = 1" % k for k in range(50_000)), "key-unknown", {"key": "lines.k0"}),
-        (b"\n".join(b"[axes.a%d]" % k for k in range(5000)), "axes-invalid", {"count": 5000, "limit": 64}),
+        (b"\n".join(b"[axes.a%d]" % k for k in range(5000)), "axes-invalid", {"count": 5000, "limit": 256}),
     ],
     ids=range(12),
 )  # fmt: skip

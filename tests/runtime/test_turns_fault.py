@@ -1,39 +1,126 @@
-"""Axes compute in turns, and one that does not return does not stop the others."""
+"""The axes of a process compute in turns, and one that does not return does not stop the others."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextvars import ContextVar
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 from livebode.records import RunRecord
+from livebode.records.segments.store import Store
+from livebode.runtime import Document, Subscriber
+from livebode.runtime.documents import TrackerResults
 from livebode.runtime.turns import Turn
 from tests.support.live_session import LiveSession, Stuck
-from tests.support.peers.peer import PATIENCE_S, SAMPLES, batches, until
+from tests.support.peers.peer import PATIENCE_S, RATE_HZ, SAMPLES, batches, until
 from tests.support.peers.plain import TcpPeer
 
+OWN = ContextVar("of a thread", default=-1)
 
-def test_one_axis_computes_at_a_time_and_an_error_leaves_the_turn_to_the_next() -> None:
-    inside, together = [], []
 
-    def work() -> None:
-        for _ in range(200):
-            try:
-                with Turn() as turn:
-                    turn.begin()
-                    turn.begin()
-                    inside.append(None)
-                    together.append(len(inside))
-                    inside.pop()
-                    raise OSError("the disk is full")
-            except OSError:
-                continue
+class Axes:
+    """Threads that run a turn each, and what their steps did."""
 
-    threads = [threading.Thread(target=work) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(PATIENCE_S)
-    assert together == [1] * 800
+    def __init__(self) -> None:
+        self.steps: list[int] = []
+        self.errors: dict[int, BaseException] = {}
+        self.turns: dict[int, Turn] = {}
+        self.threads: dict[int, threading.Thread] = {}
+
+    def begin(self, number: int, steps: Iterator[bool]) -> None:
+        self.threads[number] = threading.Thread(target=self._run, args=(number, steps))
+        self.threads[number].start()
+        until(lambda: number in self.turns, "its turn")
+
+    def _run(self, number: int, steps: Iterator[bool]) -> None:
+        OWN.set(number)
+        self.turns[number] = Turn(steps)
+        try:
+            self.turns[number].run()
+        except BaseException as error:
+            self.errors[number] = error
+
+    def join(self) -> None:
+        for thread in self.threads.values():
+            thread.join(PATIENCE_S)
+            assert not thread.is_alive()
+
+
+def test_one_axis_computes_at_a_time_and_all_do_whoever_ends_first() -> None:
+    axes, inside, together = Axes(), [], []
+
+    def steps(count: int) -> Iterator[bool]:
+        for _ in range(count):
+            inside.append(None)
+            together.append(len(inside))
+            inside.pop()
+            yield True
+
+    for number in range(6):
+        axes.begin(number, steps(100 * (number + 1)))
+    axes.join()
+    assert together == [1] * 2100
+    assert not axes.errors
+
+
+def test_steps_are_done_in_the_order_of_asking_in_the_context_of_their_axis() -> None:
+    axes, gate, order = Axes(), threading.Event(), []
+
+    def steps(number: int) -> Iterator[bool]:
+        yield False
+        while not gate.is_set():  # the first axis holds the turn until all have asked
+            assert number == 0
+            gate.wait(PATIENCE_S)
+        order.append((number, OWN.get()))
+
+    for number in range(6):
+        axes.begin(number, steps(number))
+    until(lambda: all(turn.stepped_s > 0 and not turn.works for turn in axes.turns.values()), "all to have begun")
+    for number in (0, 4, 2, 5, 1, 3):
+        axes.turns[number].ask()
+        until(lambda number=number: axes.turns[number].waits or axes.turns[number].works, "it to wait")
+    gate.set()
+    axes.join()
+    assert order == [(number, number) for number in (0, 4, 2, 5, 1, 3)]
+
+
+def test_an_error_ends_its_own_axis_whoever_did_the_step() -> None:
+    axes, go_on = Axes(), threading.Event()
+
+    def fails() -> Iterator[bool]:
+        while not go_on.is_set():
+            yield False
+        raise OSError("the disk is full")
+
+    def runs() -> Iterator[bool]:
+        while 1 not in axes.errors:
+            yield False
+
+    axes.begin(0, runs())
+    axes.begin(1, fails())
+    go_on.set()
+    axes.join()
+    assert list(axes.errors) == [1]
+    with pytest.raises(OSError, match="the disk is full"):
+        raise axes.errors[1]
+
+
+def test_samples_that_come_during_a_step_make_another_one_due() -> None:
+    axes, asked, done = Axes(), threading.Event(), []
+
+    def steps() -> Iterator[bool]:
+        axes.turns[0].ask()  # as its receiver does
+        asked.set()
+        yield False
+        done.append(None)
+
+    axes.begin(0, steps())
+    axes.join()
+    assert done == [None]
 
 
 def test_an_axis_that_does_not_return_does_not_stop_another(tmp_path: Path) -> None:
@@ -53,3 +140,38 @@ def test_an_axis_that_does_not_return_does_not_stop_another(tmp_path: Path) -> N
             until(lambda: other.control.source and not other.control.source.waiting_s, "the other axis to track")
         stuck.released.set()
     assert RunRecord.open(other.run).summary["counts"]["samples"] == 60 * SAMPLES
+
+
+def test_an_axis_waits_for_its_own_disk_and_another_does_not(tmp_path: Path, monkeypatch) -> None:
+    answers, commit, reached = threading.Event(), Store.commit, {"a": 0, "b": 0}
+
+    def slow(store: Store, *args: Any) -> bool:
+        if store.path.parent.name == "a":
+            answers.wait(PATIENCE_S)
+        return commit(store, *args)
+
+    def following(name: str) -> Subscriber:
+        def take(document: Document) -> None:
+            if isinstance(document, TrackerResults):
+                reached[name] = document.block.stop
+
+        return take
+
+    monkeypatch.setattr(Store, "commit", slow)
+    sent, folders = batches(200, first=0), [tmp_path / name for name in "ab"]
+    for folder in folders:
+        folder.mkdir()
+    with TcpPeer(folders[0]) as a, TcpPeer(folders[1]) as b, LiveSession(folders[0], a, following("a")) as waiting:
+        a.wait_ready()
+        for batch in sent:
+            a.send(batch)
+        until(lambda: reached["a"] >= 0.75 * RATE_HZ, "it to be ahead of its record")
+        with LiveSession(folders[1], b, following("b")) as other:
+            b.wait_ready()
+            for batch in sent:
+                b.send(batch)
+            until(lambda: reached["b"] == 200 * SAMPLES, "the other axis to track")
+        assert reached["a"] <= RATE_HZ
+        answers.set()
+        until(lambda: reached["a"] == 200 * SAMPLES, "it to track the rest")
+    assert [RunRecord.open(run.run).summary["counts"]["samples"] for run in (waiting, other)] == 2 * [200 * SAMPLES]

@@ -83,8 +83,9 @@ def test_what_arrives_while_an_axis_waits_for_its_turn_is_one_block_of_at_most_a
             def wait() -> None:
                 until(lambda: found[1:] or source.waiting_s > 38.5 * SAMPLES / RATE_HZ, "all other batches to wait")
 
-            for block in source.stream(turn=wait):
+            for block in source.stream(wait_s=0.0):
                 found += [] if block is None else [block]
+                wait()
                 if found and found[-1].stop == 40 * SAMPLES:
                     break
     assert [len(block) for block in found] == [SAMPLES, 1000, 950]

@@ -44,8 +44,11 @@ class Overview:
             return Responses.join(self._parts)
 
     def _add(self, responses: Responses) -> None:
-        self._append(responses[-self._seen % self._stride :: self._stride])
+        first = -self._seen % self._stride
         self._seen += len(responses)
+        if self._parts and first >= len(responses):
+            return  # nearly always, in a long run; one empty part is enough to name the lines
+        self._append(responses[first :: self._stride])
         most = min(ROWS_MAX, max(_ROWS_MIN, self._values_max / len(responses.lines)))
         while self._rows > most:
             thinned = Responses.join(self._parts)[::2]
@@ -54,8 +57,6 @@ class Overview:
             self._stride *= 2
 
     def _append(self, responses: Responses) -> None:
-        if self._parts and not len(responses):
-            return  # one empty part is enough to name the lines
         # Joining copies: a view would keep the omitted rows in memory.
         self._parts.append(Responses.join([responses]))
         self._rows += len(responses)

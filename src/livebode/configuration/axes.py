@@ -12,7 +12,7 @@ from livebode.configuration.fit_settings import check_fit
 from livebode.configuration.toml_file import parse_table, read_bytes, shortened
 from livebode.core import ConfigError, LivebodeError
 
-AXES_MAX = 64
+AXES_MAX = 256
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 SUCCESSOR = re.compile(r".*-[0-9]+")
 Axes = Mapping[str, Axis]

@@ -174,16 +174,16 @@ class Block:
 
     def index(self, name: str) -> int:
         """Row of the channel `name`; SignalError with the nearest name where it is missing."""
-        try:
-            return self.names.index(name)
-        except ValueError:
-            raise SignalError(
-                "channel-unknown",
-                f"there is no channel {name!r}",
-                nearest_name(name, self.names),
-                channel=name,
-                allowed=list(self.names),
-            ) from None
+        for row, channel in enumerate(self.channels):
+            if channel.name == name:
+                return row
+        raise SignalError(
+            "channel-unknown",
+            f"there is no channel {name!r}",
+            nearest_name(name, self.names),
+            channel=name,
+            allowed=list(self.names),
+        )
 
     def cut(self, first: int, last: int) -> Block:
         """Samples at positions first … last − 1 of this block, without a copy; all of them are this block itself."""

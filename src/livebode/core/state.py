@@ -14,6 +14,7 @@ import struct
 import sys
 import zlib
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple, NoReturn, Protocol
 
 import numpy as np
@@ -27,6 +28,7 @@ ENCODING = 1
 DTYPES = ("<f8", "<f4", "<c16", "<c8", "<i8", "<i4", "|b1", "|u1")
 """Types that an array of a state may have, little-endian, as NumPy names them."""
 
+_PLAIN = {np.dtype(name) for name in DTYPES} if sys.byteorder == "little" else set[np.dtype[Any]]()
 _MAGIC = b"LBST"
 _HEAD, _CHECK = struct.Struct("<4sHHII"), struct.Struct("<I")
 _SIZE = _HEAD.size + _CHECK.size
@@ -137,15 +139,11 @@ def encode(stage: Stage, values: Mapping[str, Any], identity: str = "") -> bytes
             parts[name] = value
         else:
             plain[name] = value
-    description = {
-        "stage": stage.name,
-        "settings": _fingerprint(identity),
-        "livebode": __version__,
-        "plain": plain,
-        "arrays": {name: (array.dtype.str, array.shape) for name, array in arrays.items()},
-        "parts": {name: len(part) for name, part in parts.items()},
-    }
-    text = json.dumps(description, separators=(",", ":"), default=_item).encode()
+    form = tuple((name, array.dtype, array.shape) for name, array in arrays.items())
+    text = (
+        f"{_begin(stage.name, identity)}{_to_json(plain) if plain else '{}'}"
+        f"{_arrays(form)}{_parts(tuple((name, len(part)) for name, part in parts.items()))}"
+    ).encode()
     check = zlib.crc32(text)
     for array in arrays.values():
         check = zlib.crc32(array.data, check) if array.size else check
@@ -305,6 +303,8 @@ def _array(data: bytes, at: int, dtype: str, shape: list[int]) -> np.ndarray:
 
 
 def _little_endian(array: np.ndarray) -> np.ndarray:
+    if array.dtype in _PLAIN and array.flags.c_contiguous:
+        return array
     if sys.byteorder == "big" or array.dtype.byteorder == ">":
         array = array.astype(array.dtype.newbyteorder("<"))
     if array.dtype.str not in DTYPES:
@@ -317,6 +317,27 @@ def _item(value: Any) -> Any:
     if not isinstance(value, np.generic):
         raise TypeError(f"{value!r} cannot be in a state")
     return value.item()
+
+
+_to_json = json.JSONEncoder(separators=(",", ":"), default=_item).encode
+
+
+# A live axis describes the same stages twice a second; only their plain data differs.
+@lru_cache(maxsize=256)
+def _begin(name: str, identity: str) -> str:
+    """A description up to the plain data."""
+    about = {"stage": name, "settings": _fingerprint(identity), "livebode": __version__}
+    return f'{_to_json(about)[:-1]},"plain":'
+
+
+@lru_cache(maxsize=256)
+def _arrays(form: tuple[tuple[str, np.dtype[Any], tuple[int, ...]], ...]) -> str:
+    return f',"arrays":{_to_json({name: (dtype.str, shape) for name, dtype, shape in form})}'
+
+
+@lru_cache(maxsize=1024)
+def _parts(lengths: tuple[tuple[str, int], ...]) -> str:
+    return f',"parts":{_to_json(dict(lengths))}}}'
 
 
 def _fingerprint(identity: str) -> str:

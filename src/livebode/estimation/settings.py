@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import isqrt
 from typing import Literal
 
@@ -258,7 +259,7 @@ class Settings:
         """Samples by which each of the roles' signals is advanced, by the description of the loop."""
         return tuple(self.loop.advance_ticks(role) for role in self.roles)
 
-    @property
+    @cached_property  # a live axis asks for it with every commit
     def identity(self) -> str:
         """All settings that a tracker's state depends on; trackers with the same identity can exchange snapshots.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -218,7 +218,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
             tracker._ends_with(responses)
         return responses, taken
 
-    @property
+    @cached_property
     def _identity(self) -> str:
         return f"{self.settings.identity} {self._layout}"
 

@@ -47,7 +47,10 @@ class ChannelCheck(StatefulBase):
 
     def _take_spectra(self, block: Spectra) -> None:
         """The same for spectra, where a constant signal has no power at the lines."""
-        for signal, level in zip(block.layout.signals, rms(block.sums, block.layout)):
+        examined = {self._reference, *self._unvaried}
+        at = [row for row, signal in enumerate(block.layout.signals) if signal.name in examined]
+        for row, level in zip(at, rms(block.sums[at], block.layout)):
+            signal = block.layout.signals[row]
             level = level[(block.state & NOT_WHOLE == 0) & np.isfinite(level)]
             if signal.name == self._reference:
                 self._moments += level.size, 0.0, np.dot(level, level)

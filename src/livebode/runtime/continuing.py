@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.core import Block, RecordError
@@ -66,7 +66,7 @@ class StreamPosition:
         origin = block.origin
         arrived = ClockReading.at(block.arrived_s)
         place = Position(block.stop, origin.epoch, block.stop + origin.offset, block.rate_hz, arrived, origin.mark)
-        return encode(_STAGE, {"left_at": asdict(place)})
+        return encode(_STAGE, {"left_at": place.to_plain()})
 
     def restore(self, snapshot: bytes) -> None:
         """Check that the source continues where the record ends."""

@@ -55,6 +55,13 @@ class Recorder(Protocol):
     def commit(self, block: Block) -> None:
         """Store everything up to the end of this Block, if a commit is due."""
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether it is to store what it has before it gets more."""
+
+    def catch_up(self) -> None:
+        """Wait until it is not behind."""
+
     def commit_while_silent(self) -> None:
         """The same while no samples come."""
 

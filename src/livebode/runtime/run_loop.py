@@ -125,9 +125,8 @@ class RunLoop:
         self._live = isinstance(source, LiveSource)
         self._shedding = LoadShedding(source, lambda: self._control.ended) if isinstance(source, LiveSource) else None
         self._follower, settings = pipeline.follower, pipeline.follower.settings
-        self._turn = Turn()
         self._blocks: Iterator[Block | None] = (
-            source.stream(pipeline.channels, self._turn.begin)
+            source.stream(pipeline.channels, wait_s=0.0)
             if isinstance(source, LiveSource)
             else source.blocks(pipeline.channels, **delivery)
         )
@@ -165,20 +164,32 @@ class RunLoop:
     def follow(self) -> None:
         """Process every Block until the source ends or another configuration follows; SignalError if there is none."""
         self._begin()
-        with self._turn:
-            for block in self._numbered():
-                if block is None:
-                    self._report_in_silence()
-                else:
-                    for piece in self._recorder.pieces(block):
-                        self._process(piece)
-                self._turn.end()
-                if self._control.changing:
-                    break
+        steps = self._steps()
+        if isinstance(self.source, LiveSource):
+            turn = Turn(steps)
+            self.source.listen(turn.ask)
+            turn.run()
+        else:
+            for _ in steps:
+                self._recorder.catch_up()
         self._control.looked_s = None
         self._recorder.commit_last()
         if not self._counts.stop:
             raise SignalError("empty", "the recording has no samples", "choose another one")
+
+    def _steps(self) -> Iterator[bool]:
+        """Process every Block, one in each step; whether the next step is due, or only when samples come."""
+        for block in self._numbered():
+            if block is None:
+                self._report_in_silence()
+            else:
+                for piece in self._recorder.pieces(block):
+                    self._process(piece)
+                    while self._recorder.is_behind:
+                        yield False
+            if self._control.changing:
+                break
+            yield isinstance(self.source, LiveSource) and self.source.has_more
 
     def _process(self, block: Block) -> None:
         """One piece of samples through the house, in this order."""
@@ -190,7 +201,6 @@ class RunLoop:
         self._report_events()
         self._stream.announce(TrackerResults(block, self._follower.counts["samples"], self.source.samples))
         self._check_signals(block, ready)  # it examines seconds of samples at a time, and no result waits for it
-        self._turn.end()  # a commit waits for the disk
         self._recorder.commit(block)
 
     def _numbered(self) -> Iterator[Block | None]:

@@ -218,6 +218,7 @@ class SegmentedRecord:
 
     def write_samples(self, block: Block) -> None:
         """Append the samples if they are recorded; the source continues after this Block."""
+        self._writer.check()  # nothing is tracked after the disk failed
         if self._samples:
             self._unwritten.blocks.append(block)
         if self._position is not None:
@@ -228,10 +229,19 @@ class SegmentedRecord:
         self._tracked, self._new = (block.stop, block.origin_s + block.stop / block.rate_hz), True
         if self._due(block.stop):
             self._commit(*self._tracked)
-        if block.stop - self._reached >= self._ahead_max:
-            self._writer.wait()
         self._writer.check()
         self._publish_reported()
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether a kill now could cost more than a second after the next piece."""
+        ahead = 0 if self._tracked is None else self._tracked[0] - self._reached
+        return ahead >= self._ahead_max and not self._writer.idle
+
+    def catch_up(self) -> None:
+        """Wait until it is not behind."""
+        if self.is_behind:
+            self._writer.wait()
 
     def commit_last(self) -> None:
         """Store the last results; RecordError if they cannot be written."""

@@ -18,6 +18,7 @@ from livebode.runtime.allocation import FreeMemory, share_between_threads
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
 from livebode.runtime.destination import Destination, nothing
+from livebode.runtime.open_files import allow_open_files
 from livebode.runtime.service_manager import ServiceManager
 from livebode.runtime.status import Status
 
@@ -82,6 +83,7 @@ class Session:
     def run(self, look: Callable[[], None] = lambda: None) -> None:
         """Wait until every axis ended; `look` is called ten times a second, in this thread."""
         share_between_threads()
+        allow_open_files()
         memory = FreeMemory()
         with self._hearing():
             for thread in list(self.threads.values()):

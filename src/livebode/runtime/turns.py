@@ -1,40 +1,171 @@
-"""Turn: at most one axis of a process computes at a time.
+"""Turns: one thread does the steps of all axes of a process, in the order in which these have something to do.
 
 Python runs one thread at a time, and another one takes over wherever a function in C lets go of the interpreter: many
-times in a Block. Axes that compute at once are therefore all late. In turns each one is interrupted by the receiver
-alone, and the batches that arrive while it waits are one Block. `python -m bench.hall` measures it.
+times in a Block. Threads of axes that compute at once are therefore all late, and waking a thread for each Block costs
+as much as the Block. So the thread of one axis leads: it does the steps of all axes, and the threads of the others
+wait. The batches that arrive while an axis waits for its turn are one Block. `python -m bench.hall` measures it.
 """
 
 from __future__ import annotations
 
+import os
 import threading
-from typing import Self
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextvars import copy_context
+from math import inf
 
-WAIT_S_MAX = 1.0
-"""Longest wait: an axis that does not return, as on a network drive, delays the others but does not stop them."""
-FREE: threading.Lock | threading.Semaphore = threading.Lock()
-"""Who has it computes."""
+TICK_S = 0.1
+"""An axis without samples has a step in this interval."""
+TURN_S = 0.01
+"""An axis whose next step is due at once does it, until it had the turn for so long: its state is in the cache."""
+STEP_S_MAX = 1.0
+"""Longest step that others wait for: an axis that does not return, as on a network drive, delays them but does not stop
+them."""
 
 
 class Turn:
-    """The turn of one axis to compute. Used as a context manager around all of its turns, the last of which it ends."""
+    """The steps of one axis, each of which says whether the next one is due at once, or only when samples come.
+
+    Parameters
+    ----------
+    steps
+        They are done in any thread, but in the context in which this was created.
+    """
+
+    def __init__(self, steps: Iterator[bool]) -> None:
+        self._steps, self._context = steps, copy_context()
+        self.ended = False
+        self.error: BaseException | None = None
+        """What the last step raised."""
+        self.waits = self.works = self.asked_again = False
+        self.stepped_s = -inf
+        self.called = threading.Event()
+        """Its thread leads from now, or the last step was done."""
+
+    def ask(self) -> None:
+        """A step is due. Any thread may call it, at any time."""
+        _lines[0].ask(self)
+
+    def run(self) -> None:
+        """Do the steps until the last one, and those of others; raises what a step raised."""
+        _lines[0].run(self)
+
+    def step(self) -> bool:
+        """Do one; whether the next one is due."""
+        try:
+            due = self._context.run(next, self._steps, None)
+        except BaseException as error:  # it belongs to the thread of this axis
+            due, self.error = None, error
+        self.ended = due is None
+        return bool(due)
+
+
+class _Line:
+    """The turns of a process, and which of their threads leads."""
 
     def __init__(self) -> None:
-        self._begun = False
+        self._changed = threading.Condition(threading.Lock())
+        self._all: dict[Turn, None] = {}
+        self._asked: deque[Turn] = deque()
+        self._leader: Turn | None = None
+        self._since_s = inf  # when the leader began a step
+        self._ticked_s = -inf
 
-    def begin(self) -> None:
-        """Wait for the turn, unless it has begun."""
-        if not self._begun:
-            self._begun = FREE.acquire(timeout=WAIT_S_MAX)
+    def ask(self, turn: Turn) -> None:
+        with self._changed:
+            if self._append(turn):
+                self._changed.notify()  # only the leader waits for it
 
-    def end(self) -> None:
-        """Leave the turn to another axis."""
-        if self._begun:
-            self._begun = False
-            FREE.release()
+    def _append(self, turn: Turn) -> bool:
+        """Whether it waits from now."""
+        turn.asked_again |= turn.works
+        new = not (turn.waits or turn.works or turn.ended)
+        if new:
+            turn.waits = True
+            self._asked.append(turn)
+        return new
 
-    def __enter__(self) -> Self:
-        return self
+    def run(self, turn: Turn) -> None:
+        with self._changed:
+            self._all[turn] = None
+        self.ask(turn)
+        try:
+            while not turn.ended:
+                if self._leads(turn):
+                    self._work(turn)
+                elif not turn.called.wait(STEP_S_MAX):
+                    self._replace_leader()
+        finally:
+            self._leave(turn)
+        if turn.error is not None:
+            raise turn.error
 
-    def __exit__(self, *_: object) -> None:
-        self.end()
+    def _leads(self, turn: Turn) -> bool:
+        with self._changed:
+            turn.called.clear()
+            if self._leader is None and not turn.ended:
+                self._leader = turn
+            return self._leader is turn
+
+    def _replace_leader(self) -> None:
+        """Another thread may lead if a step takes too long; that one still does the step."""
+        with self._changed:
+            if time.monotonic() - self._since_s >= STEP_S_MAX:
+                self._leader, self._since_s = None, inf
+
+    def _leave(self, turn: Turn) -> None:
+        """The thread of another axis leads, if this one did."""
+        with self._changed:
+            del self._all[turn]
+            turn.ended = True
+            if self._leader in (turn, None):
+                self._leader = None
+                for other in self._all:
+                    if not other.ended:
+                        other.called.set()
+                        break
+
+    def _work(self, turn: Turn) -> None:
+        """Do steps of all axes, until this one ended or another thread leads."""
+        while not turn.ended and (one := self._next(turn)) is not None:
+            due, until_s = one.step(), one.stepped_s + TURN_S
+            while due and time.monotonic() < until_s:
+                due = one.step()
+            with self._changed:
+                one.works = False
+                if one.ended:
+                    one.called.set()
+                elif due or one.asked_again:
+                    self._append(one)
+
+    def _next(self, leader: Turn) -> Turn | None:
+        """The axis that has waited longest, as soon as there is one; None if this thread does not lead any more."""
+        with self._changed:
+            while self._leader is leader:
+                self._since_s = now_s = time.monotonic()
+                if now_s - self._ticked_s >= TICK_S:
+                    self._tick(now_s)
+                if self._asked:
+                    one = self._asked.popleft()
+                    one.waits, one.works, one.asked_again, one.stepped_s = False, True, False, now_s
+                    return one
+                self._since_s = inf
+                self._changed.wait(self._ticked_s + TICK_S - now_s)
+        return None
+
+    def _tick(self, now_s: float) -> None:
+        self._ticked_s = now_s
+        for turn in self._all:
+            if now_s - turn.stepped_s >= TICK_S:
+                self._append(turn)
+
+
+_lines = [_Line()]
+if hasattr(os, "register_at_fork"):  # the threads do not exist in a child
+
+    def _renew() -> None:
+        _lines[0] = _Line()
+
+    os.register_at_fork(after_in_child=_renew)

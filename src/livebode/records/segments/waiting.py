@@ -50,7 +50,7 @@ class UnsyncedRows:
     def gather(self) -> None:
         """Create one frame for each table from the added rows."""
         for table, batches in self._new.items():
-            batch = pa.concat_batches(batches)
+            batch = pa.concat_batches(batches) if batches[1:] else batches[0]
             sample = to_numpy(batch["sample"])
             frame = to_frame(ROWS, memoryview(batch.serialize()), table=self._tables.index(table))
             self.rows[table] += batch.num_rows

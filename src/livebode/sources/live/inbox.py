@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Callable
 
 from livebode.sources.live.spectra_batch import AnyBatch
 
@@ -34,6 +35,8 @@ class Inbox:
         self._changed = threading.Condition()
         self._closed = False
         self._full = False
+        self.listener: Callable[[], None] = lambda: None
+        """Called when a batch was added, or the queue was closed."""
 
     @property
     def seconds(self) -> float:
@@ -47,8 +50,7 @@ class Inbox:
     @property
     def ended(self) -> bool:
         """Whether the queue is empty and closed."""
-        with self._changed:
-            return self._closed and not self._batches
+        return self._closed and not self._batches  # nothing is added after it was closed
 
     def put(self, batch: AnyBatch, wait: bool) -> bool:
         """Whether it was accepted. A full inbox rejects batches until a quarter is free, or with `wait` waits."""
@@ -60,7 +62,8 @@ class Inbox:
                 return False
             self._batches.append(batch)
             self._count(batch, 1)
-            return True
+        self.listener()
+        return True
 
     def _has_room(self, batch: AnyBatch, share: float = 1.0) -> bool:
         size, seconds = self._bytes + _size_bytes(batch), self._seconds + _seconds(batch)
@@ -88,11 +91,23 @@ class Inbox:
             self._count(batch, -1)
             return batch
 
+    def get_waiting(self, samples_max: int) -> list[AnyBatch]:
+        """The oldest batches that wait, with at most so many samples together, or one; none if none waits."""
+        taken: list[AnyBatch] = []
+        with self._changed:
+            while self._batches and (not taken or self._batches[0].samples <= samples_max):
+                batch = self._batches.popleft()
+                samples_max -= batch.samples
+                taken.append(batch)
+                self._count(batch, -1)
+        return taken
+
     def close(self) -> None:
         """Close the queue; its contents can still be read."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
+        self.listener()
 
 
 def _size_bytes(batch: AnyBatch) -> int:

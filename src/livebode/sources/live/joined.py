@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from livebode.sources.live.batch import LiveBlock
-from livebode.sources.live.spectra_batch import LiveSpectra
+from livebode.sources.live.batch import Batch, LiveBlock
+from livebode.sources.live.spectra_batch import AnyBatch, LiveSpectra, SpectraBatch
 
 
 def joined(blocks: Sequence[LiveBlock]) -> list[LiveBlock]:
@@ -23,6 +23,26 @@ def joined(blocks: Sequence[LiveBlock]) -> list[LiveBlock]:
         else:
             parts.append([block])
     return [_one(part) for part in parts]
+
+
+def block_of(batches: Sequence[AnyBatch], number: int) -> LiveBlock:
+    """Batches of which one follows the other as one Block that begins at `number`, as `joined` would make it."""
+    first, last = batches[0], batches[-1]
+    if first is last:
+        return first.block(number, first.first_sample, False)
+    if isinstance(first, Batch) and isinstance(last, Batch):
+        data = np.concatenate([batch.data for batch in batches if isinstance(batch, Batch)], axis=1)
+        one = replace(first, data=data, arrived_s=last.arrived_s, mark=last.mark)
+        return one.block(number, first.first_sample, False)
+    parts = [batch for batch in batches if isinstance(batch, SpectraBatch)]
+    spectra = replace(
+        parts[0],
+        sums=np.concatenate([part.sums for part in parts], axis=1),
+        values=np.concatenate([part.values for part in parts], axis=1),
+        state=np.concatenate([part.state for part in parts]),
+        arrived_s=last.arrived_s,
+    )
+    return spectra.block(number, first.first_sample, False)
 
 
 def _continues(first: LiveBlock, second: LiveBlock) -> bool:

@@ -46,7 +46,11 @@ class Position:
     arrived: ClockReading
     mark: Mark | None = None
 
+    def to_plain(self) -> dict[str, Any]:
+        """The position as plain data: what `asdict` gives, which copies each value of it again."""
+        return {**vars(self), "arrived": dict(vars(self.arrived))}
+
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> Position:
-        """Position from plain data, as `asdict` gives it."""
+        """Position from plain data."""
         return cls(**{**plain, "arrived": ClockReading(**plain["arrived"])})

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Sequence
 from typing import Any
 
 from livebode.core.state import Stage, StatefulBase
-from livebode.sources.live.batch import LiveBlock
+from livebode.sources.live.batch import VALUES_MAX, LiveBlock
 from livebode.sources.live.batch_state import batches_from_state, batches_to_state
 from livebode.sources.live.clock import ClockMonitor
 from livebode.sources.live.computer_clock import ClockReading, pause
+from livebode.sources.live.joined import block_of, joined
 from livebode.sources.live.position import Position
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
@@ -23,6 +24,7 @@ JUMP_S = 1.0
 CLOCK_S = 10.0
 """How much the pause of a sender without an epoch may be longer by its numbers than by this computer's clock."""
 _EPOCHS_REMEMBERED = 64
+_RUN_BYTES_MAX = 8 * VALUES_MAX
 _PLAIN = ("_epoch", "_next", "_highest", "_progress_s", "_gap", "_number", "_begun_at", "_paced", "lost")
 
 
@@ -119,6 +121,32 @@ class Sequencer(StatefulBase):
             self._unconfirmed.dismiss(self._epoch, self._next)  # the stream continues, so they did not belong to it
             return self._insert(aligned)
         return self._doubt(aligned)
+
+    def push_together(self, batches: Sequence[AnyBatch]) -> list[LiveBlock]:
+        """The same for several batches; those of which one follows the other are one Block."""
+        blocks: list[LiveBlock] = []
+        run: list[AnyBatch] = []
+        begin = size_bytes = 0
+        for batch in batches:
+            number = self._passed(batch)
+            size_bytes += batch.nbytes
+            if run and (number is None or size_bytes > _RUN_BYTES_MAX):
+                blocks.append(block_of(run, begin))
+                run, size_bytes = [], batch.nbytes
+            if number is None:
+                blocks += self.push(batch)
+                continue
+            begin = begin if run else number
+            run.append(batch)
+        if run:
+            blocks.append(block_of(run, begin))
+        return joined(blocks)
+
+    def _passed(self, batch: AnyBatch) -> int | None:
+        """The number of its Block, if it is the next batch of a stream in which nothing waits; see `passed`."""
+        if not self.is_idle or batch.epoch != self._epoch or not self.schema.is_same(batch):
+            return None
+        return self.passed(batch.first_sample, batch.samples, batch.rate_hz, batch.stamp_s, batch.arrived_s)
 
     @property
     def is_idle(self) -> bool:
@@ -336,7 +364,7 @@ class Sequencer(StatefulBase):
     def _state(self) -> dict[str, Any]:
         return {name.lstrip("_"): getattr(self, name) for name in _PLAIN} | {
             "left": list(self._left.items()),
-            "resumed": None if self._resumed is None else asdict(self._resumed),
+            "resumed": None if self._resumed is None else self._resumed.to_plain(),
             "position": self._events.position,
             "waiting": batches_to_state(list(self._waiting.values())),
             "schema": self.schema,

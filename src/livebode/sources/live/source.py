@@ -21,7 +21,6 @@ from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
 from livebode.sources.live.inbox import Inbox
-from livebode.sources.live.joined import joined
 from livebode.sources.live.pauses import Pauses
 from livebode.sources.live.position import Position
 from livebode.sources.live.sequencer import Sequencer
@@ -201,14 +200,8 @@ class LiveSource(ABC):
         """
         return (block for block in self.stream(channels) if block is not None)
 
-    def stream(
-        self, channels: Sequence[str] | None = None, turn: Callable[[], None] = lambda: None
-    ) -> Iterator[LiveBlock | None]:
-        """The same, and None at least ten times a second while the machine sends nothing.
-
-        `turn` is called, and may wait, before batches are taken from the queue: what arrives meanwhile is in the same
-        Block.
-        """
+    def stream(self, channels: Sequence[str] | None = None, wait_s: float = TICK_S) -> Iterator[LiveBlock | None]:
+        """The same, and None where no samples came for `wait_s`; what came in the meantime is one Block."""
         names = [channel.name for channel in self.channels]
         for name in channels or ():
             if name not in names:
@@ -216,8 +209,17 @@ class LiveSource(ABC):
         rows = [names.index(name) for name in (names if channels is None else channels)]
         labels = tuple(self.channels[row] for row in rows)
         if rows == list(range(len(names))):
-            return self._stream(turn)
-        return (None if block is None else _rows(block, rows, labels) for block in self._stream(turn))
+            return self._stream(wait_s)
+        return (None if block is None else _rows(block, rows, labels) for block in self._stream(wait_s))
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Call `listener`, in place of the one before, when samples came or the source ended; it returns at once."""
+        self._inbox.listener = listener
+
+    @property
+    def has_more(self) -> bool:
+        """Whether samples were received that `stream` has not given."""
+        return bool(self._ready or self._inbox.bytes)
 
     def take_events(self) -> list[Event]:
         """Events since the last call, of the kinds in `livebode.sources.live.KINDS`."""
@@ -240,16 +242,17 @@ class LiveSource(ABC):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _stream(self, turn: Callable[[], None]) -> Iterator[LiveBlock | None]:
+    def _stream(self, wait_s: float) -> Iterator[LiveBlock | None]:
         while self._ready or not self._inbox.ended:
             if self._ready:
                 yield self._ready.popleft()
                 continue
-            if self._inbox.wait(TICK_S):
-                turn()
-            self._take(0.0)
+            if wait_s:
+                self._inbox.wait(wait_s)
             if self.paced and not self.waits:
                 self._take_waiting()
+            else:
+                self._take(0.0)
             if not self._ready:
                 yield None
         yield from self._sequencer.finish()
@@ -263,13 +266,9 @@ class LiveSource(ABC):
             self._ready += self._sequencer.push(batch)
 
     def _take_waiting(self) -> None:
-        """Take what else waits, and join the Blocks that follow each other."""
-        while self._ready and self._ready[-1].stop - self._ready[0].start < TOGETHER_S * self.rate_hz:
-            batch = self._inbox.get(0.0)
-            if batch is None:
-                break
-            self._ready += self._sequencer.push(batch)
-        self._ready = deque(joined(list(self._ready)))
+        """Take what waits; what follows each other is one Block."""
+        batches = self._inbox.get_waiting(round(TOGETHER_S * self.rate_hz))
+        self._ready += self._sequencer.push_together(batches) if batches else self._sequencer.poll(time.monotonic())
 
     def _check_kinds(self) -> None:
         """SourceError if a kind is declared for a channel that the stream does not have."""

@@ -62,6 +62,12 @@ class StreamSchema(StatefulBase):
             return batch
         return replace(batch, data=np.ascontiguousarray(batch.data[self._rows]), channels=self.channels)
 
+    def is_same(self, batch: AnyBatch) -> bool:
+        """Whether `aligned` would return the batch as it is, because the one before was like it."""
+        if self._rows is None or (_layout(batch) or batch.channels, batch.rate_hz) != self._seen:
+            return False
+        return isinstance(batch, SpectraBatch) or batch.channels == self.channels
+
     def _compared(self, batch: AnyBatch) -> list[int] | None:
         """Rows of the stream's channels in the batch; None if it cannot be used. Reports what changed."""
         assert self.rate_hz is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import ClassVar
 
@@ -58,7 +59,7 @@ class UdpSource(LiveSource):
             self._trouble = f"datagrams come from {other}, and source.sender is {sender}"
             return
         try:
-            batch = self._decoder.decode(datagram)
+            batch = self._decoder.decode(datagram, time.monotonic())
         except LivebodeError as error:
             self._malformed(error)
             return
