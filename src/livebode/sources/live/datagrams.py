@@ -13,9 +13,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from livebode.sources.live.arrived import ArrivedDatagrams
+
 TICK_S = 0.1
 """Longest time until a new port is received from, where the system does not notice it at once."""
-BYTES_MAX = 65535
 
 
 class DatagramReceiver:
@@ -29,6 +30,7 @@ class DatagramReceiver:
         self._selector = selectors.DefaultSelector()
         self._thread: threading.Thread | None = None
         self._failures: dict[int, Exception] = {}
+        self._arrived = ArrivedDatagrams()
 
     @contextmanager
     def receiving(self, port: socket.socket, take: Callable[[bytes, str], None]) -> Iterator[Callable[[], None]]:
@@ -67,8 +69,7 @@ class DatagramReceiver:
     def _receive(self, key: selectors.SelectorKey) -> None:
         assert isinstance(key.fileobj, socket.socket)
         try:
-            datagram, (host, *_) = key.fileobj.recvfrom(BYTES_MAX)
-            key.data(datagram, host)
+            key.data(*self._arrived.take(key.fileobj))
         except BlockingIOError:  # the system dropped what it had announced: its checksum was wrong
             return
         except Exception as error:  # any error: the source raises it in its own thread
