@@ -32,7 +32,7 @@ def main() -> None:
     if not words and _COMPLETION not in os.environ and _printed(_help()):
         sys.exit(_USAGE_ERROR)
     gc.set_threshold(OBJECTS_NEW)
-    atexit.register(gc.freeze)
+    atexit.register(_leave_cycles)
     try:
         from livebode.cli.app import run_application
     except KeyboardInterrupt:
@@ -52,3 +52,9 @@ def _printed(text: str) -> bool:
     except (OSError, UnicodeError):
         return False
     return True
+
+
+def _leave_cycles() -> None:
+    """Exit without a last search for cycles, unless DuckDB was used: it complains about what is left."""
+    if "duckdb" not in sys.modules:
+        gc.freeze()
