@@ -124,7 +124,12 @@ def test_samples_that_come_during_a_step_make_another_one_due() -> None:
 
 
 def test_an_axis_that_does_not_return_does_not_stop_another(tmp_path: Path) -> None:
-    stuck, sent = Stuck(), batches(60, first=0)
+    stuck, sent, reached = Stuck(), batches(60, first=0), [0]
+
+    def follow(document: Document) -> None:
+        if isinstance(document, TrackerResults):
+            reached[0] = document.block.stop
+
     folders = [tmp_path / name for name in "ab"]
     for folder in folders:
         folder.mkdir()
@@ -133,11 +138,11 @@ def test_an_axis_that_does_not_return_does_not_stop_another(tmp_path: Path) -> N
         for batch in sent:
             a.send(batch)
         assert stuck.held.wait(PATIENCE_S)
-        with LiveSession(folders[1], b) as other:
+        with LiveSession(folders[1], b, follow) as other:
             b.wait_ready()
             for batch in sent:
                 b.send(batch)
-            until(lambda: other.control.source and not other.control.source.waiting_s, "the other axis to track")
+            until(lambda: reached == [60 * SAMPLES], "the other axis to track")
         stuck.released.set()
     assert RunRecord.open(other.run).summary["counts"]["samples"] == 60 * SAMPLES
 
