@@ -71,8 +71,8 @@ inline void expect(lb_status status)
     if (status != LB_OK) throw nb::value_error("a stage refused its arguments");
 }
 
-// Numbers from which other threads may run meanwhile.
-inline constexpr size_t long_work = 5'000;
+// Numbers from which other threads may run meanwhile: about 0.1 ms. For less the change of threads costs more.
+inline constexpr size_t long_work = 500'000;
 
 template <typename Work> void call(size_t size, Work work)
 {
