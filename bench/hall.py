@@ -9,6 +9,7 @@ so that waiting in the socket is included. What happens before the axes have tra
 from __future__ import annotations
 
 import argparse
+import gc
 import multiprocessing
 import platform
 import sys
@@ -28,6 +29,7 @@ import numpy as np
 
 from bench.job import LINES, RATE_HZ, WINDOW, signals
 from bench.live import BATCH, CHANNELS, CORES, HOP, free_ports, show, wake
+from livebode.cli.start import OBJECTS_NEW
 from livebode.configuration import Axis
 from livebode.core import Block, Responses, SpectraLayout
 from livebode.runtime import Destination, Document, Session
@@ -162,6 +164,8 @@ def track(
     hall: Hall, members: Sequence[int], ports: list[int], sent_s: Any, seconds: float, results: Connection
 ) -> None:
     """A process with a share of the axes: a Session, and what it measured."""
+    gc.set_threshold(OBJECTS_NEW)  # as in the command
+    gc.freeze()
     names = {f"x{i}": i for i in members}
     clocks = {name: ResponseClock(hall, i, sent_s) for name, i in names.items()}
     marks: list[tuple[float, float]] = []
