@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import nan
+from math import gcd, nan
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -145,6 +145,7 @@ class RunLoop:
         self._newest: Fit | None = None
         self._relation, self._recorded = relation or ClockRelation(), recorded
         self._numbers = SenderNumbers()
+        self._step = gcd(settings.step, settings.lines.window)
         self._origin_s = 0.0
         self._stepped_s = time.monotonic()
         self._events: list[Event] = []  # found in this Block, published after its responses
@@ -189,7 +190,14 @@ class RunLoop:
                         yield False
             if self._control.changing:
                 break
-            yield isinstance(self.source, LiveSource) and self.source.has_more
+            yield self._is_due()
+
+    def _is_due(self) -> bool:
+        """Whether samples wait that complete a response; others wait for those, at most until the next tick."""
+        if not isinstance(self.source, LiveSource):
+            return False
+        self.source.expect(self._step - self._counts.stop % self._step)
+        return self.source.has_more
 
     def _process(self, block: Block) -> None:
         """One piece of samples through the house, in this order."""

@@ -36,7 +36,8 @@ class Inbox:
         self._closed = False
         self._full = False
         self.listener: Callable[[], None] = lambda: None
-        """Called when a batch was added, or the queue was closed."""
+        """Called when a batch was added and `enough_s` wait, or the queue was closed."""
+        self.enough_s = 0.0
 
     @property
     def seconds(self) -> float:
@@ -46,6 +47,11 @@ class Inbox:
     @property
     def bytes(self) -> int:
         return self._bytes
+
+    @property
+    def has_enough(self) -> bool:
+        """Whether batches of `enough_s` wait, and at least one."""
+        return bool(self._batches) and self._seconds >= self.enough_s
 
     @property
     def ended(self) -> bool:
@@ -62,7 +68,9 @@ class Inbox:
                 return False
             self._batches.append(batch)
             self._count(batch, 1)
-        self.listener()
+            enough = self.has_enough
+        if enough:
+            self.listener()
         return True
 
     def _has_room(self, batch: AnyBatch, share: float = 1.0) -> bool:

@@ -216,10 +216,15 @@ class LiveSource(ABC):
         """Call `listener`, in place of the one before, when samples came or the source ended; it returns at once."""
         self._inbox.listener = listener
 
+    def expect(self, samples: int) -> None:
+        """Call the listener only when so many samples wait, unless the sender waits, too."""
+        if self.paced and not self.waits:
+            self._inbox.enough_s = (samples - 0.5) / self.rate_hz
+
     @property
     def has_more(self) -> bool:
-        """Whether samples were received that `stream` has not given."""
-        return bool(self._ready or self._inbox.bytes)
+        """Whether samples were received for which the listener is called, and which `stream` has not given."""
+        return bool(self._ready) or self._inbox.has_enough
 
     def take_events(self) -> list[Event]:
         """Events since the last call, of the kinds in `livebode.sources.live.KINDS`."""
