@@ -11,6 +11,7 @@ import pytest
 
 from livebode.sources.live import LiveBlock
 from livebode.sources.live.datagrams import DatagramReceiver
+from livebode.sources.live.inbox import Inbox
 from tests.support.peers.peer import RATE_HZ, SAMPLES, batches, fed, send_all, until
 from tests.support.peers.plain import TcpPeer
 
@@ -91,3 +92,13 @@ def test_what_arrives_while_an_axis_waits_for_its_turn_is_one_block_of_at_most_a
     assert [len(block) for block in found] == [SAMPLES, 1000, 950]
     assert np.array_equal(np.concatenate([block["w"] for block in found]), np.arange(40 * SAMPLES))
     assert not any(block.gap for block in found)
+
+
+def test_an_axis_hears_of_samples_only_when_enough_wait_for_a_response() -> None:
+    inbox, heard = Inbox(), []
+    inbox.listener = lambda: heard.append(round(inbox.seconds * RATE_HZ))
+    inbox.enough_s = (2.5 * SAMPLES - 0.5) / RATE_HZ
+    for batch in batches(4, first=0):
+        inbox.put(batch, wait=False)
+    inbox.close()
+    assert heard == [3 * SAMPLES, 4 * SAMPLES, 4 * SAMPLES]
