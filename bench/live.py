@@ -221,8 +221,8 @@ def show(name: str, found: dict[str, float], targets: dict[str, bool]) -> None:
         print(f"  target {target}: {'met' if reached else 'missed'}", flush=True)
 
 
-def free_ports(count: int) -> list[int]:
-    links = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+def free_ports(count: int, kind: int = socket.SOCK_DGRAM) -> list[int]:
+    links = [socket.socket(socket.AF_INET, kind) for _ in range(count)]
     for link in links:
         link.bind(("127.0.0.1", 0))
     ports = [int(link.getsockname()[1]) for link in links]

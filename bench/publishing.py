@@ -127,7 +127,7 @@ class Schedule:
 def measure(rounds: int, round_s: float) -> tuple[dict[str, list[float]], int, int]:
     """Latencies in seconds by condition; events that were reported, and those that arrived at both receivers."""
     context = multiprocessing.get_context("spawn")
-    tcp, udp, end, refused = tcp_ports(3), free_ports(AXES), context.Event(), context.Event()
+    tcp, udp, end, refused = free_ports(3, socket.SOCK_STREAM), free_ports(AXES), context.Event(), context.Event()
     pipes = [context.Pipe() for _ in range(2)]
     beside = [context.Process(target=send, args=(udp, end))]
     beside += [context.Process(target=receive, args=(port, refused, pipe[1])) for port, pipe in zip(tcp, pipes)]
@@ -160,14 +160,6 @@ def measure(rounds: int, round_s: float) -> tuple[dict[str, list[float]], int, i
     for process in beside:
         process.join()
     return schedule.latency_s, AXES * schedule.alarms, len(taken[0] & taken[1])
-
-
-def tcp_ports(count: int) -> list[int]:
-    links = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
-    ports = [int(link.getsockname()[1]) for link in links]
-    for link in links:
-        link.close()
-    return ports
 
 
 def main() -> None:

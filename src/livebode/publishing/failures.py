@@ -21,3 +21,13 @@ def unreachable(error: Exception, timeout_s: float) -> PublishError:
         return PublishError("unreachable", "its host name is not known", "check the host in publish.url")
     why = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return PublishError("unreachable", f"no connection: {why}", "check that the receiver runs, and publish.url")
+
+
+def cannot_listen(host: str, port: int, error: OSError) -> PublishError:
+    """The error that a server of ours has no port."""
+    return PublishError(
+        "cannot-listen",
+        f"nothing can listen at {host} port {port}: {error.strerror}",
+        "choose another port in publish.url, or end the program that uses it",
+        port=port,
+    )

@@ -12,10 +12,10 @@ from datetime import UTC, datetime
 from typing import Any
 
 from livebode.configuration.publish_section import PublishSection
-from livebode.core import ConfigError, PublishError
+from livebode.core import ConfigError
 from livebode.core.installing import not_installed
 from livebode.publishing import secrets
-from livebode.publishing.failures import unreachable
+from livebode.publishing.failures import cannot_listen, unreachable
 from livebode.publishing.messages import AxisValues, EventMessage, Measurement
 from livebode.publishing.secrets import address, server_tls
 
@@ -213,12 +213,7 @@ def _check_free(host: str, port: int) -> None:
         with socket.create_server((host, port)):
             pass
     except OSError as error:
-        raise PublishError(
-            "cannot-listen",
-            f"nothing can listen at {host} port {port}: {error.strerror}",
-            "choose another port in publish.url, or end the program that uses it",
-            port=port,
-        ) from None
+        raise cannot_listen(host, port, error) from None
 
 
 class _Users:

@@ -10,8 +10,8 @@ from wsgiref.simple_server import WSGIServer
 import numpy as np
 
 from livebode.configuration.publish_section import PublishSection
-from livebode.core import PublishError
 from livebode.core.installing import not_installed
+from livebode.publishing.failures import cannot_listen
 from livebode.publishing.messages import AxisValues, EventMessage
 from livebode.publishing.secrets import address, server_tls
 from livebode.version import __version__
@@ -83,12 +83,7 @@ class PrometheusSink:
         try:
             server = make_server(host, port, make_wsgi_app(registry), ThreadingWSGIServer, _SilentHandler)
         except OSError as error:
-            raise PublishError(
-                "cannot-listen",
-                f"nothing can listen at {host} port {port}: {error.strerror}",
-                "choose another port in publish.url, or end the program that uses it",
-                port=port,
-            ) from None
+            raise cannot_listen(host, port, error) from None
         if (context := server_tls(self._section)) is not None:
             server.socket = context.wrap_socket(server.socket, server_side=True)
         self._thread = threading.Thread(target=server.serve_forever, args=(0.2,), name="livebode metrics", daemon=True)
