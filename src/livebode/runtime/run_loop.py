@@ -10,8 +10,6 @@ from math import gcd, nan
 from pathlib import Path
 from typing import Any, Protocol, Self
 
-import numpy as np
-
 from livebode.analysis.overview import LIVE_VALUES_MAX, Overview
 from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel, Event, LivebodeError, Parameters, Responses, SignalError
@@ -20,6 +18,7 @@ from livebode.fitting import Fit
 from livebode.preparation.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.runtime import summary
 from livebode.runtime.ahead import LossesAhead
+from livebode.runtime.allocation import keep_freed_memory
 from livebode.runtime.between_event import between_events
 from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition
@@ -119,7 +118,7 @@ class RunLoop:
         recorded: Callable[[float], dict[str, Any]] | None = None,
         **delivery: Any,
     ) -> None:
-        _keep_freed_memory()
+        keep_freed_memory()
         self.source, self.pipeline, self.to = source, pipeline, to
         self._control, self._position, self._previous = control or RunControl(), position, previous
         self._live = isinstance(source, LiveSource)
@@ -505,12 +504,6 @@ class RunLoop:
             position=self._position,
             previous=self._previous,
         )
-
-
-def _keep_freed_memory() -> None:
-    # glibc returns the memory of freed arrays, and requests it again page by page for the next block: a third of the
-    # tracker's time. After an array of this size was freed, glibc retains the memory of smaller ones.
-    np.empty(31 << 20, dtype=np.uint8)
 
 
 def _schedule_label(source: Source, name: str | None) -> str:
