@@ -12,7 +12,7 @@ LATER_PYTHON ?= $(or $(lastword $(sort $(wildcard $(HOME)/.pyenv/versions/3.1[2-
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest publishing peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest publishing outage peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -121,6 +121,9 @@ profiles: $(BUILT) $(WHEELS)/.installed  ## install each profile of the wheel in
 
 lowest: $(BUILT) $(WHEELS)/.installed  ## tests with the lowest versions that pyproject.toml permits (20 min)
 	PATH="$(abspath $(BIN)):$(abspath $(WHEELS)/bin):$$PATH" $(BIN)/python -m tools.lowest
+
+outage: $(BUILT)  ## receivers of [[publish]] that are down for an hour: what arrives afterwards, and memory (1 h)
+	$(BIN)/python -m studies.receivers_down
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/explanation/peers.md)
 	$(BIN)/python -m studies.peers

@@ -9,10 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import trustme
 from asyncua import Client, ua
+from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
 
 import livebode
-from livebode.core import Event
+from livebode.core import ConfigError, Event
+from tests.support.certificates import certified
 from tests.support.peers.peer import PATIENCE_S
 from tests.support.receivers import PublishedAxis, free_port
 
@@ -121,3 +124,38 @@ def test_only_the_user_with_the_password_is_let_in_as_soon_as_the_port_is_free(t
     with PublishedAxis(tmp_path, {"kind": "opcua", "url": url, "interval_s": 0.1} | login) as axis:
         axis.measure()
         asyncio.run(tries())
+
+
+def test_with_a_certificate_only_encrypted_connections_are_taken(tmp_path: Path) -> None:
+    files = certified(tmp_path / "tls", trustme.CA(), trustme.KeyType.RSA)
+    url = f"opc.tcp://127.0.0.1:{free_port()}"
+    section = {"kind": "opcua", "url": url, "interval_s": 0.1}
+    section |= {"certificate_file": str(files["certificate"]), "key_file": str(files["key"])}
+
+    async def encrypted() -> Client:
+        client = Client(url, timeout=10)
+        own = str(files["certificate"]), str(files["key"]), str(files["certificate"])
+        await client.set_security(SecurityPolicyBasic256Sha256, own[0], own[1], server_certificate=own[2])
+        await client.connect()
+        return client
+
+    async def tries() -> float:
+        client = await happened(encrypted)
+        keff = await happened(lambda: client.nodes.root.get_child([*AXIS, "2:Parameters", "2:Keff"]))
+        value = await keff.read_value()
+        await client.disconnect()
+        with pytest.raises(ua.UaError):
+            await connected(url)
+        return float(value)
+
+    with PublishedAxis(tmp_path, section) as axis:
+        axis.measure()
+        found = asyncio.run(tries())
+    assert found == livebode.Fitter("two-mass").process(livebode.example_responses()[-2:])["Keff"][-1]
+
+
+def test_a_certificate_with_another_kind_of_key_is_refused_at_the_start(tmp_path: Path) -> None:
+    files = certified(tmp_path / "tls", trustme.CA())
+    section = {"kind": "opcua", "url": "opc.tcp://127.0.0.1:4840", "certificate_file": str(files["certificate"])}
+    with pytest.raises(ConfigError, match="is not one of RSA, which Basic256Sha256 of OPC UA requires"):
+        PublishedAxis(tmp_path, section | {"key_file": str(files["key"])})

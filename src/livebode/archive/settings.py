@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 from urllib.parse import urlsplit
@@ -16,6 +15,7 @@ from livebode.configuration.schema import Schema, schema_of
 from livebode.configuration.section import File
 from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.core import ConfigError, nearest_name
+from livebode.core.loopback import on_loopback
 
 Text = Annotated[str, Field(min_length=1)]
 
@@ -67,7 +67,9 @@ class ClusterSection(_Section):
 
     def checked(self) -> None:
         """ConfigError if others could send it code: a port of Dask executes what it receives."""
-        remote = self.kind != "local" if self.address is None else not _on_loopback(self.address)
+        remote = (
+            self.kind != "local" if self.address is None else not on_loopback(urlsplit(self.address).hostname or "")
+        )
         if remote and (not self.encrypted or (self.address or "tls://").split("://")[0] != "tls"):
             raise ConfigError(
                 "cluster-open",
@@ -224,14 +226,6 @@ def lake_url(target: str) -> str:
 
 def _beside(folder: Path, place: str) -> str:
     return place if "://" in place else str(folder / place)
-
-
-def _on_loopback(address: str) -> bool:
-    host = urlsplit(address).hostname or ""
-    try:
-        return host == "localhost" or ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def _first_of(error: ValidationError) -> ConfigError:

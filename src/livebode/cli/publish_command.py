@@ -26,6 +26,7 @@ def publish_command(
     One line for each [[publish]] section: with --test the result, else what is sent. Exit code 2 if a test failed.
     """
     from livebode.configuration import ConfigurationFile
+    from livebode.publishing.exposure import exposure
     from livebode.publishing.publisher import sections_of
     from livebode.records import to_json
 
@@ -40,9 +41,12 @@ def publish_command(
     results: list[dict[str, Any]] = []
     for label, section in sections.items():
         found = _tested(section) if test else {"sentence": _description(section)}
+        if (shown := exposure(section)) is not None:
+            found["exposure"] = shown
         results.append({"name": label, "kind": section.kind} | found)
         if not as_json:
-            print(f"{label}: {found['sentence']}", flush=True)
+            for sentence in (found["sentence"], *([shown] if shown else [])):
+                print(f"{label}: {sentence}", flush=True)
     if as_json:
         print(to_json({"receivers": results}))
     if any("error" in result for result in results):

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from urllib.parse import quote
 
 from livebode.core.errors import FleetError
+from livebode.core.loopback import on_loopback
 from livebode.fleet.page_status import NAMES, VIEW
-from livebode.fleet.settings import FleetSettings, ServerSection, UsersSection, on_loopback
+from livebode.fleet.settings import FleetSettings, ServerSection, UsersSection
 from livebode.fleet.subjects import ACTS_STREAM, API, EDGE, STATUS_STREAM, VIEW_API, axis_path
 from livebode.sources.live.framing import FRAME_BYTES_MAX
 

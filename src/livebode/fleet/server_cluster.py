@@ -6,7 +6,8 @@ import json
 from dataclasses import dataclass
 
 from livebode.core.errors import FleetError
-from livebode.fleet.settings import FleetSettings, ServerSection, on_loopback
+from livebode.core.loopback import on_loopback
+from livebode.fleet.settings import FleetSettings, ServerSection
 
 
 @dataclass(frozen=True)

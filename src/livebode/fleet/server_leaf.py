@@ -7,8 +7,9 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from livebode.core.errors import FleetError
+from livebode.core.loopback import on_loopback
 from livebode.fleet.server_config import PAYLOAD_BYTES_MAX
-from livebode.fleet.settings import FleetSettings, LeafSection, ServerSection, on_loopback
+from livebode.fleet.settings import FleetSettings, LeafSection, ServerSection
 
 _SITE = "SITE"
 _RECONNECT_S = 1

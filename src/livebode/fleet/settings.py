@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from glob import glob
-from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 from urllib.parse import urlsplit
@@ -17,6 +16,7 @@ from livebode.configuration.section import File
 from livebode.configuration.toml_file import one_line, read_table
 from livebode.core import ConfigError
 from livebode.core.errors import FleetError
+from livebode.core.loopback import on_loopback
 from livebode.fleet.subjects import axis_key
 from livebode.locations import location
 
@@ -324,14 +324,6 @@ def machine_key(axis: Axis, origin: str) -> str:
             key="machine",
         ).at(origin)
     return axis_key(axis.machine)
-
-
-def on_loopback(host: str) -> bool:
-    """Whether this name or address is this computer's own."""
-    try:
-        return host == "localhost" or ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def _beside(section: AnySection, folder: Path, *names: str) -> AnySection:

@@ -10,6 +10,7 @@ from email.utils import formatdate
 
 from livebode.configuration.publish_section import PublishSection
 from livebode.core import PublishError
+from livebode.core.loopback import on_loopback
 from livebode.publishing.failures import unreachable
 from livebode.publishing.messages import AxisValues, EventMessage
 from livebode.publishing.secrets import address, client_tls, password
@@ -83,7 +84,7 @@ class MailSink:
         if server.has_extn("starttls"):
             server.starttls(context=context)
             server.ehlo()
-        elif host not in ("localhost", "127.0.0.1", "::1") or password(self._section) is not None:
+        elif not on_loopback(host) or password(self._section) is not None:
             raise PublishError(
                 "refused", "the server offers no STARTTLS", "use a port with TLS: smtps://host:465, or another server"
             )

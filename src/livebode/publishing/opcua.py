@@ -9,6 +9,7 @@ import socket
 import threading
 from collections.abc import Callable, Coroutine, Sequence
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 from livebode.configuration.publish_section import PublishSection
@@ -47,6 +48,8 @@ class OpcUaSink:
         self._ua: Any = asyncua.ua
         self._section = section
         address(section), server_tls(section)
+        if section.key_file is not None:
+            _check_rsa(section.key_file)
         if (secrets.password(section) is None) != (section.username is None):
             raise ConfigError(
                 "incomplete",
@@ -205,6 +208,21 @@ class OpcUaSink:
             # Most clients subscribe at the object of the server; the library passes an event to one object only.
             of.emitting_node = ua.NodeId(ua.ObjectIds.Server)
             await generator.isession.subscription_service.trigger_event(of, subscription_id=None)
+
+
+def _check_rsa(path: Path) -> None:
+    """ConfigError for another kind of key, with which the library would fail at each connection."""
+    from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    if not isinstance(load_pem_private_key(path.read_bytes(), None), RSAPrivateKey):
+        raise ConfigError(
+            "file-unusable",
+            f"the key {path} is not one of RSA, which Basic256Sha256 of OPC UA requires",
+            "make certificate and key with RSA of 2048 bits or more",
+            key="publish.key_file",
+            path=str(path),
+        )
 
 
 def _check_free(host: str, port: int) -> None:

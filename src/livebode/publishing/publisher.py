@@ -11,6 +11,7 @@ from livebode.configuration.axis import Axis
 from livebode.configuration.publish_section import PublishSection
 from livebode.core import ConfigError
 from livebode.publishing.delivery import DeliveryThread
+from livebode.publishing.exposure import exposure
 from livebode.publishing.feed import AxisFeed
 from livebode.publishing.outbox import Outbox
 from livebode.publishing.sink import SinkConnection, open_sink
@@ -105,6 +106,8 @@ class Publisher:
             delivery.feeds = tuple(feed for name, feed in self._feeds.items() if delivery in feed.receivers)
         for label in new:
             self._deliveries[label].start()
+            if (shown := exposure(sections[label])) is not None:
+                self._say(f"{label}: {shown}")
 
     def _wake(self, labels: set[str]) -> None:
         for label, delivery in list(self._deliveries.items()):
