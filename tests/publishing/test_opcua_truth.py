@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import socket
 import time
+from datetime import UTC
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +71,14 @@ async def read(url: str, axis: PublishedAxis) -> dict[str, Any]:
             await place.write_value(0.0)
         with pytest.raises(ua.UaStatusCodeError):
             await client.nodes.objects.add_object(2, "foreign")
+        result = [*AXIS, "3:ResultManagement", "3:Results", "3:Newest"]
+        newest = await client.nodes.root.get_child(result)
+        found["types"] = [await newest.read_type_definition()]
+        found["types"].append(await (await client.nodes.root.get_child(result[:-2])).read_type_definition())
+        for name in ("ResultContent", "ResultMetaData/ResultId", "ResultMetaData/CreationTime"):
+            place = await newest.get_child([f"3:{part}" for part in name.split("/")])
+            found[name.split("/")[-1]] = await place.read_value()
+        found["namespace"] = (await client.get_namespace_array())[3]
         events = Events()
         subscription = await client.create_subscription(50, events)
         types = [ua.ObjectIds.BaseEventType, ua.ObjectIds.OffNormalAlarmType]
@@ -96,6 +106,13 @@ def test_a_client_reads_parameters_with_units_and_is_told_of_alarms(tmp_path: Pa
     assert found["Bound"] == fits.bound(0.95)[-1, fits.index("Keff")]
     assert found["EngineeringUnits"].DisplayName.Text == "N m/rad"
     assert found["frequency_hz"] == [float(f) for f in range(20, 141, 10)]
+    assert found["namespace"] == "http://opcfoundation.org/UA/Machinery/Result/"
+    assert found["types"] == [ua.NodeId(2001, 3), ua.NodeId(1004, 3)]
+    (content,) = map(json.loads, found["ResultContent"])
+    assert {one["name"]: one["value"] for one in content["measurements"]}["Keff"] == fits["Keff"][-1]
+    assert content["response"]["frequency_hz"] == found["frequency_hz"]
+    assert found["ResultId"] == f"x run {content['time']}"
+    assert found["CreationTime"].replace(tzinfo=UTC).timestamp() == pytest.approx(content["unix_s"], abs=1e-3)
     alarm, ended, event = found["events"]
     assert [one.Message.Text for one in found["events"]] == ["stiffness -2.0 % (no. 3)", "as before", "no fit"]
     assert [one.Severity for one in found["events"]] == [900, 900, 100]

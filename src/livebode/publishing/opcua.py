@@ -18,6 +18,7 @@ from livebode.core.installing import not_installed
 from livebode.publishing import secrets
 from livebode.publishing.failures import cannot_listen, unreachable
 from livebode.publishing.messages import AxisValues, EventMessage, Measurement
+from livebode.publishing.opcua_result import NewestResult, ResultTypes
 from livebode.publishing.secrets import address, server_tls
 
 NAMESPACE = "urn:livebode:results"
@@ -61,6 +62,7 @@ class OpcUaSink:
         self._thread: threading.Thread | None = None
         self._server: Any = None
         self._axes: dict[str, Any] = {}
+        self._results: dict[str, NewestResult] = {}
         self._variables: dict[tuple[str, ...], Any] = {}
 
     def send_events(self, events: Sequence[EventMessage]) -> None:
@@ -118,6 +120,8 @@ class OpcUaSink:
         await server.start()
         self._server, self._index = server, index
         self._root = await server.nodes.objects.add_object(index, "livebode")
+        self._types = ResultTypes(self._ua, server)
+        await self._types.add()
 
     async def _stop(self) -> None:
         await self._server.stop()
@@ -143,6 +147,13 @@ class OpcUaSink:
             for name in ("frequency_hz", "real", "imag", "sigma", "coherence") if one.response else ():
                 column = (one.response or {})[name]
                 await self._set(one, ("Response", name), [float("nan") if v is None else float(v) for v in column])
+            await self._set_result(one)
+
+    async def _set_result(self, values: AxisValues) -> None:
+        if values.axis not in self._results:
+            axis = await self._axis(values.axis)
+            self._results[values.axis] = await self._types.managed(axis, "Newest")
+        await self._results[values.axis].set(values)
 
     async def _set_measurement(self, values: AxisValues, measured: Measurement) -> None:
         path = ("Parameters", measured.name)
