@@ -1,4 +1,4 @@
-"""Chromium without a window, as Debian has it, and a page that keeps what went wrong in it."""
+"""Chromium that has no windows, as Debian has it, and a page that keeps what went wrong in it."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ def chromium() -> Iterator[Browser]:
     processor. Between the tests that use it, Playwright's event loop is not the running one of the thread, so that
     another test may have one.
     """
-    path = shutil.which("chromium")
+    # The same engine without the program around it, which takes a third more of the processor.
+    path = shutil.which("chromium-headless-shell")
     if path is None:
-        message = "chromium is not installed: `make system-packages` installs it"
+        message = "chromium-headless-shell is not installed: `make system-packages` installs it"
         pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
     before = asyncio._get_running_loop()
     if not _started:
