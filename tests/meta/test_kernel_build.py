@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.peers.peer import PATIENCE_S
+
 ROOT = Path(__file__).parents[2]
 KERNEL = ROOT / "kernel"
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror"]
@@ -84,7 +86,7 @@ def build_once(name: str, tmp_path_factory: pytest.TempPathFactory) -> Built:
     try:
         directory.mkdir()
     except FileExistsError:
-        deadline = time.monotonic() + 120
+        deadline = time.monotonic() + PATIENCE_S
         while not done.exists():
             assert time.monotonic() < deadline, f"the other process did not build {directory}"
             time.sleep(0.1)

@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_playwright
 
+from tests.support.peers.peer import PATIENCE_S
+
 DESK = {"width": 1440, "height": 900}
 TABLET = {"width": 768, "height": 1024}
 
@@ -74,6 +76,7 @@ class Tab:
         self.wrong: list[str] = []
         self.url = url
         self.context: BrowserContext = browser.new_context(**({"viewport": DESK} | options))
+        self.context.set_default_timeout(1000 * PATIENCE_S)
         self.context.add_init_script(
             "addEventListener('securitypolicyviolation', (e) => console.error('CSP', e.violatedDirective))"
         )
@@ -122,7 +125,7 @@ class Tab:
             self.wrong.append(f"a request went to {request.url}")
 
 
-def until(true: Callable[[], bool], what: str, patience_s: float = 30.0) -> None:
+def until(true: Callable[[], bool], what: str, patience_s: float = PATIENCE_S) -> None:
     """Wait for something in this process."""
     end = time.monotonic() + patience_s
     while not true():
