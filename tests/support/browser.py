@@ -42,7 +42,8 @@ def chromium() -> Iterator[Browser]:
     if not _started:
         playwright = sync_playwright().start()
         # The server is alone on its page: a new page needs no process apart, held ready for the next site.
-        arguments = ["--disable-site-isolation-trials"]
+        # And its process is the one in which the empty page was.
+        arguments = ["--disable-site-isolation-trials", "--renderer-process-limit=1"]
         # Its sandbox does not start for root.
         arguments += ["--no-sandbox"] * (os.geteuid() == 0)
         browser = playwright.chromium.launch(executable_path=path, args=arguments)
