@@ -8,7 +8,7 @@ import random
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,8 @@ from livebode.fleet.status import fleet_status, status_of
 from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS, key_of
 
 PARTITIONS, WORKERS = 4, 2
-_BUFFER_BYTES = 100_000
+_BUFFER_BYTES, _SMALL_BUFFER_BYTES = 1 << 30, 100_000
+"""Of an axis: more than a round sends, and what a log that is stopped for half a minute fills."""
 _REPEATED = 100
 """Messages of the log that are sent again."""
 _SWAPPED = 5
@@ -70,16 +71,18 @@ class FaultyMachines(SimulatedMachines):
 class FaultyFleet:
     """A fleet in a directory; a context manager. Several faults may happen at once, each in a thread.
 
-    As a service manager does, it restarts the coordinator if that ends by itself.
+    As a service manager does, it restarts the coordinator if that ends by itself. Only a fleet that is disturbed by
+    `buffer` has small buffers: in others they never drop a message, however long the log is away on a busy computer.
     """
 
-    def __init__(self, folder: Path, axes: int, rng: random.Random) -> None:
+    def __init__(self, folder: Path, axes: int, kinds: Collection[str], rng: random.Random) -> None:
         self._rng = rng
         self._server = LogServer(folder / "log", PARTITIONS)
         self._path = write_simulated_fleet(folder, self._server.url, axes=axes, partitions=PARTITIONS, workers=WORKERS)
         self._settings = FleetSettings.read(self._path)
         self._axes = self._settings.read_axes()
-        self._machines = FaultyMachines(self._settings, _BUFFER_BYTES)
+        buffer_bytes = _SMALL_BUFFER_BYTES if "buffer" in kinds else _BUFFER_BYTES
+        self._machines = FaultyMachines(self._settings, buffer_bytes)
         self._output = (folder / "fleet.log").open("ab")
         self._serving, self._coordinating, self._choosing = threading.Lock(), threading.Lock(), threading.Lock()
         self._frozen: set[psutil.Process] = set()
@@ -90,7 +93,7 @@ class FaultyFleet:
         self._start()
         self._running = contextlib.ExitStack()
         self._running.enter_context(self._machines)
-        self.recovered()
+        self.settled()
         return self
 
     def __exit__(self, *_: object) -> None:

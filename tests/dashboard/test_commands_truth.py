@@ -22,6 +22,7 @@ from tests.support.browser import Tab, chromium, until
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.dashboards import Watched
 from tests.support.demonstrated import already_learned, shown
+from tests.support.peers.peer import PATIENCE_S
 
 
 @contextmanager
@@ -50,7 +51,7 @@ def started(folder: Path, *arguments: object, before: str = "") -> Iterator[tupl
         yield process, found.group(1)
     finally:
         process.send_signal(signal.SIGINT)
-        assert process.wait(60) in (0, 130), log.read_text()
+        assert process.wait(PATIENCE_S) in (0, 130), log.read_text()
         assert "Traceback" not in log.read_text(), log.read_text()
 
 
@@ -65,7 +66,7 @@ def test_the_demo_is_served_by_default_during_its_run_and_ends_by_itself(tmp_pat
             first = tab.js("bode.curves.measured.frame.timeS[0]")
             tab.until(f"bode.curves.measured.frame.timeS[0] > {first} + 0.5")
             assert tab.wrong == []
-        assert process.wait(60) == 0
+        assert process.wait(PATIENCE_S) == 0
     assert "stiffness is 1" in (tmp_path / "log.txt").read_text()
 
 

@@ -68,7 +68,10 @@ def test_every_tile_shows_the_state_of_its_axis(browser: Browser, served: tuple[
 _PIXELS = """(() => {
   const visible = [...tiles.shown].slice(0, 300), ok = visible.findIndex((a) => feed.looks[a] === 1),
     other = visible.findIndex((a) => feed.looks[a] > 1), side = tiles.size.height, { width, height } = tiles.canvas;
-  const { data } = tiles.ctx.getImageData(0, 0, width, height);
+  // Of a copy, in memory: Chromium complains if what is drawn for the screen is read back again and again.
+  const copy = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true });
+  copy.drawImage(tiles.canvas, 0, 0);
+  const { data } = copy.getImageData(0, 0, width, height);
   const picture = (place) => {
     const { x, y } = tiles.box(place), rows = [];
     for (let row = y; row < y + side; row++) rows.push(data.slice(4 * (row * width + x), 4 * (row * width + x + side)));

@@ -27,6 +27,7 @@ from tests.support.axe import violations, with_axe
 from tests.support.browser import Tab
 from tests.support.fleet_pages import fleet_page
 from tests.support.guarded import TOKEN, VIEWER
+from tests.support.peers.peer import PATIENCE_S
 from tools.fleet_year import LOST_A_MONTH, write_year
 
 STIFFNESS = 1.3e6
@@ -68,7 +69,7 @@ class Page:
 
     def trend(self, axis: str, quantity: str = "", token: str = VIEWER) -> tuple[int, Any]:
         """Status and answer."""
-        connection = HTTPConnection("127.0.0.1", urlsplit(self.dashboard.url).port or 0, timeout=20)
+        connection = HTTPConnection("127.0.0.1", urlsplit(self.dashboard.url).port or 0, timeout=PATIENCE_S)
         headers = {"authorization": f"Bearer {token}"}
         connection.request("GET", f"/api/trend?axis={quote(axis)}&quantity={quote(quantity)}", headers=headers)
         answer = connection.getresponse()

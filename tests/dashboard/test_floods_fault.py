@@ -26,6 +26,7 @@ from tests.support.browser import until
 from tests.support.dashboards import Watched
 from tests.support.guarded import TOKEN, answer, ask, closed, cookie, guarded, origin, port_of
 from tests.support.peers.certificates import Authority
+from tests.support.peers.peer import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -121,9 +122,9 @@ def test_a_client_that_does_not_read_delays_no_other(watched: Watched) -> None:
             for samples in range(6200, 10_001, 200):
                 watched.go(samples)
             seen = 0
-            until(lambda: bool(live.recv(timeout=20)), "news")
+            until(lambda: bool(live.recv(timeout=PATIENCE_S)), "news")
             for _ in range(40):
-                seen += isinstance(live.recv(timeout=20), bytes)
+                seen += isinstance(live.recv(timeout=PATIENCE_S), bytes)
                 if seen > 2:
                     break
             assert seen > 2
@@ -178,7 +179,7 @@ def test_a_web_socket_that_its_browser_is_closing_ends_with_the_dashboard(tmp_pa
         dashboard.hub("axis")
         host = dashboard.url.removeprefix("https://").rstrip("/")
         address = ("127.0.0.1", int(host.rpartition(":")[2]))
-        browser = trust.wrap_socket(socket.create_connection(address, timeout=20), server_hostname="127.0.0.1")
+        browser = trust.wrap_socket(socket.create_connection(address, timeout=PATIENCE_S), server_hostname="127.0.0.1")
         browser.sendall(
             f"GET /live HTTP/1.1\r\nHost: {host}\r\nOrigin: https://{host}\r\nUpgrade: websocket\r\n"
             "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
@@ -199,7 +200,7 @@ def test_a_body_that_does_not_come_is_not_waited_for(
     monkeypatch.setattr(patience, "REQUEST_S", 0.2)
     host = f"127.0.0.1:{port_of(watched)}"
     head = f"POST /login HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nContent-Length: 100\r\n\r\n{{"
-    with socket.create_connection(("127.0.0.1", port_of(watched)), timeout=20) as slow:
+    with socket.create_connection(("127.0.0.1", port_of(watched)), timeout=PATIENCE_S) as slow:
         slow.sendall(head.encode())
         assert slow.recv(100) == b""
     assert "internal error" not in " ".join(watched.messages)

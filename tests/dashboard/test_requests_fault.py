@@ -21,6 +21,7 @@ from livebode.core import LivebodeError
 from livebode.dashboard import Dashboard, Serving, queries
 from livebode.dashboard.alarm_requests import alarm_request
 from tests.support.dashboards import Watched
+from tests.support.peers.peer import PATIENCE_S
 
 CASES = int(os.environ.get("LIVEBODE_DASHBOARD_FUZZ", "4000"))
 _WORDS = [
@@ -191,7 +192,7 @@ def head(rng: random.Random, port: int) -> bytes:
 def test_random_requests_do_not_stop_the_server(watched: Watched, capfd: pytest.CaptureFixture[str]) -> None:
     rng, port, statuses = random.Random(4), port_of(watched), {}
     for _ in range(min(CASES, 20_000) // 10):
-        with socket.create_connection(("127.0.0.1", port), timeout=20) as one:
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as one:
             one.sendall(head(rng, port))
             one.shutdown(socket.SHUT_WR)
             with contextlib.suppress(OSError):

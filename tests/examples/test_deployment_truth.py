@@ -21,7 +21,7 @@ from livebode.dashboard import Serving
 from tests.support.dashboards import Watched
 from tests.support.guarded import TOKEN, port_of
 from tests.support.peers.certificates import Authority
-from tests.support.peers.peer import free_port, program, until
+from tests.support.peers.peer import PATIENCE_S, free_port, program, until
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "examples/deploy"
@@ -94,6 +94,6 @@ def test_the_dashboard_works_behind_nginx_with_a_secure_cookie_and_without_other
             assert b"<!doctype html>" in answer.read().lower()
         live = f"wss://127.0.0.1:{port}/live"
         with connect(live, ssl=trust, origin=base, additional_headers=cookies) as link:
-            assert link.recv(timeout=30)
+            assert link.recv(timeout=PATIENCE_S)
         with pytest.raises(InvalidStatus, match="403"):
             connect(live, ssl=trust, origin="https://elsewhere.example", additional_headers=cookies)

@@ -20,6 +20,7 @@ from livebode.sources.live.spectra_batch import SpectraBatch
 from tests.support.command import livebode, write_parquet
 from tests.support.live_runs import started, table
 from tests.support.peers.peer import PATIENCE_S, free_port
+from tests.support.peers.plain import wait_read
 from tests.support.targets import need_tools
 from tools.firmware import M4F, ROOT, run
 
@@ -191,6 +192,7 @@ def live_run(program: Path, folder: Path) -> dict[str, np.ndarray]:
     try:
         with started(folder / "axis.toml", folder / "live") as process:
             assert machine.wait(PATIENCE_S) == 0
+            wait_read(f"tcp://127.0.0.1:{port}")
             with pytest.raises(subprocess.TimeoutExpired):
                 process.wait(2.5)
             process.send_signal(signal.SIGINT)

@@ -32,6 +32,7 @@ from tests.support.fleet_runs import (
     start_owner,
     stored_responses,
 )
+from tests.support.peers.peer import PATIENCE_S
 
 RESPONSES = 2  # of a batch, at a hop of half its samples
 
@@ -113,7 +114,7 @@ def _owner(settings: LogSection, axes: dict[str, Axis], kind: type[PartitionOwne
 
 
 def _until(count: Callable[[], int], *, at_least: int) -> int:
-    until = time.monotonic() + 30
+    until = time.monotonic() + PATIENCE_S
     while (found := count()) < at_least:
         assert time.monotonic() < until, f"{found} instead of {at_least}"
         time.sleep(0.2)

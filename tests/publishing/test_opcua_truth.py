@@ -50,7 +50,7 @@ async def happened(what: Any) -> Any:
 
 
 async def connected(url: str, **login: str) -> Client:
-    client = Client(url, timeout=10)
+    client = Client(url, timeout=PATIENCE_S)
     if login:
         client.set_user(login["user"])
         client.set_password(login["password"])

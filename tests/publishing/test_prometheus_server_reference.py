@@ -16,7 +16,7 @@ import pytest
 
 from livebode.publishing.messages import AlarmNow, AxisValues, Measurement
 from livebode.publishing.prometheus import metrics
-from tests.support.peers.peer import program
+from tests.support.peers.peer import PATIENCE_S, program
 from tests.support.receivers import HttpReceiver, PublishedAxis, free_port, until
 
 FILES = Path(__file__).parents[2] / "examples" / "prometheus"
@@ -132,7 +132,9 @@ def test_an_alarm_of_an_axis_reaches_the_receiver_of_alertmanager(tmp_path: Path
             axis.change(-2.0)
             alerts = until(lambda: receiver.posted and json.loads(receiver.posted[0][2]), "the alert")
             query = urllib.parse.urlencode({"query": 'livebode_parameter{name="Keff"}'})
-            with urllib.request.urlopen(f"http://{address['prometheus']}/api/v1/query?{query}", timeout=10) as answer:
+            with urllib.request.urlopen(
+                f"http://{address['prometheus']}/api/v1/query?{query}", timeout=PATIENCE_S
+            ) as answer:
                 (result,) = json.load(answer)["data"]["result"]
     (alert,) = alerts["alerts"]
     assert alert["labels"]["alertname"] == "LivebodeAlarm"

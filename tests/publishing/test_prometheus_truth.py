@@ -15,11 +15,12 @@ from prometheus_client.parser import text_string_to_metric_families
 import livebode
 from livebode.core import Event
 from tests.support.certificates import certified
+from tests.support.peers.peer import PATIENCE_S
 from tests.support.receivers import PublishedAxis, free_port, until
 
 
 def scraped(url: str, tls: ssl.SSLContext | None = None) -> dict[str, list[tuple[dict[str, str], float]]]:
-    with urllib.request.urlopen(url, timeout=10, context=tls) as answer:
+    with urllib.request.urlopen(url, timeout=PATIENCE_S, context=tls) as answer:
         families = list(text_string_to_metric_families(answer.read().decode()))
     found: dict[str, list[tuple[dict[str, str], float]]] = {}
     for family in families:

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from livebode.publishing.messages import EventMessage
 from livebode.publishing.syslog import rfc5424
 from tests.support.certificates import certified
+from tests.support.peers.peer import PATIENCE_S
 from tests.support.receivers import PublishedAxis, free_port, until
 
 _MESSAGE = re.compile(
@@ -94,5 +95,5 @@ def test_by_a_connection_that_breaks_every_event_arrives(tmp_path: Path, scheme:
             if first:
                 axis.change(-2.0, first)
             axis.change(-2.0, first + 1)
-            thread.join(20)
+            thread.join(PATIENCE_S)
     assert [read(message)[2]["sample"] for message in found] == ["0", "1", "2", "3"]

@@ -11,9 +11,8 @@ from livebode.records.segments import disk
 from livebode.records.segments.journal import last_commit
 from livebode.records.segments.phase import Phase
 from livebode.records.segments.writer import Writer
+from tests.support.peers.peer import PATIENCE_S
 from tests.support.recorded import RATE_HZ, check_whole, machine, record_machine
-
-PATIENCE_S = 60.0
 
 
 def test_jobs_of_a_record_are_done_in_order_while_another_record_waits_for_its_disk() -> None:

@@ -11,7 +11,7 @@ from livebode.records import RunRecord
 from livebode.records.grouped_events import each_event
 from livebode.sources.live.inbox import INBOX_S_MAX, Inbox
 from tests.support.live_session import LiveSession, Stuck, hurried
-from tests.support.peers.peer import RATE_HZ, batches, until
+from tests.support.peers.peer import PATIENCE_S, RATE_HZ, batches, until
 from tests.support.peers.plain import TcpPeer
 
 BATCHES = 60
@@ -27,7 +27,7 @@ def test_fits_are_left_out_and_no_sample_is_lost(tmp_path: Path) -> None:
         peer.wait_ready()
         for batch in batches(12, first=0):
             peer.send(batch)
-        assert stuck.held.wait(30)
+        assert stuck.held.wait(PATIENCE_S)
         source = session.control.source
         for batch in hurried(BATCHES, 12 * 50):
             peer.send(batch)

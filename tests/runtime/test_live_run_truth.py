@@ -22,7 +22,7 @@ from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.live_runs import started, table
 from tests.support.live_session import LiveSession
 from tests.support.peers.peer import PATIENCE_S, batches, free_port, until
-from tests.support.peers.plain import TcpPeer
+from tests.support.peers.plain import TcpPeer, wait_read
 from tests.support.small_axis import SMALL_AXIS
 
 CHANNELS = (Channel("w", "A"), Channel("u", "A"), Channel("y", "rad/s"))
@@ -70,6 +70,7 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
         for at, batch in enumerate(sent()):
             if at not in (20, 21):
                 peer._link.sendall(encode_samples(batch, double=True))
+        wait_read(peer.settings["url"])
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(2.0)  # it goes on, for the machine may send more
         process.send_signal(signal.SIGINT)

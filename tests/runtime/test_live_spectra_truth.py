@@ -32,7 +32,7 @@ from tests.support.live_runs import started, table
 from tests.support.monitored import small_baseline
 from tests.support.peers.broker import MqttPeer
 from tests.support.peers.peer import PATIENCE_S, Peer, fed
-from tests.support.peers.plain import TcpPeer, UdpPeer
+from tests.support.peers.plain import TcpPeer, UdpPeer, wait_read
 
 LINES = Lines.parse("20:140:20", rate_hz=4000, window=400)
 SIGNALS = (Channel("velocity", "rad/s"), Channel("u", "N m"), Channel("w", "N m"))
@@ -142,14 +142,15 @@ def run_live(
             for batch in sent:
                 peer.send(batch)
                 time.sleep(pause_s)
-            out = ended(process)
+            out = ended(process, peer)
     return json.loads(out), folder / name
 
 
-def ended(process: Command, message: bytes = b"") -> bytes:
+def ended(process: Command, peer: Peer, message: bytes = b"") -> bytes:
     """Its output after Ctrl-C, sent when it has read everything; `message` is how its errors begin."""
+    wait_read(peer.settings["url"])
     with pytest.raises(subprocess.TimeoutExpired):
-        process.wait(2.5)  # it goes on, for the machine may send more
+        process.wait(2.0)  # it goes on, for the machine may send more
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, err[: len(message) or None]) == (0, message)
@@ -209,7 +210,7 @@ def test_a_run_continues_after_lost_frames_and_after_its_end(tmp_path: Path) -> 
         peer.wait_ready()
         for batch in given:
             peer.send(replace(batch, epoch=10))
-        ended(process, b"livebode: the record continues at sample 12000")
+        ended(process, peer, b"livebode: the record continues at sample 12000")
     rows = table(out)
     sample = rows["sample"][:: len(LINES)]
     assert np.all(np.diff(sample) > 0)

@@ -39,7 +39,7 @@ def test_every_sample_is_in_one_of_the_records_and_no_window_is_lost(tmp_path: P
         running.tracked("x", 700)
         running.edit(texts[0])  # by a signal
         running.tracked("x-2", 700)
-        running.file.write_text(texts[1])  # by itself
+        running.write(texts[1])  # by itself
         running.tracked("x-3", 700)
         running.edit(one(machine, SHARED.replace("hop = 20", "hop = 10")))
         running.tracked("x-4", 700)
@@ -104,7 +104,7 @@ def test_an_edit_that_cannot_be_applied_is_refused_once_and_the_run_continues(tm
     with Machine(tmp_path) as machine, Running(tmp_path, one(machine)) as running:
         running.tracked("x", 300)
         for count, (before, after, message) in enumerate(REFUSED, 2):
-            running.file.write_text(one(machine).replace(before, after))
+            running.write(one(machine).replace(before, after))
             until(lambda count=count: len(reported(running.out / "x")) >= count, message)
             assert message in reported(running.out / "x")[-1].message
         at = numbers(running.out / "x").size
@@ -130,10 +130,10 @@ def test_a_silent_axis_holds_up_no_edit_of_the_others(tmp_path: Path) -> None:
         running.edit(one(machine) + FIT + silent)
         running.tracked("x-2", 300)
         running.edit(one(machine) + FIT)
+        running.says("z: the axis was removed and ends")
         running.tracked("x-2", 1500)
         code, out, err = running.end()
     assert code == 0, err
-    assert "z: the axis was removed and ends" in err
     assert json.loads(out)["axes"]["x"]["counts"]["samples"]
 
 

@@ -13,7 +13,7 @@ from livebode.sources.live import Batch
 from livebode.sources.live.inbox import INBOX_BYTES_MAX, INBOX_BYTES_MIN, INBOX_S_MAX, Inbox
 from tests.support.live_session import SIZE, LiveSession, Stuck, hurried
 from tests.support.peers.broker import MqttPeer
-from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer, batches, until
+from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, Peer, batches, until
 from tests.support.peers.plain import TcpPeer, UdpPeer
 
 BATCHES = 400
@@ -33,7 +33,7 @@ def test_samples_that_exceed_the_queue_become_a_gap_and_memory_is_bounded(tmp_pa
         peer.wait_ready()
         for batch in batches(12, first=0):
             peer.send(batch)
-        assert stuck.held.wait(30)
+        assert stuck.held.wait(PATIENCE_S)
         before, source = rss_bytes(), session.control.source
         for batch in hurried(BATCHES, 12 * 50):
             peer.send(batch)

@@ -188,20 +188,27 @@ def test_a_sender_that_starts_again_is_a_restart(peer):
 
 
 def test_stop_ends_the_blocks_and_a_misspelt_channel_is_named(peer):
-    given = batches(60)
+    given, sent = batches(60), threading.Event()
 
     def script() -> None:
         peer.wait_ready()
         send_all(peer, given)
+        sent.set()
+
+    def stop() -> None:
+        sent.wait(PATIENCE_S)  # before, a sender would lose its receiver
+        source.stop()
 
     with fed(peer, script) as source:
         with pytest.raises(SourceError) as caught:
             source.blocks(["W"])
         assert (caught.value.code, caught.value.channel) == ("source.channel-unknown", "W")
         assert caught.value.remedy.startswith("did you mean 'w'?")
-        threading.Timer(0.2, source.stop).start()
+        stopping = threading.Thread(target=stop)
+        stopping.start()
         for block in source.blocks(["y"]):
             assert block.names == ("y",)
+        stopping.join()
 
 
 def test_a_silent_source_is_refused_after_its_timeout(peer):

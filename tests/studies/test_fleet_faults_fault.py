@@ -39,7 +39,15 @@ def test_recorded_rounds_are_not_repeated_and_count(tmp_path: Path) -> None:
         next(campaign(ROUND, axes=2, kinds=["kill"], seed=2, at_once=1, alone=False, record=record))
 
 
-@pytest.mark.parametrize("wrong", [{"check": {"doubled": 1}}, {"dropped": 5}, {"failure": "a partition is behind"}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"check": {"doubled": 1}},
+        {"dropped": 5},
+        {"dropped": 5, "lost": 5},  # where no fault fills a buffer
+        {"failure": "a partition is behind"},
+    ],
+)
 def test_a_doubled_response_an_uncounted_loss_or_a_round_without_an_end_is_not_exact(wrong: dict[str, object]) -> None:
     good = RoundResult(1, 2, {"kill": 2})
     assert Campaign([good]).exact

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 import psutil
 
+from tests.support.peers.peer import PATIENCE_S
+
 PROGRAM = str(Path(sys.executable).with_name("livebode"))
-_LOOK_S, _LONGEST_S = 0.02, 180.0
+_LOOK_S = 0.02
 _WITHOUT_WORKERS = "has had no worker"
 
 
@@ -56,7 +58,7 @@ def run_with_kills(archive: Path, lake: Path, kills: Sequence[str], rng: np.rand
             done.append(victim)
     while True:
         try:
-            out, err = process.communicate(timeout=_LONGEST_S)
+            out, err = process.communicate(timeout=PATIENCE_S)
         except subprocess.TimeoutExpired:
             process = _restarted(process, archive)
             continue
@@ -69,7 +71,7 @@ def run_with_kills(archive: Path, lake: Path, kills: Sequence[str], rng: np.rand
 def _wrote(process: subprocess.Popen[str], lake: Path, more: int) -> bool:
     """Wait for more results, or the end; whether one of them came."""
     wanted = len(list((lake / "responses").glob("*.parquet"))) + more
-    limit_s = time.monotonic() + _LONGEST_S
+    limit_s = time.monotonic() + PATIENCE_S
     while process.poll() is None and len(list((lake / "responses").glob("*.parquet"))) < wanted:
         if time.monotonic() > limit_s:
             return False

@@ -20,7 +20,7 @@ from typing import Self
 
 from tests.support.peers.certificates import Authority
 from tests.support.peers.machine import Machine
-from tests.support.peers.peer import until
+from tests.support.peers.peer import PATIENCE_S, until
 from tests.support.small_axis import SMALL_AXIS
 
 TOKEN = "owner-" + "x" * 40
@@ -67,7 +67,7 @@ class Attacked:
 
     def __exit__(self, *_: object) -> None:
         self._process.terminate()
-        self._process.wait(30)
+        self._process.wait(PATIENCE_S)
 
     @property
     def origin(self) -> str:
@@ -83,9 +83,9 @@ class Attacked:
 
     def _ask_once(self, path: str) -> int:
         if self._trust is None:
-            connection = HTTPConnection("127.0.0.1", self.port, timeout=60)
+            connection = HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
         else:
-            connection = HTTPSConnection("127.0.0.1", self.port, timeout=60, context=self._trust)
+            connection = HTTPSConnection("127.0.0.1", self.port, timeout=PATIENCE_S, context=self._trust)
         try:
             connection.request("GET", path)
             answer = connection.getresponse()

@@ -1,4 +1,4 @@
-"""Chromium without a window, as Debian has it, and a page that keeps what went wrong in it."""
+"""Chromium that has no windows, as Debian has it, and a page that keeps what went wrong in it."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_playwright
 
+from tests.support.peers.peer import PATIENCE_S
+
 DESK = {"width": 1440, "height": 900}
 TABLET = {"width": 768, "height": 1024}
 
@@ -31,15 +33,17 @@ def chromium() -> Iterator[Browser]:
     processor. Between the tests that use it, Playwright's event loop is not the running one of the thread, so that
     another test may have one.
     """
-    path = shutil.which("chromium")
+    # The same engine without the program around it, which takes a third more of the processor.
+    path = shutil.which("chromium-headless-shell")
     if path is None:
-        message = "chromium is not installed: `make system-packages` installs it"
+        message = "chromium-headless-shell is not installed: `make system-packages` installs it"
         pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
     before = asyncio._get_running_loop()
     if not _started:
         playwright = sync_playwright().start()
         # The server is alone on its page: a new page needs no process apart, held ready for the next site.
-        arguments = ["--disable-site-isolation-trials"]
+        # And its process is the one in which the empty page was.
+        arguments = ["--disable-site-isolation-trials", "--renderer-process-limit=1"]
         # Its sandbox does not start for root.
         arguments += ["--no-sandbox"] * (os.geteuid() == 0)
         browser = playwright.chromium.launch(executable_path=path, args=arguments)
@@ -73,6 +77,7 @@ class Tab:
         self.wrong: list[str] = []
         self.url = url
         self.context: BrowserContext = browser.new_context(**({"viewport": DESK} | options))
+        self.context.set_default_timeout(1000 * PATIENCE_S)
         self.context.add_init_script(
             "addEventListener('securitypolicyviolation', (e) => console.error('CSP', e.violatedDirective))"
         )
@@ -121,7 +126,7 @@ class Tab:
             self.wrong.append(f"a request went to {request.url}")
 
 
-def until(true: Callable[[], bool], what: str, patience_s: float = 30.0) -> None:
+def until(true: Callable[[], bool], what: str, patience_s: float = PATIENCE_S) -> None:
     """Wait for something in this process."""
     end = time.monotonic() + patience_s
     while not true():

@@ -25,6 +25,7 @@ from livebode.runtime.documents import RunStarted
 from livebode.runtime.fits import Fits
 from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from tests.support.browser import until
+from tests.support.peers.peer import PATIENCE_S
 from tests.support.responses import made
 from tests.support.runs import record
 
@@ -132,7 +133,7 @@ class Watched:
     def end(self) -> None:
         """Let the run end."""
         self.machine.allow(-1 if self.hub.samples < SAMPLES else SAMPLES)
-        self._thread.join(60)
+        self._thread.join(PATIENCE_S)
         assert not self._thread.is_alive()
 
     def record(self) -> RunRecord:

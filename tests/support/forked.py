@@ -70,8 +70,16 @@ class Command:
     @property
     def printed(self) -> bytes:
         """Its standard output until now."""
-        out = self._printed[0]
-        return out.read_bytes() if out.exists() else b""
+        return self._until_now(0)
+
+    @property
+    def reported(self) -> bytes:
+        """Its standard error until now."""
+        return self._until_now(1)
+
+    def _until_now(self, stream: int) -> bytes:
+        path = self._printed[stream]
+        return path.read_bytes() if path.exists() else b""
 
     def wait(self, timeout: float | None = None) -> int:
         self._process.join(timeout)

@@ -15,6 +15,7 @@ from websockets.sync.client import ClientConnection
 
 from livebode.dashboard import Serving
 from tests.support.dashboards import Watched
+from tests.support.peers.peer import PATIENCE_S
 
 TOKEN, VIEWER = "operator-" + "x" * 40, "viewer-" + "y" * 40
 
@@ -36,7 +37,7 @@ def ask(
     watched: Watched, path: str, method: str = "GET", body: Any = None, **headers: str
 ) -> tuple[int, dict[str, str], str]:
     """Status, headers and body; nothing is sent that is not named, but Host."""
-    connection = HTTPConnection("127.0.0.1", port_of(watched), timeout=20)
+    connection = HTTPConnection("127.0.0.1", port_of(watched), timeout=PATIENCE_S)
     names = {k.replace("_", "-"): v for k, v in headers.items()}
     data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
     connection.request(method, path, data, names)
@@ -65,18 +66,16 @@ def closed(live: ClientConnection) -> bool:
     """Whether the server closes it, within what it has sent."""
     try:
         for _ in range(60):
-            live.recv(timeout=3)
+            live.recv(timeout=PATIENCE_S)
     except websockets.exceptions.ConnectionClosed:
         return True
-    except TimeoutError:
-        pass
     return False
 
 
 def answer(live: ClientConnection, word: str) -> Any:
     """What stands under this word in the next message that has it."""
     for _ in range(200):
-        message = live.recv(timeout=20)
+        message = live.recv(timeout=PATIENCE_S)
         if isinstance(message, str) and word in (cookies := json.loads(message)):
             return cookies[word]
     raise AssertionError(f"no message said {word!r}")

@@ -12,6 +12,7 @@ import numpy as np
 
 from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.dashboards import FIT, LOOP, SAMPLES, data
+from tests.support.peers.peer import PATIENCE_S
 from tests.support.runs import small_run
 from tests.support.shared import folder, shared
 from tools.run_copies import copy_run
@@ -57,7 +58,7 @@ def weeks(source: Path, folder: Path) -> Path:
 def ask(url: str, path: str, body: Any = None, token: str = "", **headers: str) -> tuple[int, dict[str, str], Any]:
     """Status, headers and body (JSON as objects) of a request, a POST if it has a body; with Origin as a browser."""
     parts = urlsplit(url)
-    connection = HTTPConnection(parts.hostname or "", parts.port, timeout=30)
+    connection = HTTPConnection(parts.hostname or "", parts.port, timeout=PATIENCE_S)
     sent = {"Origin": url.rstrip("/")} | ({"Authorization": f"Bearer {token}"} if token else {})
     data = None if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
     if data is not None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 from urllib.request import Request, urlopen
 
 import pytest
@@ -22,13 +24,27 @@ CREDENTIALS = {
 @contextmanager
 def object_storage() -> Iterator[str]:
     """The address of a server with an empty bucket; the environment leads S3 URLs to it."""
+    from moto.moto_server.werkzeug_app import DomainDispatcherApplication
     from moto.server import ThreadedMotoServer
 
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
     server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
-    server.start()
-    host, port = server.get_host_and_port()
-    with at_address(f"http://{host}:{port}") as address:
+    # An object that is replaced is closed, even while another thread answers with it: storage has each object whole.
+    answer, one = DomainDispatcherApplication.__call__, threading.Lock()
+
+    def alone(*arguments: Any) -> Any:
+        with one:
+            return answer(*arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(DomainDispatcherApplication, "__call__", alone)
+        server.start()
+        host, port = server.get_host_and_port()
+        yield from _with_bucket(server, f"http://{host}:{port}")
+
+
+def _with_bucket(server: Any, url: str) -> Iterator[str]:
+    with at_address(url) as address:
         try:
             import s3fs
 

@@ -35,7 +35,7 @@ class Running:
 
     def __init__(self, folder: Path, text: str, *options: str, pictures: bool = False) -> None:
         self.file, self.out = folder / "axes.toml", folder / "run"
-        self.file.write_text(text)
+        self.write(text)
         self.process = Command("run", self.file, "--out", self.out, "--json", *options, pictures=pictures)
 
     def __enter__(self) -> Running:
@@ -44,15 +44,26 @@ class Running:
     def __exit__(self, *error: object) -> None:
         self.process.__exit__(*error)
 
+    def write(self, text: str) -> None:
+        """Change the file at once: a look at it must not find a part."""
+        new = self.file.with_suffix(".new")
+        new.write_text(text)
+        new.replace(self.file)
+
     def edit(self, text: str) -> None:
         """Change the file, and say so."""
-        self.file.write_text(text)
+        self.write(text)
         self.process.send_signal(signal.SIGHUP)
 
     def tracked(self, name: str, samples: int = 1) -> None:
         """Until the record of this run holds so many samples, or more."""
         until(lambda: self.process.poll() is not None or numbers(self.out / name).size >= samples, f"{samples} samples")
         assert self.process.poll() is None, self.process.communicate()
+
+    def says(self, words: str) -> None:
+        """Until these words are in standard error."""
+        until(lambda: self.process.poll() is not None or words.encode() in self.process.reported, words)
+        assert words.encode() in self.process.reported, self.process.communicate()
 
     def reported_event(self, name: str, kind: str) -> Event:
         """The first event of this kind in this run, once it is there."""
@@ -88,8 +99,8 @@ def check_samples(runs: list[Path], sent: int) -> None:
     assert np.array_equal(number, np.arange(sent))
     for row, name in enumerate(("w", "u", "y", "n")):
         found = np.concatenate([table[name].to_numpy() for table in tables])
-        assert np.array_equal(found, data(120 * RATE_HZ)[row, :sent]), name
+        assert np.array_equal(found, data(sent)[row]), name
 
 
 def block(samples: int) -> Block:
-    return Block(data(120 * RATE_HZ)[:, :samples], CHANNELS, float(RATE_HZ))
+    return Block(data(samples), CHANNELS, float(RATE_HZ))

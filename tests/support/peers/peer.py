@@ -21,7 +21,8 @@ from livebode.sources.live import Batch, LiveBlock, LiveSource, SourceSettings, 
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
 RATE_HZ = 4000.0
 SAMPLES = 50
-PATIENCE_S = 30.0
+PATIENCE_S = 300.0
+"""Only against waiting for ever: a busy computer may take a minute for what else takes a second."""
 STAMP_S = 1.8e9
 
 

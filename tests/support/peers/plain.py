@@ -7,10 +7,28 @@ import os
 import socket
 import sys
 import threading
+from pathlib import Path
 
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
 from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer, free_port, until
+
+
+def wait_read(url: str) -> None:
+    """Until what was sent to or from the port of this URL has been read by the process at the other end."""
+    port = f":{int(url.rpartition(':')[2]):04X}"
+    until(lambda: not _unread_bytes(port), f"everything to be read: {url}")
+
+
+def _unread_bytes(port: str) -> int:
+    """Bytes that wait in queues of the kernel to be sent from this port or received from it, as proc(5) has them."""
+    found = 0
+    for kind in ("tcp", "udp"):
+        for line in Path(f"/proc/net/{kind}").read_text().splitlines()[1:]:
+            _, own, other, _, queues, *_ = line.split()
+            if own.endswith(port) or other.endswith(port):
+                found += sum(int(queue, 16) for queue in queues.split(":"))
+    return found
 
 
 class UdpPeer(Peer):
