@@ -115,7 +115,10 @@ class HalSource(LiveSource):
         # What waited before a record begins is older than it; of one that continues it is a part.
         stale = 0 if self._received or self._resumed is not None else int(pin_value(f"{self._sampler}.curr-depth"))
         command = [program("halsampler"), "-c", str(self._number)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as sampler:
+        # In a session of its own: Ctrl-C on the terminal ends livebode, which then ends it.
+        with subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+        ) as sampler:
             try:
                 self._established()
                 self._announce(wiring.channels, wiring.rate_hz)

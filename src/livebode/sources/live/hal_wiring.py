@@ -111,3 +111,25 @@ def period_ns(function: str) -> int:
 def pin_value(name: str) -> str:
     """Value of a pin; ConnectionError if there is none of this name."""
     return halcmd("getp", name).strip()
+
+
+@dataclass(frozen=True)
+class Link:
+    """A signal: the pin that drives it, "" for none, and the pins that read it."""
+
+    name: str
+    writer: str
+    readers: tuple[str, ...]
+
+
+def links() -> dict[str, Link]:
+    """The signals of HAL by name."""
+    found = {}
+    for line in halcmd("show", "sig").splitlines():
+        fields = line.split()
+        if len(fields) < 3:
+            continue
+        arrows = dict(zip(fields[4::2], fields[3::2]))
+        writer = next((pin for pin, arrow in arrows.items() if arrow == "<=="), "")
+        found[fields[2]] = Link(fields[2], writer, tuple(pin for pin, arrow in arrows.items() if arrow == "==>"))
+    return found
