@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import subprocess
+import time
+from dataclasses import dataclass
 
 from livebode.core import MeasurementError
 from livebode.experiment_design import Waveform
@@ -12,11 +14,12 @@ from livebode.experiments.measuring.player import Player
 from livebode.experiments.measuring.programme import Programme
 from livebode.sources.live import LiveSource
 from livebode.sources.live.hal import HalSource
-from livebode.sources.live.hal_wiring import STREAMER_KEY, fifo, links, pin_value, program
+from livebode.sources.live.hal_wiring import STREAMER_KEY, fifo, halcmd, links, pin_value, program
 
 REACTION_S = 0.3
 """From a sample in HAL to a request here, with the text that halsampler collects."""
 _RATE_SHARE = 1e-6
+_LOOK_S = 0.05
 
 
 class HalPlayer(Player):
@@ -31,13 +34,15 @@ class HalPlayer(Player):
         self._process: subprocess.Popen[bytes] | None = None
         self._programme: Programme | None = None
         self._sent, self._lead, self._waiting = 0, 0, b""
+        self._guard = Guard("", "")
+        self._off = False
 
     def check(self, waveform: Waveform) -> str:
         """The streamer is there, alone, and its end makes the excitation zero."""
         try:
             wiring = self.source.wiring()
             self._check_streamer()
-            guard = self._guard()
+            self._guard = self._found_guard()
         except OSError as error:
             raise self._wrong(str(error), "check LinuxCNC on this computer") from None
         rate_hz = waveform.lines.rate_hz
@@ -46,7 +51,9 @@ class HalPlayer(Player):
                 f"the thread of HAL runs at {wiring.rate_hz:.9g} Hz, but the excitation is for {rate_hz:.9g} Hz",
                 "design it for the rate of the thread",
             )
-        return f"{self._streamer} plays into {self._excitation!r}; {guard} makes it zero when the streamer is empty"
+        return (
+            f"{self._streamer} plays {self._excitation!r}; {self._guard.mux} makes it zero when the streamer is empty"
+        )
 
     def _check_streamer(self) -> None:
         found = fifo(STREAMER_KEY + self._section.streamer)
@@ -59,7 +66,7 @@ class HalPlayer(Player):
                 f"{self._streamer} is not empty, or not enabled", "wait until it has ended, and enable it"
             )
 
-    def _guard(self) -> str:
+    def _found_guard(self) -> Guard:
         """The mux2 that makes the excitation zero; a streamer without one would hold its last value."""
         found = links()
         by_writer = {link.writer: link for link in found.values()}
@@ -69,7 +76,7 @@ class HalPlayer(Player):
             mux = driver.writer.removesuffix(".out")
             guarded = f"{mux}.sel" in empty.readers and f"{mux}.in0" in played.readers
             if guarded and float(pin_value(f"{mux}.in1")) == 0.0:
-                return mux
+                return Guard(mux, empty.name)
         raise self._wrong(
             f"the signal {self._excitation!r} does not become zero when {self._streamer} is empty",
             f"connect {self._streamer}.empty to the sel of a mux2 with out {self._excitation!r} and in1 zero, "
@@ -129,8 +136,16 @@ class HalPlayer(Player):
         self.keep(self._programme.stop(self._sent) - self._lead)
 
     def off(self) -> None:
-        """End halstreamer: what is in the FIFO is played, then the mux2 makes zero."""
-        if self._process is not None:
+        """Switch the mux2 to zero; what is in the FIFO is played into nothing."""
+        if self._process is None or self._off:
+            return
+        self._off = True
+        try:
+            halcmd("unlinkp", f"{self._guard.mux}.sel")
+            halcmd("setp", f"{self._guard.mux}.sel", "1")
+        except OSError as error:
+            raise self._wrong(str(error), "switch the drive off") from None
+        finally:
             self._process.terminate()
 
     def close(self) -> None:
@@ -138,19 +153,45 @@ class HalPlayer(Player):
         if self._process is None:
             return
         self.ramp_down()
-        assert self._process.stdin is not None
+        self._finish(self._process)
+        if self._off:
+            self._connect_again()
+
+    def _finish(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdin is not None
         try:
-            if not self._process.stdin.closed:
-                os.set_blocking(self._process.stdin.fileno(), True)
+            if not process.stdin.closed:
+                os.set_blocking(process.stdin.fileno(), True)
                 while self._waiting:
                     self._write()
-                self._process.stdin.close()
-            self._process.wait(self.stop_s + 1.0)
+                process.stdin.close()
+            process.wait(self.stop_s + 1.0)
         except (MeasurementError, BrokenPipeError):
-            self._process.wait()
+            process.wait()
         except subprocess.TimeoutExpired:
-            self._process.terminate()
-            self._process.wait()
+            process.terminate()
+            process.wait()
+
+    def _connect_again(self) -> None:
+        """Connect the mux2 as it was, once nothing is left that it would let through."""
+        until = time.monotonic() + self.stop_s + 1.0
+        try:
+            while pin_value(f"{self._streamer}.empty") != "TRUE" and time.monotonic() < until:
+                time.sleep(_LOOK_S)
+            halcmd("net", self._guard.signal, f"{self._guard.mux}.sel")
+        except OSError as error:
+            raise self._wrong(
+                f"{self._guard.mux}.sel is not connected again: {error}",
+                f"halcmd net {self._guard.signal} {self._guard.mux}.sel",
+            ) from None
+
+
+@dataclass(frozen=True)
+class Guard:
+    """The mux2 that makes the excitation zero, and the signal at its `sel`."""
+
+    mux: str
+    signal: str
 
 
 PLAYER = HalPlayer

@@ -13,7 +13,7 @@ from livebode.core.writing import writing
 from livebode.experiment_design import Design, choose
 from livebode.experiments.designing import Picture, design_experiment
 from livebode.experiments.experiment import Experiment
-from livebode.experiments.measuring.measurement import Measurement, StopRequest
+from livebode.experiments.measuring.playback import Playback, StopRequest
 from livebode.experiments.measuring.player import Player, make_player
 
 LOG = "log.csv"
@@ -49,9 +49,9 @@ class Prepared:
     ramp_down_s: float
 
     @property
-    def measurement(self) -> Measurement:
+    def playback(self) -> Playback:
         """A new one."""
-        return Measurement(self.design, self.player, self.excitation, self.ranges)
+        return Playback(self.design, self.player, self.excitation, self.ranges)
 
     def rows(self) -> list[tuple[str, str]]:
         """What happens, as rows of a table."""
@@ -69,7 +69,7 @@ class Prepared:
     @property
     def duration_s(self) -> float:
         """From the first sample to the end of the ramp down."""
-        return self.measurement.playing_s + self.player.stop_s
+        return self.playback.playing_s + self.player.stop_s
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
@@ -150,7 +150,7 @@ def measure(
         If the directory exists, or the disk reports an error.
     """
     design_experiment(experiment.model_copy(update={"log": LOG}), directory, draw=draw)
-    one = Measurement(prepared.design, prepared.player, prepared.excitation, prepared.ranges, say)
+    one = Playback(prepared.design, prepared.player, prepared.excitation, prepared.ranges, say)
     measured = one.run(directory / LOG, request)
     first, last = measured.steady
     axis = directory / "axis.toml"

@@ -1,4 +1,4 @@
-"""Measurement: play a design on a controller, watch it, and record it."""
+"""Playback: a design is played on a controller, watched and recorded."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class StopRequest:
 
 
 @dataclass(frozen=True)
-class Measured:
+class PlaybackResult:
     """What was recorded.
 
     Attributes
@@ -67,8 +67,8 @@ class _Phase(Enum):
     ENDING = auto()
 
 
-class Measurement:
-    """One measurement. `run` may be called once.
+class Playback:
+    """Plays a design once, watches its limits, and records. `run` may be called once.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class Measurement:
         self._zeros = 0
         self._started_s = 0.0
 
-    def run(self, path: Path, request: StopRequest) -> Measured:
+    def run(self, path: Path, request: StopRequest) -> PlaybackResult:
         """Record to `path`, a new CSV file; returns when the excitation has ended.
 
         Raises
@@ -201,7 +201,7 @@ class Measurement:
                 channel=self._excitation,
             )
 
-    def _result(self, lost: int) -> Measured:
+    def _result(self, lost: int) -> PlaybackResult:
         if self._reason is not None:
             raise self._reason
         played = np.concatenate(self._played) if self._played else np.zeros(0)
@@ -217,7 +217,7 @@ class Measurement:
                 channel=self._excitation,
                 steady_s=(last - first) / rate_hz,
             )
-        return Measured(played.size, lost, (first, last), self._interrupted)
+        return PlaybackResult(played.size, lost, (first, last), self._interrupted)
 
 
 def _silent(seconds: float) -> MeasurementError:
