@@ -73,11 +73,11 @@ def ramp(w: NDArray[np.float64], out: Path) -> int:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ramps_down_and_the_record_remains(hal: Hal, known: Path, tmp_path: Path, number: int) -> None:
-    file = write_experiment(known, LONG)
+    file = write_experiment(known, LONG, "lead_s = 2.0")
     with measuring(hal, file, tmp_path / "out") as process:
         process.send_signal(number)
         assert process.wait(PATIENCE_S) == 128 + number
-        assert b"stopping: the excitation is zero in 0.95 s" in process.printed
+        assert b"stopping: the excitation is zero in 2.55 s" in process.printed
     has_ended(hal)
     w = played(tmp_path / "out")
     assert w[-1] == 0.0
@@ -118,7 +118,7 @@ def test_a_limit_ramps_down_and_is_named(hal: Hal, known: Path, tmp_path: Path) 
     velocity = np.loadtxt(tmp_path / "out" / "log.csv", delimiter=",", skiprows=1, usecols=3)
     beyond = int(np.flatnonzero(np.abs(velocity) > 0.3)[0])
     w = played(tmp_path / "out")
-    assert np.flatnonzero(w)[-1] - beyond < (0.95 + 1.0) * RATE_HZ  # of samples of HAL, not of time here
+    assert np.count_nonzero(w[beyond:]) < 0.95 * RATE_HZ + 400  # samples of HAL, whatever time they took here
 
 
 def test_a_limit_that_is_exceeded_at_rest_plays_nothing(hal: Hal, known: Path, tmp_path: Path) -> None:
@@ -136,12 +136,12 @@ def test_a_dead_real_time_part_ends_it(hal: Hal, known: Path, tmp_path: Path) ->
         hal.kill()
         _, printed = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 2
-        assert b"no samples arrived for 1" in printed
+        assert b"no samples arrived for" in printed
     assert played(tmp_path / "out").any()
 
 
 def test_an_excitation_that_was_interrupted_is_not_tracked(hal: Hal, known: Path, tmp_path: Path) -> None:
-    file = write_experiment(known, "accuracy = 0.03", "lead_s = 0.1")
+    file = write_experiment(known, "accuracy = 0.004\namplitude_n_m = 0.2", "lead_s = 0.1")
     with measuring(hal, file, tmp_path / "out") as process:
         found = subprocess.run(["pgrep", "halstreamer"], capture_output=True, text=True, check=True)
         os.kill(int(found.stdout), signal.SIGSTOP)

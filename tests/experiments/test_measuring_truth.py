@@ -28,7 +28,7 @@ def hal() -> Iterator[Hal]:
 def test_one_command_measures_a_foreign_closed_loop_within_its_bounds(hal: Hal, tmp_path: Path) -> None:
     known_machine(tmp_path)
     hal.play(np.random.default_rng(1).normal(0, 0.005, 60 * RATE_HZ), 1)
-    file, out = write_experiment(tmp_path), tmp_path / "out"
+    file, out = write_experiment(tmp_path, measure="lead_s = 3.0\nsilence_s = 20.0"), tmp_path / "out"
     dry = livebode("measure", file, "--out", out, "--dry-run")
     assert dry.code == 0
     assert not out.exists()

@@ -23,6 +23,9 @@ class MeasureSection(BaseModel):
         How far the excitation is sent ahead, in seconds: it is played to there if livebode is killed (hal).
     streamer
         Number of the streamer (hal).
+    silence_s
+        Time without samples after which the excitation is ramped down, in seconds; with ads also the time after which
+        the PLC does so by itself.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -31,6 +34,7 @@ class MeasureSection(BaseModel):
     ramp_down_s: Annotated[float, Field(strict=True, gt=0, le=60)] = 0.5
     lead_s: Annotated[float, Field(strict=True, ge=0.05, le=10)] = 0.4
     streamer: Annotated[int, Field(strict=True, ge=0, le=7)] = 0
+    silence_s: Annotated[float, Field(strict=True, ge=0.2, le=60)] = 1.0
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Lowest and highest permitted value of each limited channel."""

@@ -51,9 +51,7 @@ class HalPlayer(Player):
                 f"the thread of HAL runs at {wiring.rate_hz:.9g} Hz, but the excitation is for {rate_hz:.9g} Hz",
                 "design it for the rate of the thread",
             )
-        return (
-            f"{self._streamer} plays {self._excitation!r}; {self._guard.mux} makes it zero when the streamer is empty"
-        )
+        return f"{self._streamer} plays {self._excitation!r}; {self._guard.mux} makes it zero when it is empty"
 
     def _check_streamer(self) -> None:
         found = fifo(STREAMER_KEY + self._section.streamer)

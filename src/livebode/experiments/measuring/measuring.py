@@ -13,6 +13,7 @@ from livebode.core.writing import writing
 from livebode.experiment_design import Design, choose
 from livebode.experiments.designing import Picture, design_experiment
 from livebode.experiments.experiment import Experiment
+from livebode.experiments.measure_section import MeasureSection
 from livebode.experiments.measuring.playback import Playback, StopRequest
 from livebode.experiments.measuring.player import Player, make_player
 
@@ -37,8 +38,8 @@ class Prepared:
         Channel of the excitation.
     ranges
         Lowest and highest permitted value of each limited channel.
-    ramp_down_s
-        Duration of the ramp down.
+    section
+        [measure].
     """
 
     design: Design
@@ -46,12 +47,11 @@ class Prepared:
     connection: str
     excitation: str
     ranges: dict[str, tuple[float, float]]
-    ramp_down_s: float
+    section: MeasureSection
 
-    @property
-    def playback(self) -> Playback:
+    def playback(self, say: Callable[[str], None] = lambda _: None) -> Playback:
         """A new one."""
-        return Playback(self.design, self.player, self.excitation, self.ranges)
+        return Playback(self.design, self.player, self.excitation, self.ranges, self.section.silence_s, say)
 
     def rows(self) -> list[tuple[str, str]]:
         """What happens, as rows of a table."""
@@ -61,7 +61,7 @@ class Prepared:
             ("controller", f"{self.player.source.address}: {self.connection}"),
             ("plays", f"peak {design.waveform.peak:.4g} N m, {len(design.waveform.lines.bins)} lines"),
             ("takes", f"{self.duration_s:.4g} s: ramp up {design.ramp_s:.3g} s, recording {design.recording_s:.4g} s, "
-                      f"ramp down {self.ramp_down_s:.3g} s"),
+                      f"then the ramp down"),
             ("ends at once beyond", "; ".join(limits) or "nothing: set measure.limits"),
             ("is zero after a stop", f"within {self.player.stop_s:.3g} s (Ctrl-C, SIGTERM, a limit, silence)"),
         ]  # fmt: skip
@@ -69,7 +69,7 @@ class Prepared:
     @property
     def duration_s(self) -> float:
         """From the first sample to the end of the ramp down."""
-        return self.playback.playing_s + self.player.stop_s
+        return self.playback().playing_s + self.player.stop_s
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
@@ -128,7 +128,7 @@ def prepare(experiment: Experiment) -> Prepared:
     if "input" in signals and limits.torque_n_m_max < inf:
         ranges.setdefault(signals["input"], (-limits.torque_n_m_max, limits.torque_n_m_max))
     connection = player.check(design.waveform)
-    return Prepared(design, player, connection, signals["excitation"], ranges, experiment.measure.ramp_down_s)
+    return Prepared(design, player, connection, signals["excitation"], ranges, experiment.measure)
 
 
 def measure(
@@ -150,7 +150,7 @@ def measure(
         If the directory exists, or the disk reports an error.
     """
     design_experiment(experiment.model_copy(update={"log": LOG}), directory, draw=draw)
-    one = Playback(prepared.design, prepared.player, prepared.excitation, prepared.ranges, say)
+    one = prepared.playback(say)
     measured = one.run(directory / LOG, request)
     first, last = measured.steady
     axis = directory / "axis.toml"

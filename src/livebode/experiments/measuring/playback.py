@@ -23,7 +23,6 @@ REST_S = 0.25
 """Recorded and watched before anything is played."""
 ZERO_S = 0.05
 """The excitation has ended when it was zero for so long."""
-SILENCE_S = 1.0
 LATE_S = 2.0
 _LOOK_S = 0.05
 _STEADY_SHARE = 0.9
@@ -80,6 +79,8 @@ class Playback:
         Channel of the excitation.
     ranges
         Lowest and highest permitted value of each limited channel.
+    silence_s
+        Time without samples after which it is ramped down, in seconds.
     say
         Called with a sentence for a person at each step.
     """
@@ -90,11 +91,13 @@ class Playback:
         player: Player,
         excitation: str,
         ranges: Mapping[str, tuple[float, float]],
+        silence_s: float,
         say: Say = lambda _: None,
     ) -> None:
         self._design, self._player, self._excitation = design, player, excitation
-        self._ranges, self._say = ranges, say
+        self._ranges, self._silence_s, self._say = ranges, silence_s, say
         self._phase, self._since_start, self._rested = _Phase.REST, 0, 0
+        self._first: int | None = None
         self._played: list[NDArray[np.float64]] = []
         self._reason: LivebodeError | None = None
         self._interrupted = False
@@ -128,7 +131,7 @@ class Playback:
             if block is not None and len(block):
                 heard = time.monotonic()
                 self._take(block, watch, table)
-            elif time.monotonic() - heard > SILENCE_S:
+            elif time.monotonic() - heard > self._silence_s:
                 self._end(_silent(time.monotonic() - heard))
             if request.count and self._phase is not _Phase.ENDING:
                 self._interrupted = True
@@ -147,8 +150,10 @@ class Playback:
         self._zeros = self._zeros + zero.size if zero.all() else int(np.argmin(zero[::-1]))
         if self._phase is _Phase.REST:
             self._rested += len(block)
-        else:
-            self._since_start += len(block)
+        elif self._first is None and not zero.all():
+            self._first = block.start + int(np.argmin(zero))
+        if self._first is not None:
+            self._since_start = block.start + len(block) - self._first
         if (violation := watch.check(block)) is not None:
             self._end(violation)
 
@@ -174,7 +179,9 @@ class Playback:
             self._player.start(self._design.waveform)
         elif self._phase is _Phase.PLAYING:
             self._player.keep(self._since_start)
-            if self._since_start >= self.playing_s * lines.rate_hz:
+            if self._first is None and time.monotonic() - self._started_s > self._player.stop_s + LATE_S:
+                self._end(self._differs(0.0))
+            elif self._since_start >= self.playing_s * lines.rate_hz:
                 self._say("complete; ramping down")
                 self._end(None)
         elif self._phase is _Phase.ENDING:
@@ -209,15 +216,18 @@ class Playback:
         first, last = steady_part(played, design.waveform.samples)
         rate_hz = design.waveform.lines.rate_hz
         if not self._interrupted and last - first < _STEADY_SHARE * design.recording_s * rate_hz:
-            raise MeasurementError(
-                "played-differs",
-                f"the recorded excitation repeats the design for {(last - first) / rate_hz:.4g} s without a break, "
-                f"not for {design.recording_s:.4g} s",
-                "check that nothing else drives the signal, and that the computer was not overloaded",
-                channel=self._excitation,
-                steady_s=(last - first) / rate_hz,
-            )
+            raise self._differs((last - first) / rate_hz)
         return PlaybackResult(played.size, lost, (first, last), self._interrupted)
+
+    def _differs(self, steady_s: float) -> MeasurementError:
+        return MeasurementError(
+            "played-differs",
+            f"the recorded excitation repeats the design for {steady_s:.4g} s without a break, "
+            f"not for {self._design.recording_s:.4g} s",
+            "check that nothing else drives the signal, and that the computer was not overloaded",
+            channel=self._excitation,
+            steady_s=steady_s,
+        )
 
 
 def _silent(seconds: float) -> MeasurementError:

@@ -11,7 +11,7 @@ from livebode.experiments.measure_section import MeasureSection
 from livebode.sources.live import LiveSource, make_source
 from livebode.sources.live.settings import SourceSettings
 
-PLAYERS = {"hal": "hal_player"}
+PLAYERS = {"hal": "hal_player", "ads": "ads_player"}
 """Module of each kind of source whose controller can play; it ends with PLAYER."""
 
 
@@ -47,7 +47,7 @@ class Player(ABC):
 
     @abstractmethod
     def keep(self, played: int) -> None:
-        """Continue; to be called at least every 0.1 s. `played`: samples that were received since the start."""
+        """Continue; to be called at least every 0.1 s. `played`: samples received since the excitation began."""
 
     @abstractmethod
     def ramp_down(self) -> None:
