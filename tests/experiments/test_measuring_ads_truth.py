@@ -21,10 +21,12 @@ from livebode.records import RunRecord
 from livebode.runtime import Destination, run
 from tests.support.command import write_csv
 from tests.support.errors import refused
-from tests.support.peers.peer import until
+from tests.support.peers.peer import Feeding, until
 from tests.support.peers.plc_program import FEEDBACK, RATE_HZ, PlcProgram, plant
 
 WINDOW = 40
+RAMP = 500
+"""Samples of the design's ramp: half a second."""
 BINS = np.array([2, 5, 8])
 AXIS = f"""
 [source]
@@ -105,6 +107,18 @@ def test_a_limit_ends_it_with_the_ramp_of_the_block(plc: PlcProgram, known: Path
 
     with refused(MeasurementError, "limit-exceeded", channel="y", high=1000.0):
         measure(experiment, found, tmp_path / "out", StopRequest(), say=say)
+    assert not any(plc.excitation[-20:])
+
+
+def test_an_excitation_that_was_interrupted_is_not_tracked(plc: PlcProgram, known: Path, tmp_path: Path) -> None:
+    experiment, found = prepared(plc, known, measure={"silence_s": 20.0})
+
+    def play() -> None:
+        until(lambda: np.count_nonzero(plc.excitation) > RAMP + 5 * WINDOW, "the steady excitation")
+        plc.write("stop", b"\x01")
+
+    with Feeding(play), refused(MeasurementError, "played-differs", channel="w"):
+        measure(experiment, found, tmp_path / "out", StopRequest(), say=lambda _: None)
     assert not any(plc.excitation[-20:])
 
 

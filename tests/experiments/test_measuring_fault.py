@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -51,7 +49,7 @@ def measuring(hal: Hal, file: Path, out: Path) -> Command:
     process = Command("measure", file, "--out", out)
     until(lambda: process.poll() is not None or excitation(hal) != 0.0, "the excitation")
     began = hal.periods()
-    until(lambda: process.poll() is not None or hal.periods() > began + RATE_HZ, "a second of it")
+    until(lambda: process.poll() is not None or hal.periods() > began + 3 * RATE_HZ // 4, "its ramp")
     assert process.poll() is None, process.printed
     return process
 
@@ -71,13 +69,12 @@ def ramp(w: NDArray[np.float64], out: Path) -> int:
     return int(np.flatnonzero(w)[-1] - np.flatnonzero(np.abs(w) > 0.99 * peak)[-1])
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ramps_down_and_the_record_remains(hal: Hal, known: Path, tmp_path: Path, number: int) -> None:
-    file = write_experiment(known, LONG, "lead_s = 2.0")
+def test_a_signal_ramps_down_and_the_record_remains(hal: Hal, known: Path, tmp_path: Path) -> None:
+    file = write_experiment(known, LONG, "lead_s = 1.0")
     with measuring(hal, file, tmp_path / "out") as process:
-        process.send_signal(number)
-        assert process.wait(PATIENCE_S) == 128 + number
-        assert b"stopping: the excitation is zero in 2.55 s" in process.printed
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE_S) == 130
+        assert b"stopping: the excitation is zero in 1.55 s" in process.printed
     has_ended(hal)
     w = played(tmp_path / "out")
     assert w[-1] == 0.0
@@ -88,12 +85,12 @@ def test_a_signal_ramps_down_and_the_record_remains(hal: Hal, known: Path, tmp_p
 def test_a_second_signal_switches_it_off_and_the_machine_is_wired_as_before(
     hal: Hal, known: Path, tmp_path: Path
 ) -> None:
-    file = write_experiment(known, LONG, "lead_s = 2.0")
+    file = write_experiment(known, LONG, "lead_s = 1.0")
     with measuring(hal, file, tmp_path / "out") as process:
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGTERM)
         until(lambda: b"stopping" in process.printed, "the first request")
         process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE_S) == 130
+        assert process.wait(PATIENCE_S) == 128 + signal.SIGTERM
     has_ended(hal)
     assert ramp(played(tmp_path / "out"), tmp_path / "out") < 400
     prepare(Experiment.read(file))
@@ -131,27 +128,13 @@ def test_a_limit_that_is_exceeded_at_rest_plays_nothing(hal: Hal, known: Path, t
 
 
 def test_a_dead_real_time_part_ends_it(hal: Hal, known: Path, tmp_path: Path) -> None:
-    file = write_experiment(known, LONG)
+    file = write_experiment(known, LONG, "lead_s = 0.1\nsilence_s = 0.3")
     with measuring(hal, file, tmp_path / "out") as process:
         hal.kill()
         _, printed = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 2
         assert b"no samples arrived for" in printed
     assert played(tmp_path / "out").any()
-
-
-def test_an_excitation_that_was_interrupted_is_not_tracked(hal: Hal, known: Path, tmp_path: Path) -> None:
-    file = write_experiment(known, "accuracy = 0.004\namplitude_n_m = 0.2", "lead_s = 0.1")
-    with measuring(hal, file, tmp_path / "out") as process:
-        found = subprocess.run(["pgrep", "halstreamer"], capture_output=True, text=True, check=True)
-        os.kill(int(found.stdout), signal.SIGSTOP)
-        until(lambda: hal.halcmd("getp", "streamer.0.empty").strip() == "TRUE", "an empty FIFO")
-        os.kill(int(found.stdout), signal.SIGCONT)
-        _, printed = process.communicate(timeout=PATIENCE_S)
-        assert process.returncode == 2
-        assert b"the recorded excitation repeats the design for" in printed
-    assert not (tmp_path / "out" / "run").exists()
-    has_ended(hal)
 
 
 def test_a_controller_that_could_stay_excited_is_refused(hal: Hal, known: Path) -> None:

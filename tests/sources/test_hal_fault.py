@@ -26,7 +26,7 @@ def hal() -> Iterator[Hal]:
 
 def told(**more: object) -> str:
     with pytest.raises(SourceError) as caught:
-        open_source(SourceSettings(**(SETTINGS | {"timeout_s": 0.5} | more)))
+        open_source(SourceSettings(**(SETTINGS | {"timeout_s": 0.3} | more)))
     return str(caught.value)
 
 
@@ -43,7 +43,7 @@ def test_a_machine_that_is_wired_otherwise_is_named(hal: Hal) -> None:
     hal.halcmd("setp", "sampler.0.enable", "0")
     # What was in the FIFO is older than the record.
     hal.halcmd("stop")
-    assert "takes no samples: halcmd start" in told(timeout_s=2.0)
+    assert "takes no samples: halcmd start" in told(timeout_s=1.5)
 
 
 def test_a_killed_real_time_part_is_reported_and_a_new_one_is_a_restart(hal: Hal) -> None:

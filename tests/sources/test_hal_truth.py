@@ -75,12 +75,12 @@ def test_the_response_of_a_foreign_closed_loop_is_within_its_bounds(hal: Hal, tm
     truth = plant(mean.lines.frequency_hz)
     np.testing.assert_allclose(mean.lines.frequency_hz, 10.0 * BINS)
     assert np.all(np.abs(mean.value - truth) < 4 * mean.sigma)
-    assert np.all(mean.sigma < 0.03 * np.abs(truth))
+    assert np.all(mean.sigma < 0.04 * np.abs(truth))
     each = record.responses()
     bound = each.bound(np.sqrt(np.log(20)))
     known = np.isfinite(bound)
     assert known.mean() > 0.9  # the first windows have nothing to be compared with
-    assert np.mean((np.abs(each.value - truth) <= bound)[known]) > 0.9  # 95 %, of some 250 windows times lines
+    assert np.mean((np.abs(each.value - truth) <= bound)[known]) > 0.88  # 95 %, of some 150 windows times lines
 
 
 def test_a_full_fifo_is_a_gap_of_its_exact_length(hal: Hal) -> None:

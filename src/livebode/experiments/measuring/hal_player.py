@@ -34,7 +34,7 @@ class HalPlayer(Player):
         self._process: subprocess.Popen[bytes] | None = None
         self._programme: Programme | None = None
         self._sent, self._lead, self._waiting = 0, 0, b""
-        self._guard = Guard("", "")
+        self._guard = StreamerGuard("", "")
         self._off = False
 
     def check(self, waveform: Waveform) -> str:
@@ -64,7 +64,7 @@ class HalPlayer(Player):
                 f"{self._streamer} is not empty, or not enabled", "wait until it has ended, and enable it"
             )
 
-    def _found_guard(self) -> Guard:
+    def _found_guard(self) -> StreamerGuard:
         """The mux2 that makes the excitation zero; a streamer without one would hold its last value."""
         found = links()
         by_writer = {link.writer: link for link in found.values()}
@@ -74,7 +74,7 @@ class HalPlayer(Player):
             mux = driver.writer.removesuffix(".out")
             guarded = f"{mux}.sel" in empty.readers and f"{mux}.in0" in played.readers
             if guarded and float(pin_value(f"{mux}.in1")) == 0.0:
-                return Guard(mux, empty.name)
+                return StreamerGuard(mux, empty.name)
         raise self._wrong(
             f"the signal {self._excitation!r} does not become zero when {self._streamer} is empty",
             f"connect {self._streamer}.empty to the sel of a mux2 with out {self._excitation!r} and in1 zero, "
@@ -185,7 +185,7 @@ class HalPlayer(Player):
 
 
 @dataclass(frozen=True)
-class Guard:
+class StreamerGuard:
     """The mux2 that makes the excitation zero, and the signal at its `sel`."""
 
     mux: str
