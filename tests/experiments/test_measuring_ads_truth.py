@@ -134,7 +134,7 @@ def test_a_second_request_is_zero_at_once(plc: PlcProgram, known: Path, tmp_path
     made = measure(experiment, found, tmp_path / "out", request, say=say)
     assert made.samples
     assert not any(plc.excitation[-20:])
-    assert plc.program["stop"] is False
+    until(lambda: plc.program["stop"] is False, "stop to be reset")
 
 
 def test_without_a_sign_of_life_the_program_ramps_down(plc: PlcProgram, known: Path) -> None:

@@ -51,7 +51,8 @@ class PlcProgram(AdsPeer):
         self._cycle, self._y, self._ended = 0, 0.0, threading.Event()
         self._noise = np.random.default_rng(5)
         machine = Machine(
-            *self._project.files().values(), functions={"F_GETSYSTEMTIME": (ULINT, lambda: FILETIME_1970 + self._cycle)}
+            *self._project.files().values(),
+            functions={"F_GETSYSTEMTIME": (ULINT, lambda: FILETIME_1970 + 10_000 * self._cycle)},
         )
         self.program = machine.instance("MAIN")
         self._ring = Instance(machine.units["st_livebodering"], self.program.memory.v_livebode)

@@ -77,7 +77,8 @@ class AdsPlayer(Player):
 
     def off(self) -> None:
         """The excitation is zero in the next cycle."""
-        self._write("stop", True, "BOOL")
+        if self._opened:
+            self._write("stop", True, "BOOL")
 
     def close(self) -> None:
         """`stop` is reset: without `enable` the excitation stays zero."""

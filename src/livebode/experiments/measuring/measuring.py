@@ -62,7 +62,7 @@ class Prepared:
             ("plays", f"peak {design.waveform.peak:.4g} N m, {len(design.waveform.lines.bins)} lines"),
             ("takes", f"{self.duration_s:.4g} s: ramp up {design.ramp_s:.3g} s, recording {design.recording_s:.4g} s, "
                       f"then the ramp down"),
-            ("ends at once beyond", "; ".join(limits) or "nothing: set measure.limits"),
+            ("ramps down beyond", "; ".join(limits) or "nothing: set measure.limits"),
             ("is zero after a stop", f"within {self.player.stop_s:.3g} s (Ctrl-C, SIGTERM, a limit, silence)"),
         ]  # fmt: skip
 

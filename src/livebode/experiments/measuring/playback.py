@@ -98,6 +98,7 @@ class Playback:
         self._ranges, self._silence_s, self._say = ranges, silence_s, say
         self._phase, self._since_start, self._rested = _Phase.REST, 0, 0
         self._first: int | None = None
+        self._rested_only = False
         self._played: list[NDArray[np.float64]] = []
         self._reason: LivebodeError | None = None
         self._interrupted = False
@@ -135,8 +136,8 @@ class Playback:
                 self._end(_silent(time.monotonic() - heard))
             if request.count and self._phase is not _Phase.ENDING:
                 self._interrupted = True
-                self._say(f"stopping: the excitation is zero in {self._player.stop_s:.3g} s")
                 self._end(None)
+                self._say(f"stopping: the excitation is zero in {self._player.stop_s:.3g} s")
             if request.count > 1:
                 self._player.off()
             if self._advanced():
@@ -161,14 +162,14 @@ class Playback:
         """Ramp down, once; the first reason counts."""
         if self._phase is _Phase.ENDING:
             return
-        if reason is not None:
-            self._reason = reason
-            self._say(str(reason))
         if self._phase is _Phase.PLAYING:
             self._player.ramp_down()
+            self._zeros = 0
         else:
-            self._zeros = 1 << 62  # nothing was played
-        self._phase, self._asked_s = _Phase.ENDING, time.monotonic()
+            self._rested_only = True
+        self._phase, self._asked_s, self._reason = _Phase.ENDING, time.monotonic(), reason
+        if reason is not None:
+            self._say(f"ramping down: {reason}")
 
     def _advanced(self) -> bool:
         """Take the next step where it is due; whether the measurement has ended."""
@@ -182,13 +183,18 @@ class Playback:
             if self._first is None and time.monotonic() - self._started_s > self._player.stop_s + LATE_S:
                 self._end(self._differs(0.0))
             elif self._since_start >= self.playing_s * lines.rate_hz:
-                self._say("complete; ramping down")
                 self._end(None)
+                self._say("complete; ramping down")
         elif self._phase is _Phase.ENDING:
             self._player.keep(self._since_start)
-            if self._zeros >= ZERO_S * lines.rate_hz:
+            if self._rested_only:
                 return True
-            if time.monotonic() - self._asked_s > self._player.stop_s + LATE_S:
+            ending_s = time.monotonic() - self._asked_s
+            # An excitation that was not seen yet may still come, from what was sent ahead.
+            came = self._first is not None or ending_s > self._player.stop_s
+            if came and self._zeros >= ZERO_S * lines.rate_hz:
+                return True
+            if ending_s > self._player.stop_s + LATE_S:
                 self._fail_to_end()
                 return True
         return False
