@@ -13,6 +13,7 @@ from livebode.core import ConfigError, SourceError
 from livebode.sources.live import SourceSettings, make_source, open_source
 from livebode.sources.live.hal import SampleText, consecutive
 from livebode.sources.live.hal_wiring import halcmd
+from tests.support.command import livebode
 from tests.support.errors import refused
 from tests.support.peers.hal import SETTINGS, Hal, only_hal, remove_memory
 from tests.support.peers.peer import until
@@ -28,6 +29,18 @@ def told(**more: object) -> str:
     with pytest.raises(SourceError) as caught:
         open_source(SourceSettings(**(SETTINGS | {"timeout_s": 0.3} | more)))
     return str(caught.value)
+
+
+@pytest.mark.usefixtures("hal")
+def test_the_doctor_finds_the_signals_and_the_rate(tmp_path: Path) -> None:
+    path = tmp_path / "axis.toml"
+    path.write_text(
+        '[source]\nurl = "hal:sampler.0"\nsample_signal = "n"\n[signals]\nexcitation = "w"\ninput = "u"\n'
+        'output = "velocity"\n[lines]\nfrequencies = "20"\nwindow = 400\n'
+    )
+    assert "samples w, u, velocity at 4000 Hz" in " ".join(livebode("doctor", path).out.split())
+    path.write_text(path.read_text().replace("sampler.0", "sampler.1"))
+    assert "no sampler.1 is loaded" in " ".join(livebode("doctor", path).out.split())
 
 
 def test_a_machine_that_is_wired_otherwise_is_named(hal: Hal) -> None:
