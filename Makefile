@@ -204,7 +204,7 @@ screenshots: $(BUILT)  ## pictures of dashboard and report in every state (light
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends chromium chromium-headless-shell clang fonts-wqy-microhei gcc-aarch64-linux-gnu gcc-arm-none-eabi influxdb libc6-dev-arm64-cross mosquitto nats-server nginx-light openssh-server openssl poppler-utils prometheus prometheus-alertmanager qemu-system-arm qemu-user rsyslog systemd
+	apt-get install -y -qq --no-install-recommends chromium chromium-headless-shell clang fonts-wqy-microhei gcc-aarch64-linux-gnu gcc-arm-none-eabi influxdb libc6-dev-arm64-cross linuxcnc-uspace mosquitto nats-server nginx-light openssh-server openssl poppler-utils prometheus prometheus-alertmanager qemu-system-arm qemu-user rsyslog systemd
 
 catalogues: $(BUILT)  ## after a change of a sentence of report or dashboard: update the catalogues, list what lacks a translation
 	$(BIN)/python -m tools.catalogues

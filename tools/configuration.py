@@ -58,6 +58,7 @@ MORE = {
     "belt": "See [the simulated axis](axis.md).",
     "measured": "A limit on a quantity whose extremes are not known is rejected.",
     "cluster": "See [archives](../how-to/archive.md).",
+    "measure": "See [measuring](../how-to/measure.md).",
     "excitation": "See [excitation design](../how-to/excitation.md).",
 }
 """Text below the heading of a table."""
@@ -65,7 +66,8 @@ LOOP = """As in axis.toml; by default the loop of the run. `[loop.velocity]` bel
 `[loop.position_pd]` to a position. The excitation is added at the plant input. It is not checked whether a loop other
 than the run's is stable.
 """
-
+SOURCE = """As in axis.toml: a live source, whose controller plays the excitation and sends the samples.
+"""
 
 _FILES = (("axis", axis_schema()), ("experiment", experiment_schema()), ("archive", archive_schema()))
 
@@ -92,6 +94,8 @@ def _tables(file: Schema, name: str, table: Schema, needed: Schema) -> Iterator[
     for key, value in keys.items():
         if key == "loop" and file["title"] != "axis.toml":
             yield f"### [loop] of a measured axis\n\n{LOOP}"
+        elif key == "source" and file["title"] != "axis.toml":
+            yield f"### [source] of a measurement\n\n{SOURCE}"
         elif "$ref" in value.get("items", {}):
             yield from _tables(file, f"[{name}.{key}]" if name else f"[{key}]", _resolved(file, value["items"]), {})
         elif "properties" in value:

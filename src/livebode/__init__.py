@@ -41,8 +41,8 @@ Names by subject:
 - Simulation: BeltAxis, SimulatedAxis, Strokes
 - Examples: example_axis, example_responses, example_run
 - Errors: LivebodeError (a ValueError) and its kinds ArchiveError, BaselineError, ConfigError, DesignError, ExtraError,
-  FitError, FleetError, GridError, LocationError, OutputError, PublishError, RecordError, RecordingError, ServerError,
-  SignalError, SimulationError, SourceError, StateError, UsageError
+  FitError, FleetError, GridError, LocationError, MeasurementError, OutputError, PublishError, RecordError,
+  RecordingError, ServerError, SignalError, SimulationError, SourceError, StateError, UsageError
 
 Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the true value with probability
 1 − exp(−c²). Every public name loads its part of livebode when it is first used. These names are the public interface,
@@ -73,6 +73,7 @@ if TYPE_CHECKING:
         Lines,
         LivebodeError,
         Loop,
+        MeasurementError,
         Model,
         OutputError,
         Parameters,
@@ -141,6 +142,8 @@ _HOME = {
         "ServerError",
         "RecordingError",
         "RecordError",
+        "MeasurementError",
+        "MeasurementError",
         "OutputError",
         "PublishError",
         "LivebodeError",
@@ -195,6 +198,7 @@ __all__ = [
     "LocationError",
     "Log",
     "Loop",
+    "MeasurementError",
     "Model",
     "Monitor",
     "MotionCorrection",

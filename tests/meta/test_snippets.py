@@ -18,6 +18,7 @@ from livebode.archive.settings import ArchiveSettings
 from livebode.cli.app import app
 from livebode.configuration import Axis
 from livebode.configuration.axes import merged, tables_of
+from livebode.experiments.experiment import Experiment
 from livebode.fleet.settings import FleetSettings
 from tests.support.pages import PAGES, ROOT, steps_of
 
@@ -45,6 +46,9 @@ def test_the_toml_of_a_page_is_a_configuration(text: str) -> None:
         return
     if isinstance(data.get("axes"), list):
         assert FleetSettings.of(data, "fleet.toml")
+        return
+    if "excitation" in data:
+        assert Experiment.of(data, "experiment.toml")
         return
     below = {} if "signals" in data else SMALLEST | ({"source": {}} if "source" in data else {})
     for table in tables_of(merged(below, data), "axis.toml").values():

@@ -384,7 +384,7 @@ def test_frames_that_are_refused(frame, code, facts):
 
 URLS = [
     "udp://0.0.0.0:5000", "tcp://plc:1", "mqtt://broker/a/b", "mqtts://[::1]:8883/x", "opc.tcp://h:4840/server", "ads://h",
-    "stdin:",
+    "stdin:", "hal:sampler.0",
 ]  # fmt: skip
 
 

@@ -21,6 +21,7 @@ SUMMARIES: Mapping[str, str] = {
     "window.",
     "design": "Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and "
     "axis.toml.",
+    "measure": "Design an excitation, play it on the controller, record, and track the response; Ctrl-C ramps it down.",
     "query": "Query the tables of a run with SQL (DuckDB).",
     "export": "Write the responses or the fitted parameters of a run in a format of other programs.",
     "margins": "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter "

@@ -56,19 +56,19 @@ def design_command(
         "band_hz": None if band is None else parsed_band(band),
     }  # fmt: skip
     asked = Experiment.read(experiment, {key: value for key, value in over.items() if value is not None})
-    with _working():
+    with working():
         made = design_experiment(asked, out, name=name, suffixes=to, force=force, draw=_draw if can_draw() else None)
     if as_json:
         print(to_json({"directory": str(made.directory), "files": list(made.files)} | made.design.plain()))
         return
-    _show(made.design)
+    show_design(made.design)
     if made.left_out:
         print(made.left_out)
     print(f"{made.directory}/: {', '.join(made.files)}")
     tell_how_to_draw()
 
 
-def _working() -> AbstractContextManager[object]:
+def working() -> AbstractContextManager[object]:
     """A spinner on a terminal: thousands of lines take time."""
 
     return terminal.console(stderr=True).status("choosing")
@@ -80,8 +80,8 @@ def _draw(design: Design, path: Path) -> None:
     save_excitation_picture(design, path)
 
 
-def _show(design: Design) -> None:
-
+def show_design(design: Design) -> None:
+    """Print what was chosen, and the accuracy of each line."""
     console = terminal.console(markup=False)
     table = _table()
     table.add_column("chosen", overflow="fold")

@@ -13,6 +13,7 @@ from livebode.doctor.recordings import check_recording
 from livebode.runtime.recorded_run import RecordedRun
 from livebode.sources.live import make_source
 from livebode.sources.live.address import Address
+from livebode.sources.live.hal import HalSource
 
 NAME = "source"
 TIMEOUT_S = 3.0
@@ -36,12 +37,25 @@ def _check(of: str, axis: Axis) -> Check:
         if settings.url is None:
             found = [check_recording(name, axis, path) for path in settings.logs]
             return next((check for check in found if check.verdict != "ok"), found[0])
-        address = make_source(settings).address
+        source = make_source(settings)
+        address = source.address
+        if isinstance(source, HalSource):
+            return _hal(name, source)
     except LivebodeError as error:
         return Check.of_error(name, error)
     if address.scheme == "stdin":
         return Check(name, "not applicable", "samples come from standard input")
     return _receiving(name, address) if address.scheme == "udp" else _connecting(name, address)
+
+
+def _hal(name: str, source: HalSource) -> Check:
+    facts = {"address": str(source.address)}
+    try:
+        wiring = source.wiring()
+    except OSError as error:
+        return Check(name, "failed", f"{source.address}: {error}", "check LinuxCNC on this computer", facts)
+    names = ", ".join(channel.name for channel in wiring.channels)
+    return Check(name, "ok", f"{source.address} samples {names} at {wiring.rate_hz:.9g} Hz", facts=facts)
 
 
 def _receiving(name: str, address: Address) -> Check:

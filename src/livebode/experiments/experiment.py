@@ -15,8 +15,10 @@ from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.toml_file import read_table, shortened
 from livebode.core import ConfigError, nearest_name
 from livebode.experiment_design import ExperimentSpec, Machine, MachineLimits, belt_machine
+from livebode.experiments.measure_section import MeasureSection
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
+from livebode.sources.live.settings import SourceSettings
 
 T = TypeVar("T")
 
@@ -52,6 +54,11 @@ class Experiment(BaseModel):
         Names of the channels in axis.toml. Default: those of the simulated axis or of the run.
     log
         Name of the recording in axis.toml, relative to it.
+    source
+        The controller on which `livebode measure` plays the excitation, and whose samples it records: [source] of
+        axis.toml.
+    measure
+        How the excitation is played, and what ends it.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -63,6 +70,8 @@ class Experiment(BaseModel):
     loop: LoopSection | None = None
     signals: dict[str, str] = {}
     log: str = "log.parquet"
+    source: SourceSettings | None = None
+    measure: MeasureSection = MeasureSection()
 
     @classmethod
     def read(cls, path: Path, over: Mapping[str, Any] | None = None) -> Experiment:
@@ -80,6 +89,8 @@ class Experiment(BaseModel):
             gone = {"lines": "band_hz" in above, "window": "resolution_hz" in above, "order": "resolution_hz" in above}
             data["excitation"] = {key: value for key, value in required.items() if not gone.get(key)} | above
         found = cls.of(data, str(path))
+        if found.source is not None:
+            found = found.model_copy(update={"source": found.source.beside(path.parent)})
         if found.measured is None:
             return found
         return found.model_copy(

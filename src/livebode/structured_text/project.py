@@ -23,7 +23,16 @@ _DECLARED: list[Declared] = [
     ("enable", "BOOL", "excite"),
     ("stop", "BOOL", "w = 0 at once: connect the drive's fault to it"),
     ("scale", "LREAL := 1.0", "of the excitation"),
+    ("watch", "UDINT", "cycles until enable is reset, renewed by livebode; 0: never"),
 ]
+_WATCH = """\
+IF watch > 0 THEN
+    watch := watch - 1;
+    IF watch = 0 THEN
+        enable := FALSE;
+    END_IF
+END_IF
+"""
 # A variable with one of these names would change the meaning of MAIN.
 _OWN = ("MAIN", "F_GetSystemTime", *(word for name, of, _ in _DECLARED for word in (name, of.split()[0])))
 
@@ -117,6 +126,7 @@ class Project:
             )
             + f"\n// 1. From the drive, of this cycle:\n{wired}\n\n"
             + "// 2. The excitation\n"
+            + _WATCH
             + "fbMultisine(enable := enable, stop := stop, scale := scale);\n"
             + f"{self.excitation} := fbMultisine.w;\n"
             + f"{self.counter} := ULINT_TO_LREAL(fbMultisine.sample);\n\n"

@@ -14,6 +14,7 @@ from livebode.core.errors.fit import FitError
 from livebode.core.errors.fleet import FleetError
 from livebode.core.errors.grid import GridError
 from livebode.core.errors.location import LocationError
+from livebode.core.errors.measurement import MeasurementError
 from livebode.core.errors.output import OutputError
 from livebode.core.errors.publish import PublishError
 from livebode.core.errors.record import RecordError
@@ -37,6 +38,7 @@ __all__ = [
     "GridError",
     "LivebodeError",
     "LocationError",
+    "MeasurementError",
     "OutputError",
     "PublishError",
     "RecordError",

@@ -14,7 +14,7 @@ PORTS: dict[str, int | None] = {
 
 @dataclass(frozen=True)
 class Address:
-    """Kind of source, host, port and path; `path` is the MQTT topic, or a file."""
+    """Kind of source, host, port and path; `path` is the MQTT topic, a file, or the whole of hal:sampler.0."""
 
     scheme: str
     host: str = ""
@@ -45,6 +45,8 @@ def parse_address(url: str) -> Address:
     """
     if url in ("stdin:", "stdin://"):
         return Address("stdin")
+    if url.startswith("hal:") and url.isprintable():
+        return Address("hal", path=url)
     if "@" in url:
         raise ConfigError(
             "secret-in-url",
@@ -65,7 +67,7 @@ def parse_address(url: str) -> Address:
     except ValueError:
         raise _url_error("is not an address", "give kind://host:port, with a port from 1 to 65535") from None
     if parts.scheme not in PORTS:
-        raise _url_error("has a scheme that is not supported", f"give one of {', '.join(PORTS)} or stdin:")
+        raise _url_error("has a scheme that is not supported", f"give one of {', '.join(PORTS)}, hal: or stdin:")
     port = port or PORTS[parts.scheme]
     if not host or port is None or "?" in url or "#" in url:
         raise _url_error("is not a complete address", f"give {parts.scheme}://host:port")

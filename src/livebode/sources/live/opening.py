@@ -19,6 +19,7 @@ MODULES = {
     "mqtts": "mqtt",
     "opc.tcp": "opcua",
     "ads": "ads",
+    "hal": "hal",
 }
 """The module of each kind of URL; it ends with SOURCE, and imports its library when the source is created."""
 

@@ -56,6 +56,7 @@ TAKEN: dict[str, set[str]] = {
     "mqtts": FRAMES | LOGIN | TLS | {"client_id"},
     "opc.tcp": {"rate_hz", "nodes", "sample_node", "security", "server_certificate_file"} | LOGIN | TLS - {"ca_file"},
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
+    "hal": {"channels", "sample_signal"},
 }
 """Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
@@ -137,7 +138,10 @@ class SourceSettings(BaseModel):
     symbol
         Symbol of the ring, or of the array that is notified (ADS).
     channels
-        Channels in the order of the symbol, each with its unit: "w [N m]" (ADS).
+        Channels in the order of the symbol, each with its unit: "w [N m]" (ADS). Names of signals at the sampler, each
+        with its unit (hal). Default for hal: all of them.
+    sample_signal
+        Signal at the sampler that counts the periods of its thread (hal).
     mode
         "ring": reads a ring in the PLC program, without losses. "notify": the PLC sends each sample (ADS).
     net_id
@@ -182,6 +186,7 @@ class SourceSettings(BaseModel):
     sample_node: str | None = None
     symbol: str | None = None
     channels: list[str] = []
+    sample_signal: str | None = None
     mode: Literal["ring", "notify"] = "ring"
     net_id: str | None = None
     local_net_id: str | None = None
