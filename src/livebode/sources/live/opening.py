@@ -19,6 +19,8 @@ MODULES = {
     "mqtts": "mqtt",
     "opc.tcp": "opcua",
     "ads": "ads",
+    "serial": "serial_line",
+    "can": "can_bus",
 }
 """The module of each kind of URL; it ends with SOURCE, and imports its library when the source is created."""
 

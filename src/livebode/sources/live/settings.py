@@ -56,6 +56,8 @@ TAKEN: dict[str, set[str]] = {
     "mqtts": FRAMES | LOGIN | TLS | {"client_id"},
     "opc.tcp": {"rate_hz", "nodes", "sample_node", "security", "server_certificate_file"} | LOGIN | TLS - {"ca_file"},
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
+    "serial": {"rate_hz", "channels", "counter", "counter_modulus", "baud_rate"},
+    "can": {"rate_hz", "dbc", "channels", "counter", "bitrate", "can_fd"},
 }
 """Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
@@ -96,7 +98,7 @@ class SourceSettings(BaseModel):
     skip_periods
         Number of periods that are left out at the beginning of the excitation in that part.
     dbc
-        DBC file that defines the signals of a recording of CAN frames, relative to this file.
+        DBC file that defines the signals of CAN frames, live or in a recording, relative to this file.
     follow
         The recording grows: a text table, or a directory of recordings.
     replay
@@ -137,7 +139,19 @@ class SourceSettings(BaseModel):
     symbol
         Symbol of the ring, or of the array that is notified (ADS).
     channels
-        Channels in the order of the symbol, each with its unit: "w [N m]" (ADS).
+        Channels in the order of the symbol (ADS) or of a line (serial), each with its unit: "w [N m]". Signals of the
+        DBC: "Get_Iq.Iq_Measured", or "Iq_Measured" if one message has it (CAN).
+    counter
+        The channel that counts the samples, so that losses are exact. Default: lines are counted (serial); frames are
+        numbered by their time (CAN).
+    counter_modulus
+        Number of values of the counter, if it wraps: 65536 for 16 bits (serial).
+    baud_rate
+        Bits per second of the serial port, as the device has it.
+    bitrate
+        Bits per second of the bus, for adapters that do not have it from the system (CAN).
+    can_fd
+        Receive CAN FD frames as well (CAN).
     mode
         "ring": reads a ring in the PLC program, without losses. "notify": the PLC sends each sample (ADS).
     net_id
@@ -182,6 +196,11 @@ class SourceSettings(BaseModel):
     sample_node: str | None = None
     symbol: str | None = None
     channels: list[str] = []
+    counter: str | None = None
+    counter_modulus: Annotated[int, Field(ge=2, le=1 << 53)] | None = None
+    baud_rate: Annotated[int, Field(ge=50, le=100_000_000)] = 115200
+    bitrate: Annotated[int, Field(ge=1000, le=20_000_000)] | None = None
+    can_fd: bool = False
     mode: Literal["ring", "notify"] = "ring"
     net_id: str | None = None
     local_net_id: str | None = None
