@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import select
+import struct
+import termios
 import time
 import tty
 
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
 from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, Peer, until
+
+_TIOCPKT_FLUSHREAD = 1
+"""A pseudo terminal in packet mode tells the device's end that its port was emptied."""
 
 
 class SerialPeer(Peer):
@@ -31,6 +37,8 @@ class SerialPeer(Peer):
         tty.setraw(port)
         self._name.symlink_to(os.ttyname(port))
         os.close(port)  # from now on the device sees whether somebody has opened the port
+        fcntl.ioctl(self._device, termios.TIOCPKT, struct.pack("i", 1))
+        os.set_blocking(self._device, False)
 
     def unplug(self) -> None:
         with contextlib.suppress(FileNotFoundError):
@@ -43,15 +51,21 @@ class SerialPeer(Peer):
         return not any(events & select.POLLHUP for _, events in poll.poll(0))
 
     def wait_ready(self) -> None:
-        until(self._opened, "the port to be opened")
+        until(self._emptied, "the port to be opened and emptied")
         self.write(self.greeting)
+
+    def _emptied(self) -> bool:
+        """Whether livebode has dropped what the port had before: what is sent earlier may be lost with it."""
+        try:
+            return bool(os.read(self._device, 1)[0] & _TIOCPKT_FLUSHREAD)
+        except OSError:  # nothing happened, or the port is closed
+            return False
 
     greeting = b"\n"
 
     def write(self, data: bytes) -> None:
         """All of it, as fast as the port is read; what nobody reads is lost."""
         end = time.monotonic() + PATIENCE_S
-        os.set_blocking(self._device, False)
         while data and time.monotonic() < end and self._opened():
             with contextlib.suppress(BlockingIOError):
                 data = data[os.write(self._device, data) :]
