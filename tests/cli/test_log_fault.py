@@ -127,6 +127,7 @@ SOURCES = {
     "opc.tcp": f'url = "opc.tcp://127.0.0.1:{{port}}"\nrate_hz = 1000\n{LOGIN}\n[source.nodes]\ny = "ns=2;s=y"',
     "ads": 'url = "ads://127.0.0.1:{port}"\nnet_id = "5.1.2.3.1.1"\nsymbol = "MAIN.r"\nchannels = ["w", "y"]',
     "can": f'url = "can:socketcan/no{{port}}"\ndbc = "{DBC}"\nrate_hz = 1000\nchannels = ["Vel_Estimate"]',
+    "klipper": 'url = "klipper:/nowhere/{port}"',
     "serial": 'url = "serial:/nowhere/tty{port}"',
 }
 

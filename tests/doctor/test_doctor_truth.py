@@ -145,6 +145,17 @@ def test_a_device_is_plugged_in_or_not(tmp_path: Path) -> None:
     assert doctor(path)[1]["source"]["verdict"] == "ok"
 
 
+def test_a_printer_listens_or_not(tmp_path: Path) -> None:
+    path = axis(tmp_path, f'url = "klipper:{tmp_path}/klippy_uds"')
+    code, checks = doctor(path)
+    assert code == 2
+    assert "klippy_uds: No such file" in checks["source"]["message"]
+    with closing(socket.socket(socket.AF_UNIX)) as server:
+        server.bind(str(tmp_path / "klippy_uds"))
+        server.listen()
+        assert doctor(path)[1]["source"]["verdict"] == "ok"
+
+
 def test_a_bus_is_there_or_not(tmp_path: Path) -> None:
     shutil.copy(ROOT / "examples/can/odrive.dbc", tmp_path)
     rest = 'dbc = "odrive.dbc"\nrate_hz = 1000\nchannels = ["Vel_Estimate"]'

@@ -95,8 +95,11 @@ def _bus(name: str, source: CanSource) -> Check:
 def _connecting(name: str, address: Address) -> Check:
     facts = {"address": str(address), "timeout_s": TIMEOUT_S}
     try:
-        with socket.create_connection((address.host, address.port), TIMEOUT_S):
-            pass
+        if address.scheme == "klipper":
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+                link.connect(str(Path(address.path).expanduser()))
+        else:
+            socket.create_connection((address.host, address.port), TIMEOUT_S).close()
     except OSError as error:
         why = f"no answer within {TIMEOUT_S:g} s" if isinstance(error, TimeoutError) else error.strerror or str(error)
         remedy = "check that it is switched on, its address in source.url, and the firewall"

@@ -10,7 +10,7 @@ from livebode.core import ConfigError
 PORTS: dict[str, int | None] = {
     "udp": None, "tcp": None, "mqtt": 1883, "mqtts": 8883, "opc.tcp": 4840, "ads": 48898,
 }  # fmt: skip
-DEVICES = {"serial": "serial:/dev/ttyACM0", "can": "can:socketcan/can0"}
+DEVICES = {"serial": "serial:/dev/ttyACM0", "can": "can:socketcan/can0", "klipper": "klipper:/tmp/klippy_uds"}
 """Kinds whose URL is kind:path, each with an example; of can the path is interface/channel."""
 
 

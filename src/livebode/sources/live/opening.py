@@ -21,6 +21,7 @@ MODULES = {
     "ads": "ads",
     "serial": "serial_line",
     "can": "can_bus",
+    "klipper": "klipper",
 }
 """The module of each kind of URL; it ends with SOURCE, and imports its library when the source is created."""
 

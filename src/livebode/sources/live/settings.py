@@ -58,6 +58,7 @@ TAKEN: dict[str, set[str]] = {
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
     "serial": {"rate_hz", "channels", "counter", "counter_modulus", "baud_rate"},
     "can": {"rate_hz", "dbc", "channels", "counter", "bitrate", "can_fd"},
+    "klipper": {"rate_hz", "accelerometer"},
 }
 """Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
@@ -152,6 +153,8 @@ class SourceSettings(BaseModel):
         Bits per second of the bus, for adapters that do not have it from the system (CAN).
     can_fd
         Receive CAN FD frames as well (CAN).
+    accelerometer
+        Section of the accelerometer in printer.cfg, such as "adxl345 bed" (Klipper).
     mode
         "ring": reads a ring in the PLC program, without losses. "notify": the PLC sends each sample (ADS).
     net_id
@@ -201,6 +204,7 @@ class SourceSettings(BaseModel):
     baud_rate: Annotated[int, Field(ge=50, le=100_000_000)] = 115200
     bitrate: Annotated[int, Field(ge=1000, le=20_000_000)] | None = None
     can_fd: bool = False
+    accelerometer: str = "adxl345"
     mode: Literal["ring", "notify"] = "ring"
     net_id: str | None = None
     local_net_id: str | None = None
