@@ -23,7 +23,7 @@ BATCH = 322
 RESONANCE_HZ, DAMPING = 60.0, 0.05
 HARMONICS = 700
 
-_signs = np.random.default_rng(4).permutation(np.repeat([-1.0, 1.0], PIECES // 2))
+_signs = np.random.default_rng(1).permutation(np.repeat([-1.0, 1.0], PIECES // 2))
 COMMAND = 5000.0 * _signs
 """Acceleration of each move in mm/s², without a mean: the velocity repeats as well."""
 

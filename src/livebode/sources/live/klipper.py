@@ -19,7 +19,7 @@ from livebode.core import ConfigError, LivebodeError, SourceError
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import Batch
 from livebode.sources.live.klipper_moves import HEADER as MOVE_FIELDS
-from livebode.sources.live.klipper_moves import Moves
+from livebode.sources.live.klipper_moves import SIDE, Moves
 from livebode.sources.live.on_grid import OnGrid
 from livebode.sources.live.position import Position
 from livebode.sources.live.settings import SourceSettings, named_channels
@@ -201,7 +201,7 @@ class KlipperSource(LiveSource):
         certain_s = max(self._moves.known_s, self._newest_s - WAIT_S)
         while self._waiting:
             first, values = self._waiting[0]
-            known = min(values.shape[1], int(np.floor(certain_s * self._rate_given - 0.5)) - first + 1)
+            known = min(values.shape[1], int(np.floor(certain_s * self._rate_given)) - SIDE - first + 1)
             if known <= 0:
                 break
             self._waiting.popleft()
@@ -209,8 +209,8 @@ class KlipperSource(LiveSource):
                 self._waiting.appendleft((first + known, values[:, known:]))
             command = self._moves.acceleration(first, known, self._rate_given)
             data = np.concatenate([command, values[:, :known]])
-            self._passed_s = (first + known - 0.5) / self._rate_given
-            self._moves.forget(self._passed_s)
+            self._passed_s = (first + known) / self._rate_given
+            self._moves.forget(self._passed_s - SIDE / self._rate_given)
             self._deliver(Batch(first, data, self._channels, self._rate_given, self._epoch))
 
 

@@ -12,6 +12,9 @@ Floats = NDArray[np.float64]
 MOVES_MAX = 1 << 16
 """Moves that wait for the samples of their time."""
 HEADER = ("time", "duration", "start_velocity", "acceleration", "start_position", "direction")
+SIDE = 3
+"""Periods on each side of a time from which its acceleration is computed."""
+_SECOND_DERIVATIVE = (1 / 90, -3 / 20, 3 / 2, -49 / 18, 3 / 2, -3 / 20, 1 / 90)
 _AXES = 3
 
 
@@ -46,27 +49,36 @@ class Moves:
         return float(moves[0, 0])
 
     def acceleration(self, first: int, numbers: int, rate_hz: float) -> Floats:
-        """Mean acceleration over one period around each of so many multiples of it, shape (3, numbers), in mm/s².
+        """Commanded acceleration at so many multiples of a period, shape (3, numbers), in mm/s².
 
-        It is the change of the commanded velocity: at the corner between two moves the velocity may jump.
+        It is the second derivative of the commanded position at seven multiples. The acceleration itself jumps, and
+        samples of it would contain what is above half the rate; the position is smooth. At 1/16 of the rate the error
+        is 3·10⁻⁴ of what the moves contain there.
         """
-        edges_s = np.asarray((np.arange(first, first + numbers + 1) - 0.5) / rate_hz, dtype=np.float64)
-        return np.asarray(np.diff(self._velocity(edges_s), axis=1) * rate_hz)
+        times_s = np.asarray(np.arange(first - SIDE, first + numbers + SIDE) / rate_hz, dtype=np.float64)
+        position = self._displacement(times_s)
+        found = np.zeros((_AXES, numbers))
+        for at, weight in enumerate(_SECOND_DERIVATIVE):
+            found += weight * position[:, at : at + numbers]
+        return found * rate_hz**2
 
     def forget(self, time_s: float) -> None:
         """Drop the moves that ended before this print time."""
         self._moves = self._moves[self._moves[:, 0] + self._moves[:, 1] >= time_s]
 
-    def _velocity(self, time_s: Floats) -> Floats:
+    def _displacement(self, time_s: Floats) -> Floats:
+        """Displacement since the oldest move, shape (3, times), in mm."""
         moves = self._moves
         if not len(moves):
             return np.zeros((_AXES, time_s.size))
+        duration_s, speed, acceleration, direction = moves[:, 1], moves[:, 2], moves[:, 3], moves[:, 4:]
+        paths = (speed * duration_s + 0.5 * acceleration * duration_s**2)[:, None] * direction
+        before = np.concatenate([np.zeros((1, _AXES)), np.cumsum(paths, axis=0)])
         at = np.searchsorted(moves[:, 0], time_s, side="right") - 1
-        move = moves[np.maximum(at, 0)]
-        since_s = time_s - move[:, 0]
-        moving = (at >= 0) & (since_s < move[:, 1])
-        speed = np.where(moving, move[:, 2] + move[:, 3] * since_s, 0.0)
-        return (speed[:, None] * move[:, 4:]).T
+        move = np.maximum(at, 0)
+        since_s = np.where(at >= 0, np.minimum(time_s - moves[move, 0], duration_s[move]), 0.0)
+        path = speed[move] * since_s + 0.5 * acceleration[move] * since_s**2
+        return np.asarray((before[move] + path[:, None] * direction[move]).T)
 
 
 def _checked(rows: object) -> Floats:
