@@ -128,6 +128,8 @@ SOURCES = {
     "ads": 'url = "ads://127.0.0.1:{port}"\nnet_id = "5.1.2.3.1.1"\nsymbol = "MAIN.r"\nchannels = ["w", "y"]',
     "can": f'url = "can:socketcan/no{{port}}"\ndbc = "{DBC}"\nrate_hz = 1000\nchannels = ["Vel_Estimate"]',
     "klipper": 'url = "klipper:/nowhere/{port}"',
+    "daqref": 'url = "daqref://none{port}"',
+    "daq.nd": 'url = "daq.nd://127.0.0.1:{port}"',
     "serial": 'url = "serial:/nowhere/tty{port}"',
 }
 

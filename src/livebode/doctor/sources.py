@@ -47,6 +47,8 @@ def _check(of: str, axis: Axis) -> Check:
     address = source.address
     if address.scheme == "stdin":
         return Check(name, "not applicable", "samples come from standard input")
+    if address.scheme.startswith("daq"):
+        return Check(name, "not applicable", f"{address} is opened by the SDK of openDAQ when the run begins")
     if address.scheme == "serial":
         return _plugged_in(name, address)
     return _receiving(name, address) if address.scheme == "udp" else _connecting(name, address)

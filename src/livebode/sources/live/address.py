@@ -10,7 +10,13 @@ from livebode.core import ConfigError
 PORTS: dict[str, int | None] = {
     "udp": None, "tcp": None, "mqtt": 1883, "mqtts": 8883, "opc.tcp": 4840, "ads": 48898,
 }  # fmt: skip
-DEVICES = {"serial": "serial:/dev/ttyACM0", "can": "can:socketcan/can0", "klipper": "klipper:/tmp/klippy_uds"}
+DEVICES = {
+    "serial": "serial:/dev/ttyACM0",
+    "can": "can:socketcan/can0",
+    "klipper": "klipper:/tmp/klippy_uds",
+    "daqref": "daqref://device0",
+    "daq.nd": "daq.nd://192.168.0.5",
+}
 """Kinds whose URL is kind:path, each with an example; of can the path is interface/channel."""
 
 
@@ -25,7 +31,7 @@ class Address:
 
     def __str__(self) -> str:
         if self.scheme in DEVICES:
-            return f"{self.scheme}:{self.path}"
+            return f"{self.scheme}:{'//' if self.scheme.startswith('daq') else ''}{self.path}"
         if not self.host:
             return self.path or "stdin:"
         host = f"[{self.host}]" if ":" in self.host else self.host
@@ -87,7 +93,7 @@ def parse_address(url: str) -> Address:
 def _device(kind: str, path: str) -> Address:
     if path.startswith("//"):
         path = "/" + path.lstrip("/")
-    path = path.lstrip("/") if kind == "can" else path
+    path = path if kind in ("serial", "klipper") else path.lstrip("/")
     if not path.strip("/") or (kind == "can" and "/" not in path.strip("/")):
         raise _url_error("names no device", f"give one such as {DEVICES[kind]}")
     return Address(kind, path=path)

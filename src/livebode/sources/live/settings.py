@@ -59,6 +59,8 @@ TAKEN: dict[str, set[str]] = {
     "serial": {"rate_hz", "channels", "counter", "counter_modulus", "baud_rate"},
     "can": {"rate_hz", "dbc", "channels", "counter", "bitrate", "can_fd"},
     "klipper": {"rate_hz", "accelerometer"},
+    "daqref": {"channels"},
+    "daq.nd": {"channels"},
 }
 """Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
@@ -141,7 +143,8 @@ class SourceSettings(BaseModel):
         Symbol of the ring, or of the array that is notified (ADS).
     channels
         Channels in the order of the symbol (ADS) or of a line (serial), each with its unit: "w [N m]". Signals of the
-        DBC: "Get_Iq.Iq_Measured", or "Iq_Measured" if one message has it (CAN).
+        DBC: "Get_Iq.Iq_Measured", or "Iq_Measured" if one message has it (CAN). Signals of the
+        device; default: all that share the clock of the first (openDAQ).
     counter
         The channel that counts the samples, so that losses are exact. Default: lines are counted (serial); frames are
         numbered by their time (CAN).
