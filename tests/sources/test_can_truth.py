@@ -178,7 +178,7 @@ def test_a_dbc_of_another_node_is_reported_with_what_the_bus_has(tmp_path):
         ({"dbc": None}, "key-missing", {"keys": ["dbc"]}),
         ({"rate_hz": None}, "key-missing", {"keys": ["rate_hz"]}),
         ({"channels": []}, "key-missing", {"keys": ["channels"]}),
-        ({"channels": ["Vel_Estimat"]}, "channel-unknown", {"channel": "Vel_Estimat"}),
+        ({"channels": ["Vel_Estimat"]}, "value-invalid", {"channel": "Vel_Estimat"}),
         ({"counter": "n"}, "value-invalid", {"key": "source.counter", "value": "n"}),
         ({"counter": "Iq_Setpoint"}, "value-invalid", {"value": "Iq_Setpoint"}),
         ({"channels": ["Vel_Estimate"], "counter": "Vel_Estimate"}, "value-invalid", {"value": "Vel_Estimate"}),

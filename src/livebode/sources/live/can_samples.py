@@ -64,7 +64,7 @@ def _signal(heading: str, found: dict[str, list[Signal]], full: list[str]) -> Si
         wrong = f"is a signal of {len(same)} messages" if same else "is not a signal of the DBC, or is multiplexed"
         remedy = f"write {' or '.join(f for f in full if f.endswith('.' + name))}" if same else nearest_name(name, full)
         raise ConfigError(
-            "channel-unknown", f"source.channels: {name!r} {wrong}", remedy, key="source.channels", channel=name
+            "value-invalid", f"source.channels: {name!r} {wrong}", remedy, key="source.channels", channel=name
         )
     return same[0]._replace(channel=Channel(name, unit)) if unit else same[0]
 
