@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 
 import numpy as np
 import pytest
@@ -10,15 +11,16 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from livebode.core import Channel, ConfigError, SourceError
-from livebode.sources.live import SourceSettings, make_source
+from livebode.sources.live import Position, SourceSettings, make_source
 from livebode.sources.live.arrival_rate import ArrivalRate
+from livebode.sources.live.computer_clock import ClockReading
 from livebode.sources.live.counter import Counter
 from livebode.sources.live.number_lines import NumberLines, numbers_in
 from livebode.sources.live.serial_decoder import UNKNOWN_BYTES, FramesOrJson, NumbersDecoder
 from livebode.sources.live.source_events import SourceEvents
 from tests.support.damaged_bytes import damaged, one_sentence
 from tests.support.errors import refused
-from tests.support.peers.peer import CHANNELS, RATE_HZ, batches, fed
+from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, Feeding, batches, fed
 from tests.support.peers.serial_line import SerialNumbersPeer
 
 SETTINGS = {"url": "serial:/nowhere", "channels": ["n", "y [m]"]}
@@ -139,6 +141,31 @@ def test_impossible_settings_of_a_serial_line_are_refused(given_keys, code, fact
 def test_a_line_that_is_not_of_two_numbers_is_refused(line):
     with refused(SourceError, "line-not-numbers"):
         numbers_in(line, 2)
+
+
+@pytest.mark.parametrize(("modulus", "epoch", "kind"), [(None, 3, "loss"), (1 << 16, 4, "restart")])
+def test_a_run_continues_exactly_where_the_counter_does_not_wrap(tmp_path, modulus, epoch, kind):
+    given = batches(40, first=2000)
+    with SerialNumbersPeer(tmp_path) as peer:
+        keys = peer.settings | ({} if modulus is None else {"counter_modulus": modulus})
+        source = make_source(SourceSettings(**keys, timeout_s=PATIENCE_S))
+        source.resume(Position(700, 3, 1500, RATE_HZ, ClockReading.at(time.monotonic())))
+
+        def script():
+            peer.wait_ready()
+            for batch in given:
+                peer.send(batch)
+
+        with Feeding(script) as feeding, source:
+            block = next(source.open().blocks())
+            feeding.join()
+            kinds = [event.kind for event in source.take_events()]
+    assert block.origin.epoch == epoch
+    assert block["w"][0] == 2000
+    assert block.gap
+    assert kind in kinds
+    if modulus is None:
+        assert block.start == 1200
 
 
 def test_half_a_line_at_the_moment_of_unplugging_is_not_a_sample(tmp_path):

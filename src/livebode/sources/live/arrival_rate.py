@@ -28,10 +28,14 @@ class ArrivalRate:
         """Begin again: the sender restarted."""
         self._blocks: deque[tuple[float, float]] = deque(maxlen=BLOCKS)
         self._begin_s: float | None = None
+        self._newest = -1
         self._least: tuple[float, float] = (0.0, 0.0)
 
     def take(self, number: int, time_s: float) -> None:
         """Sample `number` arrived at `time_s`."""
+        if number < self._newest:
+            self.restart()
+        self._newest = number
         delay_s = time_s - number / self._rate_hz
         if self._begin_s is None:
             self._begin_s, self._least = time_s, (time_s, delay_s)

@@ -65,8 +65,7 @@ class CanSource(LiveSource):
 
     def resume(self, position: Position) -> None:
         super().resume(position)
-        self._samples = self._new_samples(position.epoch)
-        self._samples.restart()
+        self._samples = self._new_samples(position.epoch + 1)  # a counter has wrapped, and times may have been set
 
     def _receive(self) -> bool:
         with self.open_bus() as bus:

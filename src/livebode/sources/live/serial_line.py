@@ -37,14 +37,15 @@ class SerialSource(LiveSource):
     def resume(self, position: Position) -> None:
         super().resume(position)
         if self._lines is not None:
-            self._lines = number_lines(self.settings, position.epoch)
-            self._lines.restart()
+            # Only a counter that does not wrap tells what is missing after a pause of any length.
+            certain = self.settings.counter is not None and self.settings.counter_modulus is None
+            self._lines = number_lines(self.settings, position.epoch + (not certain))
 
     def _receive(self) -> bool:
         # Another program that reads the port would take bytes from this one.
         with self._serial.Serial(self.address.path, self.settings.baud_rate, timeout=TICK_S, exclusive=True) as port:
             self._established()
-            decoder = self._decoder()
+            decoder, self._arrival = self._decoder(), None
             try:
                 while not self._stop.is_set():
                     if piece := port.read(1):
