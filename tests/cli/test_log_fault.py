@@ -20,7 +20,7 @@ from livebode.configuration import Axis
 from livebode.core import SourceError
 from livebode.dashboard import Dashboard, Serving
 from livebode.sources.live import SourceSettings, make_source
-from livebode.sources.live.address import PORTS
+from livebode.sources.live.address import DEVICES, PORTS
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.peers.peer import Feeding, batches, free_port, send_all, until
 from tests.support.peers.plain import TcpPeer
@@ -118,6 +118,7 @@ def test_a_log_file_is_of_bounded_size(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 LOGIN = 'username = "joe-the-user"\npassword_env = "LIVEBODE_TEST_PASSWORD"'
+DBC = Path(__file__).parents[2] / "examples/can/odrive.dbc"
 SOURCES = {
     "udp": 'url = "udp://127.0.0.1:{port}"',
     "tcp": 'url = "tcp://127.0.0.1:{port}"',
@@ -125,11 +126,16 @@ SOURCES = {
     "mqtts": f'url = "mqtts://127.0.0.1:{{port}}/t"\n{LOGIN}',
     "opc.tcp": f'url = "opc.tcp://127.0.0.1:{{port}}"\nrate_hz = 1000\n{LOGIN}\n[source.nodes]\ny = "ns=2;s=y"',
     "ads": 'url = "ads://127.0.0.1:{port}"\nnet_id = "5.1.2.3.1.1"\nsymbol = "MAIN.r"\nchannels = ["w", "y"]',
+    "can": f'url = "can:socketcan/no{{port}}"\ndbc = "{DBC}"\nrate_hz = 1000\nchannels = ["Vel_Estimate"]',
+    "klipper": 'url = "klipper:/nowhere/{port}"',
+    "daqref": 'url = "daqref://none{port}"',
+    "daq.nd": 'url = "daq.nd://127.0.0.1:{port}"',
+    "serial": 'url = "serial:/nowhere/tty{port}"',
 }
 
 
 def test_every_kind_of_url_is_in_the_test_below() -> None:
-    assert set(SOURCES) == set(PORTS)
+    assert set(SOURCES) == {*PORTS, *DEVICES}
 
 
 @pytest.mark.parametrize("kind", SOURCES)

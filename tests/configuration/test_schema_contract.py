@@ -16,6 +16,7 @@ from livebode.configuration.axes import axes_of
 from livebode.configuration.schema import axis_schema
 from livebode.core import ConfigError, LivebodeError
 from livebode.sources.live import SourceSettings, make_source
+from livebode.sources.live.address import DEVICES
 from livebode.sources.live.settings import TAKEN
 from tests.support.schemas import tables, validator, values_of, with_value
 
@@ -68,10 +69,10 @@ def test_a_value_is_valid_where_livebode_accepts_it(table: tuple[str, ...]) -> N
 
 @pytest.mark.parametrize("kind", TAKEN)
 def test_a_source_has_the_keys_of_its_kind(kind: str) -> None:
-    url = "stdin:" if kind == "stdin" else f"{kind}://192.168.0.5:5000"
+    url = {"stdin": "stdin:", **DEVICES}.get(kind, f"{kind}://192.168.0.5:5000")
     for name, key in TABLES[("source",)]["properties"].items():
         if name not in ("log", "url", "follow", "replay"):
-            candidates = (key.get("default"), "x", 1, ["x"], {"x": "x"}, *key.get("enum", []))
+            candidates = (key.get("default"), "x", 2, 5000, ["x"], {"x": "x"}, *key.get("enum", []))
             value = next(value for value in candidates if fits(key, value))
             data = SMALLEST | {"source": {"url": url, name: value}}
             assert VALID.is_valid(data) == accepted(data), (name, value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import socket
 import subprocess
 import sys
@@ -132,6 +133,38 @@ def test_a_machine_is_reached_or_not(tmp_path: Path, scheme: str, more: str) -> 
     assert f"127.0.0.1:{port}" in checks["source"]["message"]
     with socket.create_server(("127.0.0.1", port)):
         assert doctor(path)[1]["source"]["verdict"] == "ok"
+
+
+def test_a_device_is_plugged_in_or_not(tmp_path: Path) -> None:
+    path = axis(tmp_path, f'url = "serial:{tmp_path}/ttyACM0"')
+    code, checks = doctor(path)
+    assert code == 2
+    assert checks["source"]["verdict"] == "failed"
+    assert "there is no such device" in checks["source"]["message"]
+    (tmp_path / "ttyACM0").touch()
+    assert doctor(path)[1]["source"]["verdict"] == "ok"
+
+
+def test_a_printer_listens_or_not(tmp_path: Path) -> None:
+    path = axis(tmp_path, f'url = "klipper:{tmp_path}/klippy_uds"')
+    code, checks = doctor(path)
+    assert code == 2
+    assert "klippy_uds: No such file" in checks["source"]["message"]
+    with closing(socket.socket(socket.AF_UNIX)) as server:
+        server.bind(str(tmp_path / "klippy_uds"))
+        server.listen()
+        assert doctor(path)[1]["source"]["verdict"] == "ok"
+
+
+def test_a_bus_is_there_or_not(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "examples/can/odrive.dbc", tmp_path)
+    rest = 'dbc = "odrive.dbc"\nrate_hz = 1000\nchannels = ["Vel_Estimate"]'
+    assert doctor(axis(tmp_path, f'url = "can:virtual/1"\n{rest}'))[1]["source"]["verdict"] == "ok"
+    for url, words in (("can:socketcan/nocan7", "nocan7"), ("can:nothing/1", "no interface 'nothing'")):
+        code, checks = doctor(axis(tmp_path, f'url = "{url}"\n{rest}'))
+        assert code == 2
+        assert checks["source"]["verdict"] == "failed"
+        assert words in checks["source"]["message"]
 
 
 def test_a_port_that_another_program_receives_udp_on_fails(tmp_path: Path) -> None:

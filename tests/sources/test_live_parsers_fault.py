@@ -384,7 +384,7 @@ def test_frames_that_are_refused(frame, code, facts):
 
 URLS = [
     "udp://0.0.0.0:5000", "tcp://plc:1", "mqtt://broker/a/b", "mqtts://[::1]:8883/x", "opc.tcp://h:4840/server", "ads://h",
-    "stdin:", "hal:sampler.0",
+    "stdin:", "serial:/dev/ttyACM0", "serial:COM3", "can:socketcan/can0", "hal:sampler.0",
 ]  # fmt: skip
 
 
@@ -405,6 +405,7 @@ def test_damaged_addresses_give_an_address_or_a_sentence():
     [
         "http://h:1/hunter2", "udp://:5000", "udp://h", "udp://h:99999", "tcp://h:1/hunter2", "mqtt://h?x=hunter2",
         "5000", "udp://h:1\n", "mqtt://me:hunter2", "mqtt://me:hunter2%40h/t", "mqtt://h#hunter2", "hunter2",
+        "serial:", "serial:///", "can:can0",
     ],
 )  # fmt: skip
 def test_addresses_that_are_refused_are_not_repeated(url):

@@ -32,6 +32,7 @@ class SourceError(LivebodeError):
         "key-unknown": "A message of the sender has an unknown key.",
         "layout-invalid": "The text that describes the channels or spectra cannot be read.",
         "line-not-json": "A line of the sender is not a JSON object.",
+        "line-not-numbers": "A line of the sender does not have a number for each channel.",
         "line-too-long": "A line of the sender is longer than is read.",
         "no-samples": "No samples came in time.",
         "not-found": "The file to follow does not exist yet.",

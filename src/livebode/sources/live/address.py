@@ -10,11 +10,19 @@ from livebode.core import ConfigError
 PORTS: dict[str, int | None] = {
     "udp": None, "tcp": None, "mqtt": 1883, "mqtts": 8883, "opc.tcp": 4840, "ads": 48898,
 }  # fmt: skip
+DEVICES = {
+    "serial": "serial:/dev/ttyACM0",
+    "can": "can:socketcan/can0",
+    "klipper": "klipper:/tmp/klippy_uds",
+    "daqref": "daqref://device0",
+    "daq.nd": "daq.nd://192.168.0.5",
+}
+"""Kinds whose URL is kind:path, each with an example; of can the path is interface/channel."""
 
 
 @dataclass(frozen=True)
 class Address:
-    """Kind of source, host, port and path; `path` is the MQTT topic, a file, or the whole of hal:sampler.0."""
+    """Kind of source, host, port and path; `path` is the MQTT topic, a device, a file, or the whole of hal:sampler.0."""
 
     scheme: str
     host: str = ""
@@ -22,6 +30,8 @@ class Address:
     path: str = ""
 
     def __str__(self) -> str:
+        if self.scheme in DEVICES:
+            return f"{self.scheme}:{'//' if self.scheme.startswith('daq') else ''}{self.path}"
         if not self.host:
             return self.path or "stdin:"
         host = f"[{self.host}]" if ":" in self.host else self.host
@@ -42,6 +52,8 @@ def parse_address(url: str) -> Address:
     Address(scheme='mqtt', host='broker', port=1883, path='plant/axis1')
     >>> str(parse_address("udp://127.0.0.1:5000"))
     'udp://127.0.0.1:5000'
+    >>> str(parse_address("serial:///dev/ttyACM0"))
+    'serial:/dev/ttyACM0'
     """
     if url in ("stdin:", "stdin://"):
         return Address("stdin")
@@ -61,13 +73,16 @@ def parse_address(url: str) -> Address:
             "give the URL of the machine",
             key="source.url",
         )
+    kind, _, path = url.partition(":")
+    if kind in DEVICES:
+        return _device(kind, path)
     try:
         parts = urlsplit(url)
         port, host = parts.port, parts.hostname
     except ValueError:
         raise _url_error("is not an address", "give kind://host:port, with a port from 1 to 65535") from None
     if parts.scheme not in PORTS:
-        raise _url_error("has a scheme that is not supported", f"give one of {', '.join(PORTS)}, hal: or stdin:")
+        raise _url_error("has a scheme that is not supported", f"give one of {', '.join([*PORTS, *DEVICES])}, hal: or stdin:")
     port = port or PORTS[parts.scheme]
     if not host or port is None or "?" in url or "#" in url:
         raise _url_error("is not a complete address", f"give {parts.scheme}://host:port")
@@ -75,6 +90,15 @@ def parse_address(url: str) -> Address:
     if path and not parts.scheme.startswith(("mqtt", "opc")):
         raise _url_error(f"has a path, but {parts.scheme} has none", "remove what is after the port")
     return Address(parts.scheme, host, port, path)
+
+
+def _device(kind: str, path: str) -> Address:
+    if path.startswith("//"):
+        path = "/" + path.lstrip("/")
+    path = path if kind in ("serial", "klipper") else path.lstrip("/")
+    if not path.strip("/") or (kind == "can" and "/" not in path.strip("/")):
+        raise _url_error("names no device", f"give one such as {DEVICES[kind]}")
+    return Address(kind, path=path)
 
 
 def _url_error(wrong: str, remedy: str) -> ConfigError:

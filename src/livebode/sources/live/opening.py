@@ -20,6 +20,11 @@ MODULES = {
     "opc.tcp": "opcua",
     "ads": "ads",
     "hal": "hal",
+    "serial": "serial_line",
+    "can": "can_bus",
+    "klipper": "klipper",
+    "daqref": "daq",
+    "daq.nd": "daq",
 }
 """The module of each kind of URL; it ends with SOURCE, and imports its library when the source is created."""
 

@@ -57,6 +57,11 @@ TAKEN: dict[str, set[str]] = {
     "opc.tcp": {"rate_hz", "nodes", "sample_node", "security", "server_certificate_file"} | LOGIN | TLS - {"ca_file"},
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
     "hal": {"channels", "sample_signal"},
+    "serial": {"rate_hz", "channels", "counter", "counter_modulus", "baud_rate"},
+    "can": {"rate_hz", "dbc", "channels", "counter", "bitrate", "can_fd"},
+    "klipper": {"rate_hz", "accelerometer"},
+    "daqref": {"channels"},
+    "daq.nd": {"channels"},
 }
 """Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
@@ -97,7 +102,7 @@ class SourceSettings(BaseModel):
     skip_periods
         Number of periods that are left out at the beginning of the excitation in that part.
     dbc
-        DBC file that defines the signals of a recording of CAN frames, relative to this file.
+        DBC file that defines the signals of CAN frames, live or in a recording, relative to this file.
     follow
         The recording grows: a text table, or a directory of recordings.
     replay
@@ -138,8 +143,23 @@ class SourceSettings(BaseModel):
     symbol
         Symbol of the ring, or of the array that is notified (ADS).
     channels
-        Channels in the order of the symbol, each with its unit: "w [N m]" (ADS). Names of signals at the sampler, each
-        with its unit (hal). Default for hal: all of them.
+        Channels in the order of the symbol (ADS) or of a line (serial), each with its unit: "w [N m]". Signals of the
+        DBC: "Get_Iq.Iq_Measured", or "Iq_Measured" if one message has it (CAN). Signals of the
+        device; default: all that share the clock of the first (openDAQ). Names of signals at the sampler, each with its
+        unit; default: all of them (hal).
+    counter
+        The channel that counts the samples, so that losses are exact. Default: lines are counted (serial); frames are
+        numbered by their time (CAN).
+    counter_modulus
+        Number of values of the counter, if it wraps: 65536 for 16 bits (serial).
+    baud_rate
+        Bits per second of the serial port, as the device has it.
+    bitrate
+        Bits per second of the bus, for adapters that do not have it from the system (CAN).
+    can_fd
+        Receive CAN FD frames as well (CAN).
+    accelerometer
+        Section of the accelerometer in printer.cfg, such as "adxl345 bed" (Klipper).
     sample_signal
         Signal at the sampler that counts the periods of its thread (hal).
     mode
@@ -187,6 +207,12 @@ class SourceSettings(BaseModel):
     symbol: str | None = None
     channels: list[str] = []
     sample_signal: str | None = None
+    counter: str | None = None
+    counter_modulus: Annotated[int, Field(ge=2, le=1 << 53)] | None = None
+    baud_rate: Annotated[int, Field(ge=50, le=100_000_000)] = 115200
+    bitrate: Annotated[int, Field(ge=1000, le=20_000_000)] | None = None
+    can_fd: bool = False
+    accelerometer: str = "adxl345"
     mode: Literal["ring", "notify"] = "ring"
     net_id: str | None = None
     local_net_id: str | None = None
