@@ -16,8 +16,8 @@ from functools import cache, partial
 from math import inf
 
 _THREADS = 4  # a sync that takes long leaves room for other records; the work between syncs is little
-_SLOW_S = 0.05  # a job that takes longer shows a disk that does not answer
-_BESIDE_S = 60.0  # after such a job, all jobs of the process are done in threads for so long
+_SLOW_S = 0.2  # a job that takes longer shows a disk that does not answer, or a start of many axes
+_BESIDE_S, _BESIDE_S_MAX = 5.0, 600.0  # after such a job, all are done in threads for so long; twice that at the next
 
 
 class Writer:
@@ -84,18 +84,20 @@ class _AtOnce:
 
     def __init__(self) -> None:
         self._free = threading.Lock()
-        self._slow_s = -inf
+        self._resumes_s, self._beside_s = -inf, _BESIDE_S
 
     def do(self, job: Callable[[], None]) -> bool:
         """Do it, or return False: the last slow one was a short time ago, or one has not returned."""
         began_s = time.monotonic()
-        if began_s - self._slow_s < _BESIDE_S or not self._free.acquire(blocking=False):
+        if began_s < self._resumes_s or not self._free.acquire(blocking=False):
             return False
         try:
             job()
         finally:
             ended_s = time.monotonic()
-            self._slow_s = ended_s if ended_s - began_s > _SLOW_S else self._slow_s
+            if ended_s - began_s > _SLOW_S:
+                self._resumes_s = ended_s + self._beside_s
+                self._beside_s = min(2 * self._beside_s, _BESIDE_S_MAX)
             self._free.release()
         return True
 
