@@ -13,9 +13,11 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
+import random
 import socket
 import tempfile
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event as Flag
@@ -222,12 +224,13 @@ def show(name: str, found: dict[str, float], targets: dict[str, bool]) -> None:
 
 
 def free_ports(count: int, kind: int = socket.SOCK_DGRAM) -> list[int]:
-    links = [socket.socket(socket.AF_INET, kind) for _ in range(count)]
-    for link in links:
-        link.bind(("127.0.0.1", 0))
-    ports = [int(link.getsockname()[1]) for link in links]
-    for link in links:
-        link.close()
+    """Ports that are free, below those that a system gives to senders: one of these may have it before its receiver."""
+    ports: list[int] = []
+    candidates = random.sample(range(20_000, 32_000), 4_000)
+    while len(ports) < count:
+        with socket.socket(socket.AF_INET, kind) as link, suppress(OSError):  # it is in use
+            link.bind(("127.0.0.1", candidates.pop()))
+            ports.append(int(link.getsockname()[1]))
     return ports
 
 

@@ -40,7 +40,7 @@ class Load:
         return self.together * Hall(1, self.spectra).step / RATE_HZ
 
 
-LOADS = Load(False, 1), Load(False, 4), Load(False, 10), Load(True, 1), Load(True, 5)
+LOADS = Load(False, 2), Load(False, 4), Load(False, 10), Load(True, 1), Load(True, 5)
 
 
 class Drive(UdpSource):

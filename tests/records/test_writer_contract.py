@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
+import time
 from pathlib import Path
 
 import pytest
 
-from livebode.records.segments import disk
+from livebode.records.segments import disk, writer
 from livebode.records.segments.journal import last_commit
 from livebode.records.segments.phase import Phase
 from livebode.records.segments.writer import Writer
@@ -26,6 +27,52 @@ def test_jobs_of_a_record_are_done_in_order_while_another_record_waits_for_its_d
     disk_answers.set()
     slow.wait()
     assert done[100:] == [-1]
+
+
+class AtOnce:
+    """Jobs that are to be done at once, and the threads that did them."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(writer, "_at_once", writer._AtOnce())
+        self.by: list[threading.Thread] = []
+
+    def add(self, to: Writer) -> threading.Thread:
+        """Add one, and return the thread that did it."""
+        to.add(lambda: self.by.append(threading.current_thread()), at_once=True)
+        to.wait()
+        return self.by[-1]
+
+
+def test_a_job_is_done_at_once_after_the_ones_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    jobs, record, go_on, done = AtOnce(monkeypatch), Writer(), threading.Event(), list[int]()
+    assert jobs.add(record) is threading.current_thread()
+    record.add(lambda: done.append(1 if go_on.wait(PATIENCE_S) else -1))
+    record.add(lambda: done.append(2), at_once=True)
+    assert done == []
+    go_on.set()
+    record.wait()
+    assert done == [1, 2]
+
+
+def test_jobs_are_done_beside_the_axes_after_one_that_took_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    jobs = AtOnce(monkeypatch)
+    Writer().add(lambda: time.sleep(2 * writer._SLOW_S), at_once=True)
+    assert jobs.add(Writer()) is not threading.current_thread()
+
+
+def test_jobs_are_done_beside_the_axes_while_one_does_not_return(monkeypatch: pytest.MonkeyPatch) -> None:
+    jobs, begun, disk_answers = AtOnce(monkeypatch), threading.Event(), threading.Event()
+
+    def hang() -> None:
+        begun.set()
+        disk_answers.wait(PATIENCE_S)
+
+    hanging = threading.Thread(target=lambda: Writer().add(hang, at_once=True))
+    hanging.start()
+    assert begun.wait(PATIENCE_S)
+    assert jobs.add(Writer()) is not threading.current_thread()
+    disk_answers.set()
+    hanging.join()
 
 
 def test_nothing_is_written_after_a_job_that_failed() -> None:

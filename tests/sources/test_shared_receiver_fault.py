@@ -1,4 +1,4 @@
-"""One thread receives for all UDP sources, and what waits for a turn comes as one Block."""
+"""The thread that computes receives for all UDP sources, another one where it does not come to it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from livebode.sources.live import LiveBlock
 from livebode.sources.live.datagrams import DatagramReceiver
 from livebode.sources.live.inbox import Inbox
-from tests.support.peers.peer import RATE_HZ, SAMPLES, batches, fed, send_all, until
+from tests.support.peers.peer import PATIENCE_S, RATE_HZ, SAMPLES, batches, fed, send_all, until
 from tests.support.peers.plain import TcpPeer
 
 
@@ -69,6 +69,34 @@ def test_a_port_that_fails_raises_in_its_own_source_and_disturbs_no_other() -> N
             send(a, b"3")
             until(lambda: len(got) == 2, "the port that failed")
     assert got == [(b"2", "127.0.0.1"), (b"3", "127.0.0.1")]
+
+
+def test_a_thread_that_waits_receives_until_it_does_something_else_for_long() -> None:
+    receiver, by = DatagramReceiver(), []
+    with port() as a, receiver.receiving(a, lambda *_: by.append(threading.current_thread())):
+
+        def received() -> bool:
+            send(a, b"1")
+            receiver.receive(0.1)
+            return by[-1:] == [threading.current_thread()]
+
+        until(received, "this thread to receive")
+        send(a, b"2")
+        until(lambda: by[-1].name == "livebode datagrams", "the other thread to receive")
+
+
+def test_a_thread_that_waits_for_datagrams_is_woken() -> None:
+    receiver, returned = DatagramReceiver(), threading.Event()
+
+    def wait() -> None:
+        receiver.receive(10 * PATIENCE_S)
+        returned.set()
+
+    with port() as a, receiver.receiving(a, lambda *_: None):
+        waiting = threading.Thread(target=wait)
+        waiting.start()
+        until(lambda: (receiver.wake(), returned.is_set())[1], "it to be woken")
+        waiting.join()
 
 
 def test_what_arrives_while_an_axis_waits_for_its_turn_is_one_block_of_at_most_a_quarter_second(tmp_path: Path) -> None:

@@ -223,8 +223,10 @@ class Spectra(Block):
         return np.asarray(self.origin_s + self.sample / self.rate_hz)
 
     def cut(self, first: int, last: int) -> Spectra:
-        """Spectra at positions first … last − 1, without a copy."""
+        """Spectra at positions first … last − 1, without a copy; all of them are this object itself."""
         first, last, _ = slice(first, last).indices(len(self))
+        if (first, last) == (0, len(self)):
+            return self
         skipped = first * self.layout.hop
         return replace(
             self,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ from livebode.preparation.transients import transient_event, transient_periods
 _WINDOWS, _SECONDS, _SAMPLES_MAX = 32, 10.0, 1 << 22  # length of a stretch that is judged, whichever is longer
 _EXCITED_MIN = 16  # windows with power in it, to distinguish noise from a response
 _SLIP_PERIODS = 32  # that are searched at a time
+_JUDGING_S = 0.5  # from the beginning of a judgement, in a thread of its own, to its findings
 
 
 class LiveChecks:
@@ -56,6 +59,8 @@ class LiveChecks:
         self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
         self._stretch = _Stretch()
         self._complete: _CompleteStretch | None = None
+        self._judgement: Future[_Judgement] | None = None
+        self._known_at = 0  # sample behind which the findings of the judgement are due
         self._delay = int(phase * self._size)
         self._begun: int | None = None
         repeats = settings.periodic and settings.method.reference == "excitation"
@@ -92,34 +97,38 @@ class LiveChecks:
                 judged_at = block.stop + self._delay
                 self._complete = _CompleteStretch(start, _time_s(block, start), data, self._transient, judged_at)
             if self._complete is not None and block.stop >= self._complete.judged_at:
-                yield from self.finish()
+                yield from self._findings()
+                self._begin_judging(block.stop)
+            if block.stop >= self._known_at:
+                yield from self._findings()
         if self._reference is not None:
             yield from self._slipped(block, self._reference)
 
     def finish(self) -> Iterator[Event]:
-        """Findings in the stretch that is complete, at its turn or at the end of the run."""
+        """Findings in the stretches that are complete, at the end of the run."""
+        yield from self._findings()
         if self._complete is not None:
-            stretch, self._complete = self._complete, None
-            yield from self._judged(stretch)
+            self._begin_judging(0)
+            yield from self._findings()
 
-    def _judged(self, stretch: _CompleteStretch) -> Iterator[Event]:
-        settings, start, time_s = self._settings, stretch.start, stretch.time_s
-        signals = dict(zip(self._channels, stretch.data))
-        by_role = {role: signals[name] for role in ROLES if (name := settings.channel(role))}
-        spectra = role_spectra(by_role, settings)
-        if spectra is None:
-            return  # no excitation yet: the next stretch is judged
-        if spectra.windows < _EXCITED_MIN:
-            self._transient = False  # the excitation began in this stretch, not with the next one
+    def _begin_judging(self, sample: int) -> None:
+        """Judge the complete stretch beside the axis: it takes as long as many Blocks."""
+        stretch, self._complete = self._complete, None
+        if stretch is not None and (self._roles or self._transient):
+            begun = stretch.start if self._begun is None else self._begun
+            self._judgement = _thread().submit(_judged, stretch, self._settings, self._channels, self._roles, begun)
+            self._known_at = sample + round(_JUDGING_S * self._settings.lines.rate_hz)
+
+    def _findings(self) -> Iterator[Event]:
+        """Those of the judgement that has begun, always behind the same sample."""
+        if self._judgement is None:
             return
-        if self._roles:
-            for one in suspicions(by_role, settings):
-                yield Event("roles-doubtful", start, time_s, one.sentence)
-        if stretch.transient and (periods := transient_periods(signals, settings)):
-            begun = start if self._begun is None else self._begun
-            yield transient_event(periods, settings, first=start, time_s=time_s, begun=begun)
-        self._roles = self._transient = False
-        self._report_judged()
+        judgement, self._judgement = self._judgement.result(), None
+        self._transient &= not judgement.excited
+        if judgement.final:
+            yield from judgement.events
+            self._roles = self._transient = False
+            self._report_judged()
 
     def _slipped(self, block: Block, name: str) -> Iterator[Event]:
         size = _SLIP_PERIODS * self._settings.lines.window
@@ -152,6 +161,38 @@ class _CompleteStretch:
     data: NDArray[np.float64]
     transient: bool
     judged_at: int
+
+
+@dataclass(frozen=True)
+class _Judgement:
+    """What was found; `excited`: a stretch with excitation, `final`: with enough of it, so that no other is judged."""
+
+    events: tuple[Event, ...] = ()
+    excited: bool = True
+    final: bool = True
+
+
+def _judged(stretch: _CompleteStretch, settings: Settings, channels: list[str], roles: bool, begun: int) -> _Judgement:
+    """The judgement of a stretch of a run that began with sample `begun`."""
+    start, time_s = stretch.start, stretch.time_s
+    signals = dict(zip(channels, stretch.data))
+    by_role = {role: signals[name] for role in ROLES if (name := settings.channel(role))}
+    spectra = role_spectra(by_role, settings)
+    if spectra is None:
+        return _Judgement(excited=False, final=False)  # the next stretch is judged
+    if spectra.windows < _EXCITED_MIN:
+        return _Judgement(final=False)  # the excitation began in this stretch, not with the next one
+    doubts = suspicions(by_role, settings) if roles else []
+    events = [Event("roles-doubtful", start, time_s, one.sentence) for one in doubts]
+    if stretch.transient and (periods := transient_periods(signals, settings)):
+        events.append(transient_event(periods, settings, first=start, time_s=time_s, begun=begun))
+    return _Judgement(tuple(events))
+
+
+@cache
+def _thread() -> ThreadPoolExecutor:
+    """One for all axes, not before the first judgement: a process that is forked has no threads of its parent."""
+    return ThreadPoolExecutor(1, "livebode checks")
 
 
 class _Stretch:

@@ -296,7 +296,9 @@ class SegmentedRecord:
         self._committed, self._committed_s = sample, time.monotonic()
         self._new, self._waited = False, self._waiting()
         written, self._unwritten = self._unwritten, Unwritten()
-        self._writer.add(partial(self._write, written, sample, time_s, self._states(), self._waited))
+        job = partial(self._write, written, sample, time_s, self._states(), self._waited)
+        # A recording is read while its record is written; a machine is waited for.
+        self._writer.add(job, at_once=self._position is not None and not self._store.closes_at(sample))
 
     def _write(
         self, written: Unwritten, sample: int, time_s: float, states: Mapping[str, bytes], waiting: Sequence[Event]

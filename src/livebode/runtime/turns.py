@@ -3,7 +3,8 @@
 Python runs one thread at a time, and another one takes over wherever a function in C lets go of the interpreter: many
 times in a Block. Threads of axes that compute at once are therefore all late, and waking a thread for each Block costs
 as much as the Block. So the thread of one axis leads: it does the steps of all axes, and the threads of the others
-wait. The batches that arrive while an axis waits for its turn are one Block. `python -m bench.hall` measures it.
+wait. Between the steps it receives the datagrams, for which it would otherwise wait. The batches that arrive while an
+axis waits for its turn are one Block. `python -m bench.hall` measures it.
 """
 
 from __future__ import annotations
@@ -16,10 +17,14 @@ from collections.abc import Iterator
 from contextvars import copy_context
 from math import inf
 
+from livebode.sources.live.datagrams import receiver
+
 TICK_S = 0.1
 """An axis without samples has a step in this interval."""
 TURN_S = 0.01
 """An axis whose next step is due at once does it, until it had the turn for so long: its state is in the cache."""
+RECEIVE_S = 0.002
+"""Interval in which the thread that leads receives datagrams while steps are due."""
 STEP_S_MAX = 1.0
 """Longest step that others wait for: an axis that does not return, as on a network drive, delays them but does not stop
 them."""
@@ -66,17 +71,20 @@ class _Line:
     """The turns of a process, and which of their threads leads."""
 
     def __init__(self) -> None:
-        self._changed = threading.Condition(threading.Lock())
+        self._changed = threading.Lock()
         self._all: dict[Turn, None] = {}
         self._asked: deque[Turn] = deque()
         self._leader: Turn | None = None
         self._since_s = inf  # when the leader began a step
-        self._ticked_s = -inf
+        self._ticked_s = self._received_s = -inf
+        self._waits = False  # the leader, for datagrams or a step
 
     def ask(self, turn: Turn) -> None:
         with self._changed:
-            if self._append(turn):
-                self._changed.notify()  # only the leader waits for it
+            wakes = self._append(turn) and self._waits
+            self._waits &= not wakes
+        if wakes:
+            receiver().wake()
 
     def _append(self, turn: Turn) -> bool:
         """Whether it waits from now."""
@@ -142,18 +150,22 @@ class _Line:
 
     def _next(self, leader: Turn) -> Turn | None:
         """The axis that has waited longest, as soon as there is one; None if this thread does not lead any more."""
-        with self._changed:
-            while self._leader is leader:
+        while True:
+            with self._changed:
+                if self._leader is not leader:
+                    return None
                 self._since_s = now_s = time.monotonic()
                 if now_s - self._ticked_s >= TICK_S:
                     self._tick(now_s)
-                if self._asked:
+                if self._asked and now_s - self._received_s < RECEIVE_S:
                     one = self._asked.popleft()
                     one.waits, one.works, one.asked_again, one.stepped_s = False, True, False, now_s
                     return one
-                self._since_s = inf
-                self._changed.wait(self._ticked_s + TICK_S - now_s)
-        return None
+                self._since_s, self._waits = inf, not self._asked
+                timeout_s = max(0.0, self._ticked_s + TICK_S - now_s) if self._waits else 0.0
+            receiver().receive(timeout_s)
+            self._received_s = time.monotonic()
+            self._waits = False
 
     def _tick(self, now_s: float) -> None:
         self._ticked_s = now_s

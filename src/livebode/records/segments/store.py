@@ -34,6 +34,7 @@ from livebode.records.segments.waiting import UnsyncedRows
 from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table_file import ColumnTable
 
+_NEARLY = 15 / 16  # of the bytes of a journal: the next commit may fill it
 _logger = logging.getLogger(__name__)
 
 
@@ -211,6 +212,10 @@ class Store:
                 path=str(self.path),
                 errno=self._pause.details.get("errno"),
             )
+
+    def closes_at(self, sample: int) -> bool:
+        """Whether a commit at this sample may close the segment, which waits for the disk; more often by its bytes."""
+        return self._full(sample) or self._journal.length >= _NEARLY * self.limits.journal_bytes_max
 
     def _full(self, sample: int) -> bool:
         limits = self.limits

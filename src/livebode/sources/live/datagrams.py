@@ -1,7 +1,8 @@
-"""DatagramReceiver: one thread that receives the datagrams of all UDP sources of a process.
+"""DatagramReceiver: receives the datagrams of all UDP sources of a process, in the thread that computes.
 
 A thread of each source would be woken for each datagram, and wait each time for the interpreter, which the tracking
-threads use: with 64 axes that cost a third of tracking.
+threads use: with 64 axes that cost a third of tracking. A thread that receives for all of them still takes the
+interpreter from the one that computes, thousands of times per second. So that one receives, between its steps.
 """
 
 from __future__ import annotations
@@ -10,19 +11,24 @@ import os
 import selectors
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from math import inf
 
 from livebode.sources.live.arrived import ArrivedDatagrams
 
 TICK_S = 0.1
 """Longest time until a new port is received from, where the system does not notice it at once."""
+PATIENCE_S = 0.02
+"""A thread that receives may compute for so long before another one receives: the system's buffers hold more."""
 
 
 class DatagramReceiver:
     """Passes each datagram of a port, and the host that sent it, to the function that is registered for the port.
 
-    Its thread exists as long as a port does.
+    A thread that waits calls `receive`. Where none has done that for `PATIENCE_S`, a thread of its own receives, which
+    exists as long as a port does.
     """
 
     def __init__(self) -> None:
@@ -31,6 +37,8 @@ class DatagramReceiver:
         self._thread: threading.Thread | None = None
         self._failures: dict[int, Exception] = {}
         self._arrived = ArrivedDatagrams()
+        self._received_until_s = -inf  # another thread receives until then
+        self._bell: tuple[int, int] | None = None  # a pipe that `wake` writes to
 
     @contextmanager
     def receiving(self, port: socket.socket, take: Callable[[bytes, str], None]) -> Iterator[Callable[[], None]]:
@@ -54,23 +62,63 @@ class DatagramReceiver:
                 if self._failures.pop(number, None) is None:
                     self._selector.unregister(port)
 
+    def receive(self, timeout_s: float) -> None:
+        """Pass on what has arrived, or what arrives first within this time, and return; at once after `wake`."""
+        if self._bell is None:
+            self._hang_bell()
+        self._received_until_s = inf
+        self._pass_on(timeout_s)
+        self._received_until_s = time.monotonic() + PATIENCE_S
+
+    def wake(self) -> None:
+        """Let the thread that waits in `receive` return. Any thread may call it."""
+        if self._bell is not None:
+            with suppress(BlockingIOError):  # it was called often enough
+                os.write(self._bell[1], b"\0")
+
+    def _hang_bell(self) -> None:
+        with self._lock:
+            if self._bell is None:
+                self._bell = os.pipe()
+                for end in self._bell:
+                    os.set_blocking(end, False)
+                self._selector.register(self._bell[0], selectors.EVENT_READ)
+
     def _work(self) -> None:
         while True:
-            ready = self._selector.select(TICK_S)
+            rest_s = self._received_until_s - time.monotonic()
+            if rest_s > 0:
+                time.sleep(min(rest_s, PATIENCE_S))
+            else:
+                self._pass_on(TICK_S)
             with self._lock:
-                for key, _ in ready:
-                    # One of each port: a sender that floods its port does not keep the others waiting.
-                    if key.fd in self._selector.get_map():
-                        self._receive(key)
-                if not self._selector.get_map():
+                if len(self._selector.get_map()) == (self._bell is not None):
                     self._thread = None
                     return
+
+    def _pass_on(self, timeout_s: float) -> None:
+        ready = self._selector.select(timeout_s)
+        if not ready:
+            return
+        with self._lock:
+            for key, _ in ready:
+                if key.data is None:
+                    self._hear(key.fd)
+                # One of each port: a sender that floods its port does not keep the others waiting.
+                elif key.fd in self._selector.get_map():
+                    self._receive(key)
+
+    def _hear(self, bell: int) -> None:
+        """Silence the bell, unless it rings for another thread, which waits in `receive`."""
+        if threading.current_thread() is not self._thread or self._received_until_s < inf:
+            with suppress(BlockingIOError):
+                os.read(bell, 1 << 10)
 
     def _receive(self, key: selectors.SelectorKey) -> None:
         assert isinstance(key.fileobj, socket.socket)
         try:
             key.data(*self._arrived.take(key.fileobj))
-        except BlockingIOError:  # the system dropped what it had announced: its checksum was wrong
+        except BlockingIOError:  # the system dropped what it had announced, or another thread was faster
             return
         except Exception as error:  # any error: the source raises it in its own thread
             self._failures[key.fd] = error
