@@ -13,6 +13,7 @@ PORTS: dict[str, int | None] = {
 DEVICES = {
     "serial": "serial:/dev/ttyACM0",
     "can": "can:socketcan/can0",
+    "hal": "hal:sampler.0",
     "klipper": "klipper:/tmp/klippy_uds",
     "daqref": "daqref://device0",
     "daq.nd": "daq.nd://192.168.0.5",
@@ -22,7 +23,7 @@ DEVICES = {
 
 @dataclass(frozen=True)
 class Address:
-    """Kind of source, host, port and path; `path` is the MQTT topic, a device, a file, or the whole of hal:sampler.0."""
+    """Kind of source, host, port and path; `path` is the MQTT topic, a device, or a file."""
 
     scheme: str
     host: str = ""
@@ -57,8 +58,6 @@ def parse_address(url: str) -> Address:
     """
     if url in ("stdin:", "stdin://"):
         return Address("stdin")
-    if url.startswith("hal:") and url.isprintable():
-        return Address("hal", path=url)
     if "@" in url:
         raise ConfigError(
             "secret-in-url",
@@ -82,7 +81,7 @@ def parse_address(url: str) -> Address:
     except ValueError:
         raise _url_error("is not an address", "give kind://host:port, with a port from 1 to 65535") from None
     if parts.scheme not in PORTS:
-        raise _url_error("has a scheme that is not supported", f"give one of {', '.join([*PORTS, *DEVICES])}, hal: or stdin:")
+        raise _url_error("has a scheme that is not supported", f"give one of {', '.join([*PORTS, *DEVICES])} or stdin:")
     port = port or PORTS[parts.scheme]
     if not host or port is None or "?" in url or "#" in url:
         raise _url_error("is not a complete address", f"give {parts.scheme}://host:port")

@@ -34,7 +34,7 @@ from livebode.sources.live.source import TICK_S, LiveSource
 ALIVE_S = 1.0
 """Silence after which it is checked whether the real-time part still runs."""
 _PIECE_BYTES = 1 << 16
-_ADDRESS = re.compile(r"hal:sampler\.([0-7])")
+_ADDRESS = re.compile(r"sampler\.([0-7])")
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class HalSource(LiveSource):
         if found is None:
             raise ConfigError(
                 "value-invalid",
-                f"source.url = {address.path[:80]!r} names no sampler of HAL",
+                f"source.url = {str(address)[:80]!r} names no sampler of HAL",
                 "give one such as hal:sampler.0",
                 key="source.url",
             )
