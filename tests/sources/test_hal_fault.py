@@ -12,7 +12,7 @@ import pytest
 from livebode.core import ConfigError, SourceError
 from livebode.sources.live import SourceSettings, make_source, open_source
 from livebode.sources.live.hal import SampleText, consecutive
-from livebode.sources.live.hal_wiring import halcmd
+from livebode.sources.live.hal_wiring import SAMPLER_KEY, fifo, halcmd
 from tests.support.command import livebode
 from tests.support.errors import refused
 from tests.support.peers.hal import SETTINGS, Hal, only_hal, remove_memory
@@ -50,7 +50,7 @@ def test_a_machine_that_is_wired_otherwise_is_named(hal: Hal) -> None:
     assert "no sampler.1 is loaded" in told(url="hal:sampler.1")
     assert "does not count" in told(sample_signal="w", channels=["u"])
     with subprocess.Popen(["halsampler"], stdout=subprocess.DEVNULL) as other:
-        until(lambda: f"halsampler{other.pid}" in hal.halcmd("show", "comp"), "the other halsampler")
+        until(lambda: (found := fifo(SAMPLER_KEY)) and found.users == 2, "the other halsampler at the FIFO")
         assert "end the other halsampler" in told()
         other.kill()
     hal.halcmd("setp", "sampler.0.enable", "0")
