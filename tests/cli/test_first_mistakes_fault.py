@@ -87,7 +87,7 @@ MISTAKES = [
         "there is no baseline 'none.json'",
     ),
     ("run log.csv key.toml", "a configuration cannot be combined"),
-    ("design key.toml", "there is no 'source'"),
+    ("design key.toml", "there is neither [belt] nor [measured]"),
 ]
 
 

@@ -127,6 +127,7 @@ SOURCES = {
     "opc.tcp": f'url = "opc.tcp://127.0.0.1:{{port}}"\nrate_hz = 1000\n{LOGIN}\n[source.nodes]\ny = "ns=2;s=y"',
     "ads": 'url = "ads://127.0.0.1:{port}"\nnet_id = "5.1.2.3.1.1"\nsymbol = "MAIN.r"\nchannels = ["w", "y"]',
     "can": f'url = "can:socketcan/no{{port}}"\ndbc = "{DBC}"\nrate_hz = 1000\nchannels = ["Vel_Estimate"]',
+    "hal": 'url = "hal:sampler.7"\nsample_signal = "n"',
     "klipper": 'url = "klipper:/nowhere/{port}"',
     "daqref": 'url = "daqref://none{port}"',
     "daq.nd": 'url = "daq.nd://127.0.0.1:{port}"',

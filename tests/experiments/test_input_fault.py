@@ -15,7 +15,7 @@ def read(data):
 @pytest.mark.parametrize(
     ("data", "code", "facts"),
     [
-        ({}, "key-conflict", {"key": "belt"}),
+        ({}, "key-missing", {"key": "belt"}),
         ({"belt": {}, "measured": {"run": "x"}}, "key-conflict", {"key": "belt"}),
         ({"measured": {"run": "x", "noise": True}}, "value-invalid", {"key": "measured.noise", "value": "True"}),
         ({"measured": {"run": "x", "torque_n_m": [True, 1]}}, "value-invalid", {"key": "measured.torque_n_m.0"}),

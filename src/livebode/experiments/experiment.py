@@ -108,11 +108,18 @@ class Experiment(BaseModel):
             raise ConfigError(
                 "key-conflict", "a [belt] axis has its loop in [belt.drive]", "remove [loop]", key="loop"
             ).at(origin)
-        if (found.belt is None) == (found.measured is None):
+        if found.belt is None and found.measured is None:
+            raise ConfigError(
+                "key-missing",
+                "there is neither [belt] nor [measured], so that it describes no machine",
+                "describe a [belt] axis by its constants, or name a run of it in [measured]",
+                key="belt",
+            ).at(origin)
+        if found.belt is not None and found.measured is not None:
             raise ConfigError(
                 "key-conflict",
-                "the machine is described by both or neither of [belt] and [measured]",
-                "describe either a [belt] axis by its constants, or one that was [measured]",
+                "the machine is described twice, by [belt] and by [measured]",
+                "remove one of them",
                 key="belt",
             ).at(origin)
         return found
