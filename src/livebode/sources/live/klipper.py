@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from livebode.core import ConfigError, LivebodeError, SourceError
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import Batch
+from livebode.sources.live.connection import pieces
 from livebode.sources.live.klipper_moves import HEADER as MOVE_FIELDS
 from livebode.sources.live.klipper_moves import SIDE, Moves
 from livebode.sources.live.on_grid import OnGrid
@@ -27,13 +28,11 @@ from livebode.sources.live.source import TICK_S, LiveSource
 
 END = b"\x03"
 MESSAGE_BYTES_MAX = 8 << 20
-PIECE_BYTES = 1 << 16
 RATE_HZ = 3200.0
 CHANNELS = tuple(f"{name}_{axis} [mm/s^2]" for name in ("command", "accel") for axis in "xyz")
 FIELDS = ("time", "x_acceleration", "y_acceleration", "z_acceleration")
 WAIT_S = 3.0
 """How long samples wait for the moves of their time, which Klipper sends after they ended, every half second."""
-SILENCE_S = 30.0
 _CHIPS = ("adxl345", "lis2dw", "lis3dh", "mpu9250", "icm20948", "bmi160")
 
 
@@ -71,18 +70,8 @@ class KlipperSource(LiveSource):
             link.connect(str(Path(self.address.path).expanduser()))
             self._begin()
             link.sendall(self._requests())
-            buffer, silent_s = bytearray(), 0.0
-            while not self._stop.is_set():
-                try:
-                    piece = link.recv(PIECE_BYTES)
-                except TimeoutError:
-                    silent_s += TICK_S
-                    if silent_s > SILENCE_S:
-                        raise ConnectionError(f"Klipper sent nothing for {SILENCE_S:g} s") from None
-                    continue
-                if not piece:
-                    raise ConnectionError("Klipper closed the connection")
-                silent_s = 0.0
+            buffer = bytearray()
+            for piece in pieces(link, self._stop, "Klipper"):
                 buffer += piece
                 *messages, rest = buffer.split(END)
                 buffer = bytearray(rest)
