@@ -275,8 +275,8 @@ def completed(excitation):
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ({"excitation": {}}, "either a [belt]"),
-        ({"excitation": {}, "belt": {}, "measured": {"run": "x"}}, "either a [belt]"),
+        ({"excitation": {}}, "neither [belt] nor [measured]"),
+        ({"excitation": {}, "belt": {}, "measured": {"run": "x"}}, "described twice"),
         ({"excitation": {}, "measured": {"run": "x", "noise": True}}, "measured.noise = True is not usable"),
         ({"excitation": {}, "measured": {"run": "x", "torque_n_m": [True, 1]}}, "torque_n_m.0 = True is not usable"),
         ({"excitation": {}, "belt": {}, "loop": {}}, "remove [loop]"),
