@@ -173,9 +173,9 @@ damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile
 	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/records/test_bit_flips_fault.py
 	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/records/test_hostile_run_fault.py
 
-crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each kind of live source
+crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each of ten kinds of live source
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/records/test_kills_fault.py
-	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 9 -rP tests/records/test_live_kills_fault.py  # they mostly wait
+	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 10 -rP tests/records/test_live_kills_fault.py  # they mostly wait
 
 archive-faults: $(BUILT) ## an archive with bad recordings: kill workers and coordinators 100 times, compare with a loop (20 min)
 	LIVEBODE_ARCHIVE_KILLS=100 $(BIN)/python -m pytest -q -s tests/archive/test_kills_fault.py

@@ -29,6 +29,7 @@ from tests.support.peers.peer import CHANNELS as OPC_UA_CHANNELS
 from tests.support.peers.peer import STAMP_S, free_port
 from tests.support.peers.plain import TcpPeer
 from tests.support.peers.plc import NET_ID, Memory, Server
+from tests.support.peers.serial_line import SerialJsonPeer
 
 BATCH = 20
 PERIOD = 1_000
@@ -119,6 +120,20 @@ class TcpFeed(Feed):
         if link is not None:
             with contextlib.suppress(OSError):  # the process was killed
                 link.sendall(encode_samples(batch, double=True))
+
+    def close(self) -> None:
+        self._peer.__exit__()
+
+
+class SerialFeed(Feed):
+    """What the port holds while nobody has opened it is dropped."""
+
+    def open(self) -> None:
+        self._peer = SerialJsonPeer(self.folder).__enter__()
+        self.source = self._peer.settings
+
+    def send(self, batch: Batch) -> None:
+        self._peer.write(encode_line(batch))
 
     def close(self) -> None:
         self._peer.__exit__()
@@ -283,6 +298,7 @@ def put_recording(folder: Path, batches: list[Batch]) -> Path:
 FEEDS: dict[str, Callable[[Path], Feed]] = {
     "udp": UdpFeed,
     "tcp": TcpFeed,
+    "serial": SerialFeed,
     "mqtt": MqttFeed,
     "stdin": StdinFeed,
     "file": FileFeed,
