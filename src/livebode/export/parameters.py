@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from livebode.arrow import to_numpy
 from livebode.core import OutputError, RecordError
 from livebode.core.installing import needing
-from livebode.export.delimited import begin
+from livebode.export.delimited import write_columns, write_header
 from livebode.export.matlab import VARIABLE
 from livebode.export.result import VALUES_MAX, WriteResult
 
@@ -66,17 +67,21 @@ def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> WriteRe
     RecordError
         If there are none.
     """
-    rows, writer = 0, None
+    rows: int | None = None
     with path.open("wb") as file:
         for part in parts:
-            writer = writer or begin(file, list(COLUMNS), part.schema)
-            writer.write_batch(part)
+            if rows is None:
+                rows = 0
+                write_header(file, COLUMNS)
+            numbers = {name: to_numpy(part[name]) for name in _NUMBERS}
+            write_columns(
+                file, [numbers[name] if name in numbers else part[name].fill_null("").to_pylist() for name in COLUMNS]
+            )
             rows += part.num_rows
-        if writer is None:
+        if rows is None:
             raise RecordError(
                 "no-parameters", "the run has no parameters to export", "run the recording again with a model"
             )
-        writer.close()
     return WriteResult(rows)
 
 

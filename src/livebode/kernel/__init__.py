@@ -69,6 +69,7 @@ from livebode.kernel._repeating import (
 )
 from livebode.kernel._sizes import largest_sizes
 from livebode.kernel._sliding import SlidingDFT
+from livebode.kernel._table import MOMENT, NO_MOMENT, NUMBER, SKIPPED, TableLayout, Words, read_rows, write_rows
 
 __all__ = [
     "ADDED",
@@ -76,15 +77,19 @@ __all__ = [
     "INSTRUCTION_SET_VARIABLE",
     "JUDGED",
     "MEANS",
+    "MOMENT",
     "NEWS",
     "NEWS_GONE",
     "NEWS_INVALID",
     "NOISE_LARGER",
     "NOISE_MOVING",
     "NOISE_SCATTER",
+    "NO_MOMENT",
+    "NUMBER",
     "REASONS",
     "RIGID",
     "SCATTER",
+    "SKIPPED",
     "TWO_MASS",
     "TWO_MASS_GAIN",
     "BeltCourse",
@@ -112,8 +117,10 @@ __all__ = [
     "RepeatingPlan",
     "RepeatingSettings",
     "SlidingDFT",
+    "TableLayout",
     "Tones",
     "WeightSums",
+    "Words",
     "belt_each",
     "belt_replay",
     "belt_response",
@@ -132,4 +139,6 @@ __all__ = [
     "largest_sizes",
     "process_each",
     "process_lines",
+    "read_rows",
+    "write_rows",
 ]
