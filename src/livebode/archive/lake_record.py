@@ -72,7 +72,7 @@ class LakeRecord(RecordInOnePiece):
                     self._responses.write(to_wide(document))
                 case FitResults(parts):
                     for part in parts:
-                        rows = pa.Table.from_batches([parameter_rows(part)])
+                        rows = pa.table(parameter_rows(part))
                         self._parameters.write(rows)
                         self.fitted.add(rows)
                 case Event():

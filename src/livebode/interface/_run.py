@@ -108,7 +108,7 @@ class Run:
         A pyarrow Table with the columns ``time_s``, ``schedule``, ``model``, ``name``, ``value``, ``sigma``, ``unit``,
         ``status`` and others; ``run.parameters.to_pandas()`` is a DataFrame.
         """
-        return pa.concat_tables([PARAMETERS.schema.empty_table(), *self._record.tables("parameters")])
+        return pa.concat_tables([pa.schema(PARAMETERS.schema).empty_table(), *self._record.tables("parameters")])
 
     @cached_property
     def _averaged(self) -> Averaged:

@@ -36,6 +36,7 @@ from livebode.records.segments.damage import KIND
 from livebode.records.segments.manifest import Manifest, Segment
 from livebode.records.summary_file import RUN, read_summary
 from livebode.records.summary_shape import what_is_wrong
+from livebode.tables import Table
 
 _logger = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of responses at once, times their lines: about 10 MB
@@ -47,7 +48,7 @@ class Files:
 
     paths: list[Path]
     groups: list[int] | None
-    rows: list[pa.RecordBatch]
+    rows: list[Table]
 
 
 def lines_in(found: Mapping[str, Any]) -> Lines:
@@ -181,7 +182,7 @@ class RunRecord:
 
     def responses(self) -> Responses:
         """All responses, as written; an empty batch before the first."""
-        return Responses.join(list(self.batches()) or [responses_in(SCHEMA.empty_table(), self.lines, self.found)])
+        return Responses.join(list(self.batches()) or [responses_in(Table.empty(SCHEMA), self.lines, self.found)])
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
         """All readable responses in order, in parts of bounded size; or the newest, from files up to this size."""
@@ -218,7 +219,7 @@ class RunRecord:
                 whole = table.num_rows // len(lines) * len(lines)
                 rest = table.slice(whole)
                 if whole:
-                    yield responses_in(table.slice(0, whole), lines, self.found)
+                    yield responses_in(Table.from_arrow(table.slice(0, whole)), lines, self.found)
         if rest is not None and rest.num_rows:
             raise RecordError(
                 "unexpected-content",

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from livebode.records.parquet_part import ParquetPart, sha256_of_next
+from livebode.tables import Schema, Table
 
 _GROUP_ROWS = 1 << 15  # two groups at a time are in memory: one fills, one is written
 
@@ -25,7 +26,7 @@ class ColumnTable:
     do.
     """
 
-    schema: pa.Schema
+    schema: Schema
     repeating: tuple[str, ...] = ()
 
 
@@ -49,15 +50,16 @@ class TableFile:
     """
 
     def __init__(self, path: Path, table: ColumnTable) -> None:
-        self._path, self._schema = path, table.schema
-        self._file = pq.ParquetWriter(path, table.schema, use_dictionary=list(table.repeating), compression="lz4")
-        self._waiting: list[pa.RecordBatch] = []
+        self._path = path
+        schema, repeating = pa.schema(table.schema), list(table.repeating)
+        self._file = pq.ParquetWriter(path, schema, use_dictionary=repeating, compression="lz4")
+        self._waiting: list[Table] = []
         self._rows = 0
         self._parts: list[ParquetPart] = []
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="table")
         self._group: Future[None] | None = None
 
-    def write(self, rows: pa.RecordBatch) -> None:
+    def write(self, rows: Table) -> None:
         if not rows.num_rows:
             return
         self._waiting.append(rows)
@@ -88,9 +90,9 @@ class TableFile:
         if group is not None:
             group.result()
 
-    def _write(self, waiting: list[pa.RecordBatch], rows: int) -> None:
+    def _write(self, waiting: list[Table], rows: int) -> None:
         # One group, so that it ends with a complete response: a damaged one is skipped without cutting the next.
-        self._file.write_table(pa.Table.from_batches(waiting, self._schema), row_group_size=rows)
+        self._file.write_table(pa.table(Table.join(waiting)), row_group_size=rows)
         self._add_part(rows)
 
     def _add_part(self, rows: int) -> None:

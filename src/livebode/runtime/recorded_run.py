@@ -21,6 +21,7 @@ from livebode.sources.live import Batch, LiveSource, SourceSettings, make_source
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, with_kinds
 from livebode.sources.live.replayable import ReplaySource, SenderSample
+from livebode.tables.exchange import schema_from_arrow
 
 
 class RecordedRun:
@@ -47,7 +48,7 @@ class RecordedRun:
             )
         summary = self._run.summary
         kinds = summary.get("configuration", {}).get("source", {}).get("kinds") or {}
-        self.channels: tuple[Channel, ...] = with_kinds(channels_of(first.schema), kinds)
+        self.channels: tuple[Channel, ...] = with_kinds(channels_of(schema_from_arrow(first.schema)), kinds)
         self.rate_hz = float(self._run.found["rate_hz"])
         pieces = SenderNumbers.of(summary.get("numbering", ())).pieces
         begun = int(first["sample"][0].as_py())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,7 @@ class Field:
         if self.kind not in KINDS:
             raise TypeError(f"column {self.name!r} is of type {self.kind}")
 
-    @property
+    @cached_property
     def dtype(self) -> np.dtype[Any]:
         """Of NumPy; TypeError for text."""
         return np.dtype(self.kind)
@@ -64,7 +65,7 @@ class Schema:
         """
         return cls(tuple(Field(name, kind) for name, kind in kinds.items()))
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         return [one.name for one in self.fields]
 

@@ -49,8 +49,7 @@ class Table:
         if len(self.columns) != len(self.schema) or len({len(column) for column in self.columns}) > 1:
             raise ValueError("the columns do not fit the schema, or differ in length")
         for column, field in zip(self.columns, self.schema):
-            fits = field.kind == STRING if isinstance(column, Text) else field.kind == column.dtype.name
-            if not fits:
+            if not _is_of(column, field):
                 raise ValueError(f"column {field.name!r} is not of type {field.kind}")
 
     @classmethod
@@ -136,6 +135,12 @@ class Table:
         from livebode.tables.exchange import to_arrow
 
         return to_arrow(self).__arrow_c_stream__(requested_schema)
+
+
+def _is_of(column: Column, field: Field) -> bool:
+    if isinstance(column, Text):
+        return field.kind == STRING
+    return field.kind != STRING and column.dtype == field.dtype
 
 
 def _no_rows(field: Field) -> Column:

@@ -16,6 +16,7 @@ from livebode.records.segments.damage import KIND, event_of
 from livebode.records.segments.journal import Journal, last_commit
 from livebode.records.segments.manifest import NAME, Manifest, Segment
 from livebode.records.segments.segment_file import segment_content
+from livebode.tables import Table
 
 _ROWS = 1 << 14
 Report = Callable[[Event], None]
@@ -27,7 +28,7 @@ def in_segments(run: Path) -> bool:
     return is_folder(run / journal.FOLDER) or (run / NAME).is_file()
 
 
-Rows = dict[str, list[pa.RecordBatch]]
+Rows = dict[str, list[Table]]
 
 
 def parts(run: Path, report: Report, *, finished: bool) -> tuple[list[Segment], Rows]:
@@ -86,7 +87,7 @@ def tables(
         segments = [segment for segment in segments if segment.first_s <= span_s[1] and segment.last_s >= span_s[0]]
     yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), report, span_s)
     if table in rows:
-        yield pa.Table.from_batches(rows[table])
+        yield pa.table(Table.join(rows[table]))
 
 
 def _joined(
