@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import pyarrow as pa
-from pyarrow.csv import CSVWriter, WriteOptions
+from arro3 import io as arrow_io
 
-from livebode.arrow import from_numpy
 from livebode.core import RecordError, Responses
 from livebode.export.result import WriteResult
+from livebode.tables import Table
+from livebode.tables.exchange import to_arrow
+from livebode.tables.table import Column
 
 
 def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] | None = None) -> WriteResult:
@@ -22,8 +23,8 @@ def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] 
 
     Columns: ``time [s]``, ``schedule``, ``frequency [Hz]``, ``re``, ``im``, ``magnitude [dB]``, ``phase [deg]``,
     ``sigma``, ``dof``, ``coherence``, ``valid`` (1 or 0), ``first``, ``sample``, ``ready`` (1 or 0); re, im and sigma
-    with the response's unit in brackets, where it has one. A number is the shortest decimal that gives the same double;
-    an unknown value is ``nan``.
+    with the response's unit in brackets, where it has one. A number is a short decimal that gives the same double;
+    an unknown value is ``NaN``.
 
     Raises
     ------
@@ -32,26 +33,30 @@ def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] 
     """
     rows = 0
     with path.open("wb") as file:
-        writer: CSVWriter | None = None
         for part in parts:
             if not len(part):
                 continue
-            batch = _as_batch(part)
-            writer = writer or begin(file, _header(part.unit), batch.schema)
-            writer.write_batch(batch)
+            if not rows:
+                write_header(file, _header(part.unit))
+            write_rows(file, _as_table(part))
             rows += len(part)
-        if writer is None:
+        if not rows:
             raise RecordError("no-responses", "the run has no responses to export", "see its events")
-        writer.close()
     return WriteResult(rows)
 
 
-def begin(file: BinaryIO, header: list[str], schema: pa.Schema) -> CSVWriter:
-    """A writer of CSV below this header, which is quoted only where it must be."""
+def write_header(file: BinaryIO, header: Sequence[str]) -> None:
+    """Write the first line; a name is quoted only where it must be."""
     line = io.StringIO()
     csv.writer(line, lineterminator="\n").writerow(header)
     file.write(line.getvalue().encode())
-    return CSVWriter(file, schema, write_options=WriteOptions(include_header=False, quoting_style="needed"))
+
+
+def write_rows(file: BinaryIO, rows: Table) -> None:
+    """Write rows without a header; text is quoted only where it must be."""
+    text = io.BytesIO()  # errors of the disk have no number from arro3
+    arrow_io.write_csv(to_arrow(rows), text, header=False)
+    file.write(text.getbuffer())
 
 
 def _header(unit: str) -> list[str]:
@@ -71,12 +76,12 @@ def _header(unit: str) -> list[str]:
     ]
 
 
-def _as_batch(part: Responses) -> pa.RecordBatch:
+def _as_table(part: Responses) -> Table:
     rows, lines = part.value.shape
     value = part.value.ravel()
     with np.errstate(divide="ignore"):
         magnitude_db = 20 * np.log10(np.abs(value))
-    columns = {
+    columns: dict[str, Column] = {
         "time": np.repeat(part.time_s, lines),
         "schedule": np.repeat(part.schedule, lines),
         "frequency": np.tile(part.lines.frequency_hz, rows),
@@ -92,4 +97,4 @@ def _as_batch(part: Responses) -> pa.RecordBatch:
         "sample": np.repeat(part.sample, lines),
         "ready": np.repeat(part.ready.astype(np.int8), lines),
     }
-    return pa.RecordBatch.from_arrays([from_numpy(c) for c in columns.values()], names=list(columns))
+    return Table.of(columns)

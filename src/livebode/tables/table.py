@@ -76,7 +76,7 @@ class Table:
         """
         from livebode.tables.exchange import from_arrow  # arro3 is loaded where tables are exchanged
 
-        return from_arrow(data)
+        return data if isinstance(data, Table) else from_arrow(data)
 
     @classmethod
     def join(cls, parts: Sequence[Table]) -> Table:
@@ -109,6 +109,13 @@ class Table:
         if not isinstance(column, Text):
             raise TypeError(f"column {name!r} is not text")
         return column
+
+    def values(self, name: str) -> NDArray[Any]:
+        """Any column as an array; of a text its words as objects, shape (rows,)."""
+        column = self.columns[self.schema.place(name)]
+        if not isinstance(column, Text):
+            return column
+        return np.array(column.words or [""], dtype=object)[column.at]
 
     def slice(self, start: int, rows: int | None = None) -> Table:
         """So many rows from this one on, or all; without a copy."""
