@@ -9,11 +9,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from livebode.records.parquet_part import ParquetPart, sha256_of_next
 from livebode.tables import Schema, Table
+from livebode.tables.parquet_writer import ParquetWriter
 
 _GROUP_ROWS = 1 << 15  # two groups at a time are in memory: one fills, one is written
 
@@ -51,8 +49,8 @@ class TableFile:
 
     def __init__(self, path: Path, table: ColumnTable) -> None:
         self._path = path
-        schema, repeating = pa.schema(table.schema), list(table.repeating)
-        self._file = pq.ParquetWriter(path, schema, use_dictionary=repeating, compression="lz4")
+        self._file = path.open("wb")
+        self._writer = ParquetWriter(self._file, table.schema, table.repeating)
         self._waiting: list[Table] = []
         self._rows = 0
         self._parts: list[ParquetPart] = []
@@ -69,12 +67,13 @@ class TableFile:
 
     def close(self) -> list[dict[str, Any]]:
         """Complete the file, and return its parts, for run.json; again: the same."""
-        with contextlib.ExitStack() as ends:
-            ends.callback(self._thread.shutdown)
-            ends.callback(self._file.close)
-            self._flush()
-            self._await_group()
-        if sum(part.size_bytes for part in self._parts) < self._path.stat().st_size:
+        if not self._file.closed:
+            with contextlib.ExitStack() as ends:
+                ends.callback(self._thread.shutdown)
+                ends.callback(self._file.close)
+                self._flush()
+                self._await_group()
+                self._writer.close()
             self._add_part(0)
         return [asdict(part) for part in self._parts]
 
@@ -92,11 +91,12 @@ class TableFile:
 
     def _write(self, waiting: list[Table], rows: int) -> None:
         # One group, so that it ends with a complete response: a damaged one is skipped without cutting the next.
-        self._file.write_table(pa.table(Table.join(waiting)), row_group_size=rows)
+        self._writer.write(Table.join(waiting))
+        self._file.flush()
         self._add_part(rows)
 
     def _add_part(self, rows: int) -> None:
-        """The bytes since the last part; what Arrow has written is in the file at once."""
+        """The bytes since the last part, as they are in the file."""
         with self._path.open("rb") as file:
             file.seek(sum(part.size_bytes for part in self._parts))
             size = os.fstat(file.fileno()).st_size - file.tell()

@@ -5,13 +5,11 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
+import io
 import logging
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from livebode.core.files import sync_directory, write_whole
 from livebode.records.inside import check_folder, is_folder
@@ -22,6 +20,7 @@ from livebode.records.segments.merging import groups_to_merge, row_groups, rows_
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
 from livebode.tables import Table
+from livebode.tables.parquet_writer import ParquetWriter
 
 FIRST_TO_GO = "samples"
 _LONG_BYTES, _SHORTER = 128 << 10, 3
@@ -213,12 +212,13 @@ class Shelf:
         if not is_folder(folder):
             os.mkdir(folder)
             sync_directory(self._run)
-        sink = pa.BufferOutputStream()
-        repeating = list(self._tables["responses" if table in manifest.TIERS else table].repeating)
-        with pq.ParquetWriter(sink, pa.schema(groups[0].schema), compression="lz4", use_dictionary=repeating) as file:
-            for group in groups:
-                file.write_table(pa.table(group), row_group_size=group.num_rows)
-        data = memoryview(sink.getvalue())
+        sink = io.BytesIO()
+        repeating = self._tables["responses" if table in manifest.TIERS else table].repeating
+        writer = ParquetWriter(sink, groups[0].schema, repeating)
+        for group in groups:
+            writer.write(group)
+        writer.close()
+        data = sink.getbuffer()
         write_whole(self._run / name, data, locked=True)
         first, last = groups[0], groups[-1]
         return Segment(
