@@ -20,8 +20,10 @@ from typing import IO, BinaryIO, TypeVar, cast
 from arro3 import core
 from arro3 import io as arrow_io
 
+from livebode.tables.exchange import from_arrow
 from livebode.tables.parquet_footer import Footer, read_footer, written_footer
 from livebode.tables.parquet_pages import check_pages
+from livebode.tables.table import Table
 
 _ARROW_SCHEMA = "ARROW:schema"
 _END_OF_STREAM = b"\xff\xff\xff\xff\0\0\0\0"
@@ -41,7 +43,7 @@ class ParquetFile:
     """
 
     def __init__(self, file: BinaryIO) -> None:
-        self._file = file
+        self.file = file
         self.footer: Footer = read_footer(file)
 
     @cached_property
@@ -70,13 +72,19 @@ class ParquetFile:
             while (batch := _contained(lambda: next(reader, None))) is not None:  # noqa: B023 (called at once)
                 yield batch
 
+    def table(self, groups: Sequence[int] | None = None) -> Table:
+        """The rows of these row groups, as `batches`; TypeError if one of its columns cannot be in a table."""
+        rows = max((group.rows for group in self.footer.groups), default=0)
+        batches = list(self.batches(groups=groups, rows=rows))
+        return from_arrow(core.Table.from_batches(batches, schema=batches[0].schema if batches else self.schema))
+
     def _check(self, places: Sequence[int], group: int) -> None:
         for column in (self.footer.columns[place] for place in places):
             for chunk in (self.footer.groups[group].chunks[leaf] for leaf in column.leaves):
                 if column.repeated and chunk.values > _LIST_VALUES_MAX:
                     raise ValueError(f"column {column.name!r} has lists of {chunk.values} values in a row group")
                 try:
-                    check_pages(self._file, chunk)
+                    check_pages(self.file, chunk)
                 except ValueError as error:
                     raise ValueError(f"column {column.name!r} is damaged: {error}") from None
 
@@ -85,7 +93,7 @@ class ParquetFile:
         if _ARROW_SCHEMA in metadata and len(places) < len(self.footer.columns):
             metadata[_ARROW_SCHEMA] = _contained(lambda: _narrowed(metadata[_ARROW_SCHEMA], places))
         end = written_footer(self.footer, places, groups, metadata)
-        view = _OtherEnd(self._file, self.footer.begin, end)
+        view = _OtherEnd(self.file, self.footer.begin, end)
         return _contained(lambda: arrow_io.read_parquet(cast(IO[bytes], view), batch_size=max(1, rows)))
 
 
