@@ -80,7 +80,7 @@ class _Element:
 
 
 @dataclass(frozen=True)
-class Column:
+class ParquetColumn:
     """A column of the table: one leaf of the schema, or several where it is nested."""
 
     name: str
@@ -95,7 +95,7 @@ class Footer:
 
     begin: int
     root: _Element
-    columns: tuple[Column, ...]
+    columns: tuple[ParquetColumn, ...]
     groups: tuple[RowGroup, ...]
     metadata: Mapping[str, str]
 
@@ -324,15 +324,15 @@ def _statistics(reader: CompactReader) -> tuple[dict[int, bytes], int | None]:
     return bounds, nulls
 
 
-def _columns(elements: Sequence[_Element]) -> tuple[Column, ...]:
+def _columns(elements: Sequence[_Element]) -> tuple[ParquetColumn, ...]:
     if not elements:
         raise ValueError("it has no schema")
-    columns: list[Column] = []
+    columns: list[ParquetColumn] = []
     at, leaf = 1, 0
     for _ in range(elements[0].children):
         end, leaves = _end_of(elements, at, 0)
         part = tuple(elements[at:end])
-        columns.append(Column(part[0].name, part, range(leaf, leaf + leaves), any(one.repeated for one in part)))
+        columns.append(ParquetColumn(part[0].name, part, range(leaf, leaf + leaves), any(one.repeated for one in part)))
         at, leaf = end, leaf + leaves
     if at != len(elements):
         raise ValueError("its schema has elements outside of the columns")
@@ -351,7 +351,7 @@ def _end_of(elements: Sequence[_Element], at: int, depth: int) -> tuple[int, int
     return at, leaves if children > 0 else 1
 
 
-def _check(group: RowGroup, columns: Sequence[Column], begin: int) -> None:
+def _check(group: RowGroup, columns: Sequence[ParquetColumn], begin: int) -> None:
     leaves = columns[-1].leaves.stop if columns else 0
     if len(group.chunks) != leaves or group.rows < 0:
         raise ValueError(f"a row group has {group.rows} rows and {len(group.chunks)} columns of {leaves}")
