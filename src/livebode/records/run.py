@@ -186,7 +186,7 @@ class RunRecord:
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
         """All readable responses in order, in parts of bounded size; or the newest, from files up to this size."""
-        return self._in_parts(self.tables("responses", size_bytes_max))
+        return self._in_parts(self._tables("responses", size_bytes_max))
 
     def steady_batches(self) -> Iterator[Responses]:
         """Those of a machine that was ready, without a transient at the start of a live run.
@@ -197,13 +197,13 @@ class RunRecord:
 
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """Responses with an effective time in this span, including its ends, in parts; other segments are not read."""
-        for part in self._in_parts(self.tables("responses", span_s=(from_s, to_s))):
+        for part in self._in_parts(self._tables("responses", span_s=(from_s, to_s))):
             if len(within := part.between(from_s, to_s)):
                 yield within
 
-    def _in_parts(self, tables: Iterator[pa.Table]) -> Iterator[Responses]:
+    def _in_parts(self, tables: Iterator[Table]) -> Iterator[Responses]:
         lines = self.lines
-        rest: pa.Table | None = None
+        rest: Table | None = None
         for part in tables:
             if part.schema.names not in (SCHEMA.names, EARLIER):
                 raise RecordError(
@@ -215,11 +215,11 @@ class RunRecord:
                 )
             for start in range(0, part.num_rows, _ROWS):
                 piece = part.slice(start, _ROWS)
-                table = piece if rest is None else pa.concat_tables([rest, piece])
+                table = piece if rest is None else Table.join([rest, piece])
                 whole = table.num_rows // len(lines) * len(lines)
                 rest = table.slice(whole)
                 if whole:
-                    yield responses_in(Table.from_arrow(table.slice(0, whole)), lines, self.found)
+                    yield responses_in(table.slice(0, whole), lines, self.found)
         if rest is not None and rest.num_rows:
             raise RecordError(
                 "unexpected-content",
@@ -241,13 +241,20 @@ class RunRecord:
             While iterating, if nothing can be read, or the content is not from a run. A damaged part is skipped and
             reported in `damages`.
         """
+        yield from map(pa.table, self._tables(name, size_bytes_max, span_s))
+
+    def _tables(
+        self, name: str, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
+    ) -> Iterator[Table]:
         file = self.path / name
         try:
             if reading.in_segments(self.path):
                 yield from reading.tables(self.path, name, self.report, size_bytes_max, span_s, finished=self.finished)
             elif (piece := self._piece(name)) is not None:
-                yield from (pa.Table.from_batches([batch]) for batch in piece.batches(_ROWS))
-        except (OSError, pa.ArrowException, KeyError, TypeError) as error:
+                yield from piece.tables(_ROWS)
+        except LivebodeError:  # it is a ValueError
+            raise
+        except (OSError, ValueError, KeyError, TypeError) as error:
             raise _unreadable(file, error) from None
 
     def _piece(self, name: str) -> StoredTable | None:
@@ -276,7 +283,7 @@ class RunRecord:
             for segment in segments:
                 if segment.table in found and reading.whole(self.path, segment, self.report) is not None:
                     found[segment.table].paths.append(self.path / segment.name)
-        except (OSError, pa.ArrowException) as error:
+        except OSError as error:
             raise _unreadable(self.path, error) from None
         return {name: files for name, files in found.items() if files.paths or files.rows}
 
@@ -285,7 +292,7 @@ class RunRecord:
         try:
             if reading.in_segments(self.path):
                 return reading.parts(self.path, self.report, finished=self.finished)
-        except (OSError, pa.ArrowException) as error:
+        except OSError as error:
             raise _unreadable(self.path, error) from None
         return None
 

@@ -67,7 +67,7 @@ def thinned(run: RunRecord, bin_s: float, span_s: tuple[float, float] | None = N
     means: list[BinnedMeans] = []
     for segment in [one for one in (*before, *tier) if _within(one, span_s)]:
         if (file := reading.whole(run.path, segment, run.report)) is not None:
-            table = Table.from_arrow(file.read(use_threads=False))
+            table = file.table()
             means.append(_means_of(table, lines, found, None if segment.table in BIN_S else bin_s))
     if "responses" in rows:
         means.append(_means_of(Table.join(rows["responses"]), lines, found, bin_s))

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from livebode.core import Channel, LivebodeError, RecordError
 from livebode.core.clock import RunClock
@@ -22,6 +21,7 @@ from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, with_kinds
 from livebode.sources.live.replayable import ReplaySource, SenderSample
 from livebode.tables.exchange import schema_from_arrow
+from livebode.tables.parquet_footer import read_footer
 
 
 class RecordedRun:
@@ -61,7 +61,10 @@ class RecordedRun:
     def samples(self) -> int:
         """Number of its samples."""
         files = self._run.files(["samples"])["samples"]
-        closed = sum(pq.read_metadata(path).num_rows for path in files.paths)
+        closed = 0
+        for path in files.paths:
+            with path.open("rb") as file:
+                closed += read_footer(file).rows
         return int(closed + sum(batch.num_rows for batch in files.rows))
 
     @property

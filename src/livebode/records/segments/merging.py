@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from livebode.core import RecordError
 from livebode.records.inside import is_folder
 from livebode.records.segments.manifest import SEGMENT_NAME, TABLES, Manifest, Segment, segment_numbers
 from livebode.records.segments.segment_file import open_segment
@@ -47,8 +46,8 @@ def rows_to_merge(run: Path, parts: list[Segment]) -> list[Table] | None:
     tables = []
     for part in parts:
         try:
-            tables.append(Table.from_arrow(open_segment(run, part).read(use_threads=False)))
-        except (RecordError, FileNotFoundError):
+            tables.append(open_segment(run, part).table())
+        except (FileNotFoundError, TypeError, ValueError):
             return None
         if tables[-1].schema != tables[0].schema:
             return None
