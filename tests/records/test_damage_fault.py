@@ -252,9 +252,9 @@ def test_a_changed_file_of_a_finished_run_is_reported_and_the_rest_is_read(finis
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DamageWarning)
         run = RunRecord.open(other)
-        found = run.responses(), run.events(), list(run.tables("samples"))
+        found = run.responses(), run.events(), list(map(pa.table, run.tables("samples")))
         for tier in TIERS:
-            list(run.tables(tier))
+            list(map(pa.table, run.tables(tier)))
     reported = [str(damage.details["file"]) for damage in run.damages]
     assert reported == ([] if name.name == "run-copy.json" else [str(name)] * len(reported))
     assert reported or name.name == "run-copy.json"
@@ -308,7 +308,9 @@ def check_damage(run: Path, reported: Event, journal: str) -> None:
     assert RunRecord.open(run).summary["record"]["damaged"] == {
         "files": [f"damaged/{journal}"], **{key: details[key] for key in ("samples", "seconds", "rows")},
     }  # fmt: skip
-    number = np.concatenate([table["sample"].to_numpy() for table in RunRecord.open(run).tables("samples")])
+    number = np.concatenate(
+        [table["sample"].to_numpy() for table in map(pa.table, RunRecord.open(run).tables("samples"))]
+    )
     lost = np.setdiff1d(np.arange(SAMPLES), number)
     assert lost.size == details["rows"].get("samples", 0)
     responses = RunRecord.open(run).responses()

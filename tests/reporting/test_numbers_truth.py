@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from pypdf import PdfReader
 from pypdf.generic import DictionaryObject
@@ -114,7 +115,10 @@ def test_parameters_over_time_are_those_of_the_table(run: Path) -> None:
     document = run_report(run, made=MADE)
     (picture,) = parts(document, Picture, "Parameters")
     rows = [
-        row for table in RunRecord.open(run).tables("parameters") for row in table.to_pylist() if row["name"] == "Keff"
+        row
+        for table in map(pa.table, RunRecord.open(run).tables("parameters"))
+        for row in table.to_pylist()
+        if row["name"] == "Keff"
     ]
     curves = {name: (value, half) for name, _, value, half in picture.data["curves"]}
     np.testing.assert_array_equal(curves["Keff"][0], [row["value"] for row in rows])

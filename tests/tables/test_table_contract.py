@@ -88,7 +88,7 @@ def test_a_misfit_of_columns_and_schema_is_an_error() -> None:
         Table.of({"a": np.arange(2), "b": np.arange(3)})
     with pytest.raises(TypeError, match="'t' is of type date32"):
         Field("t", "date32")
-    with pytest.raises(TypeError, match="Timestamp"):
+    with pytest.raises(TypeError, match="of type timestamp"):
         Table.from_arrow(pa.table({"t": pa.array([0], pa.timestamp("ns"))}))
     with pytest.raises(TypeError, match="is text"):
         example()["model"]

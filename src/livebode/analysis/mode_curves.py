@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from livebode.output_only import ModeCurve
 from livebode.records import RunRecord
-from livebode.tables import Table
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +24,7 @@ def mode_curves(run: RunRecord, rows_max: int = ROWS_MAX) -> list[ModeCurve]:
     windows, hop = sum(run.summary["windows"].values()), run.found["hop"]
     every = max(1, -(-windows // rows_max))
     parts: dict[str, dict[str, list[NDArray[Any]]]] = {}
-    for table in map(Table.from_arrow, run.tables("parameters")):
+    for table in run.tables("parameters"):
         columns = {name: table.values(name) for name in _COLUMNS}
         used = columns["sample"] // hop % every == 0
         for model in dict.fromkeys(columns["model"]):

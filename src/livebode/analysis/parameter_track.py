@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from livebode.core.parameters import OK
 from livebode.records import RunRecord
-from livebode.tables import Table
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +54,7 @@ class Track:
 def tracks(run: RunRecord, kept: NDArray[np.int64], time_s: Floats) -> dict[str, Track]:
     """Tracks by model, at the responses whose newest samples are `kept`; empty if nothing was fitted."""
     found: dict[str, Track] = {}
-    for table in map(Table.from_arrow, run.tables("parameters")):
+    for table in run.tables("parameters"):
         columns = {name: table.values(name) for name in _COLUMNS}
         for model in dict.fromkeys(columns["model"]):
             track = found.setdefault(model, Track(time_s, model=model))

@@ -142,7 +142,7 @@ def fitted_rows(run: RunRecord) -> FittedQuantities:
     """The valid fits of a run; of one in segments the newest 64 MiB."""
     found = FittedQuantities()
     for table in run.tables("parameters", _NEWEST_BYTES):
-        found.add(Table.from_arrow(table))
+        found.add(table)
     return found
 
 

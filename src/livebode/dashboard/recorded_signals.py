@@ -28,7 +28,7 @@ def recorded_block(run: RunRecord, at_s: float) -> Block | None:
     lines = run.lines
     half_s = span_samples(lines.rate_hz, lines.window, 1) / lines.rate_hz / 2
     found = []
-    for table in map(Table.from_arrow, run.tables("samples", span_s=(at_s - half_s, at_s + half_s))):
+    for table in run.tables("samples", span_s=(at_s - half_s, at_s + half_s)):
         time_s = table["time_s"]
         within = np.flatnonzero((time_s >= at_s - half_s) & (time_s < at_s + half_s))
         if within.size:

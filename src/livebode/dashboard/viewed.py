@@ -16,7 +16,6 @@ from livebode.dashboard.trends import TrendRows
 from livebode.records import RunRecord
 from livebode.records.grouped_events import still_waiting
 from livebode.records.tiers import thinned
-from livebode.tables import Table
 
 _LONG_BYTES = 16 << 20  # larger tables are not read whole
 _MEANS = 2000
@@ -103,7 +102,7 @@ class Viewed:
 
     def _parameters(self, span_s: tuple[float, float] | None) -> Iterator[tuple[str, str, str, TrendRows]]:
         """Model, name, unit and rows of each parameter, table by table."""
-        for table in map(Table.from_arrow, self._run.tables("parameters", span_s=span_s)):
+        for table in self._run.tables("parameters", span_s=span_s):
             new = table["sample"] > self._parameter_sample
             if not new.any():
                 continue

@@ -14,7 +14,6 @@ from arro3 import io as arrow_io
 from livebode.core import RecordError, Responses
 from livebode.export.result import WriteResult
 from livebode.tables import Table
-from livebode.tables.exchange import to_arrow
 from livebode.tables.table import Column
 
 
@@ -55,7 +54,7 @@ def write_header(file: BinaryIO, header: Sequence[str]) -> None:
 def write_rows(file: BinaryIO, rows: Table) -> None:
     """Write rows without a header; text is quoted only where it must be."""
     text = io.BytesIO()  # errors of the disk have no number from arro3
-    arrow_io.write_csv(to_arrow(rows), text, header=False)
+    arrow_io.write_csv(rows, text, header=False)
     file.write(text.getbuffer())
 
 

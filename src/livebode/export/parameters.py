@@ -31,11 +31,11 @@ class ParameterTable:
     """
 
     run: Path
-    tables: Callable[[], Iterable[object]]
+    tables: Callable[[], Iterable[Table]]
 
     def __iter__(self) -> Iterator[Table]:
         any_ = False
-        for table in map(Table.from_arrow, self.tables()):
+        for table in self.tables():
             any_ = True
             missing = [column for column in COLUMNS if column not in table.column_names]
             if missing:

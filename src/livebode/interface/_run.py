@@ -108,7 +108,7 @@ class Run:
         ``status`` and others: ``run.parameters["value"]`` is an array, ``run.parameters.text("name")`` its words, and
         ``polars.DataFrame(run.parameters)`` or ``pyarrow.table(run.parameters).to_pandas()`` a DataFrame.
         """
-        parts = map(Table.from_arrow, self._record.tables("parameters"))
+        parts = self._record.tables("parameters")
         return Table.join([Table.empty(PARAMETERS.schema), *parts])
 
     @cached_property

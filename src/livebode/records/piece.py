@@ -66,7 +66,7 @@ class StoredTable:
         if groups == []:
             return
         with open_read(self._run, self._name) as file:
-            yield from map(Table.from_arrow, ParquetFile(file).batches(None, groups, rows))
+            yield from ParquetFile(file).tables(rows, groups)
 
     def _whole(self, file: BinaryIO, parts: list[ParquetPart]) -> list[bool]:
         """Whether each part is intact; computed once per process, as long as the file is unchanged."""

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from livebode.core import (
     DamageWarning,
@@ -186,7 +185,7 @@ class RunRecord:
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
         """All readable responses in order, in parts of bounded size; or the newest, from files up to this size."""
-        return self._in_parts(self._tables("responses", size_bytes_max))
+        return self._in_parts(self.tables("responses", size_bytes_max))
 
     def steady_batches(self) -> Iterator[Responses]:
         """Those of a machine that was ready, without a transient at the start of a live run.
@@ -197,7 +196,7 @@ class RunRecord:
 
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """Responses with an effective time in this span, including its ends, in parts; other segments are not read."""
-        for part in self._in_parts(self._tables("responses", span_s=(from_s, to_s))):
+        for part in self._in_parts(self.tables("responses", span_s=(from_s, to_s))):
             if len(within := part.between(from_s, to_s)):
                 yield within
 
@@ -230,7 +229,7 @@ class RunRecord:
 
     def tables(
         self, name: str, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
-    ) -> Iterator[pa.Table]:
+    ) -> Iterator[Table]:
         """The rows of "responses", "parameters" or "samples" in order, part by part; none if it was not recorded.
 
         With `span_s`, segments completely outside of that time are skipped.
@@ -241,11 +240,6 @@ class RunRecord:
             While iterating, if nothing can be read, or the content is not from a run. A damaged part is skipped and
             reported in `damages`.
         """
-        yield from map(pa.table, self._tables(name, size_bytes_max, span_s))
-
-    def _tables(
-        self, name: str, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
-    ) -> Iterator[Table]:
         file = self.path / name
         try:
             if reading.in_segments(self.path):

@@ -1,38 +1,33 @@
-"""Parquet files: only the columns and row groups that are asked for, decoded by arro3.
+"""Parquet files of runs: only the columns and row groups that are asked for.
 
-arro3 reads whole files. It gets one with the bytes of this file and a footer that names only these columns and row
-groups, and reads page by page what that footer names.
-
-A damaged page can end the process: arro3 decodes behind a C interface, and a failed assertion of its decoder aborts
-there. Headers of pages and checksums of pages, where a file has them, are checked before; for files without these
-checksums the caller verifies the bytes first, as records do.
+Plain flat columns, compressed by LZ4 or not at all: what livebode writes, and wrote with PyArrow before. A value that a
+file does not have is NaN.
 """
 
 from __future__ import annotations
 
-import base64
 import io
-import os
-from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property
-from typing import IO, BinaryIO, TypeVar, cast
+from collections.abc import Iterator, Sequence
+from typing import BinaryIO
 
-from arro3 import core
-from arro3 import io as arrow_io
+import numpy as np
 
-from livebode.tables.exchange import from_arrow
-from livebode.tables.parquet_footer import Footer, read_footer, written_footer
-from livebode.tables.parquet_pages import check_pages
-from livebode.tables.table import Table
+from livebode.tables.parquet_footer import ColumnChunk, Footer, ParquetColumn, read_footer
+from livebode.tables.parquet_pages import column_of, joined
+from livebode.tables.schema import STRING, Field, Schema
+from livebode.tables.table import Column, Table
+from livebode.tables.text import Text
 
-_ARROW_SCHEMA = "ARROW:schema"
-_END_OF_STREAM = b"\xff\xff\xff\xff\0\0\0\0"
-_LIST_VALUES_MAX = 1 << 27  # in a row group: 1 GiB of numbers; the number of rows does not limit lists
-_T = TypeVar("_T")
+_GROUP_VALUES_MAX = 1 << 27  # 1 GiB of numbers
 
 
 class ParquetFile:
-    """A Parquet file that is open for reading, and remains open as long as this is in use.
+    """A Parquet file to read.
+
+    Parameters
+    ----------
+    content
+        Its bytes, of which tables may contain parts, or a file that remains open as long as this is in use.
 
     Raises
     ------
@@ -42,116 +37,71 @@ class ParquetFile:
         If it cannot be read.
     """
 
-    def __init__(self, file: BinaryIO) -> None:
-        self.file = file
-        self.footer: Footer = read_footer(file)
+    def __init__(self, content: bytes | BinaryIO) -> None:
+        self.content = content
+        self.footer: Footer = read_footer(io.BytesIO(content) if isinstance(content, bytes) else content)
 
-    @cached_property
-    def schema(self) -> core.Schema:
-        """Its schema; ValueError if arro3 does not read it."""
-        return self._reader(range(len(self.footer.columns)), [], 1).schema
+    @property
+    def schema(self) -> Schema:
+        """Of all columns, if none has nulls; errors as of `table`."""
+        return self.footer.schema_of(self.footer.columns)
 
-    def batches(
-        self, columns: Sequence[int] | None = None, groups: Sequence[int] | None = None, rows: int = 1 << 16
-    ) -> Iterator[core.RecordBatch]:
-        """The rows of these row groups, at most `rows` at a time, with these columns in the order of the file.
+    def table(self, groups: Sequence[int] | None = None, columns: Sequence[str] | None = None) -> Table:
+        """The rows of these row groups with these columns.
 
         Raises
         ------
         ValueError
-            If they are damaged, or of a kind that is not read; one sentence says why.
+            If they are damaged, or of a form that is not read; one sentence says why.
+        TypeError
+            If a column contains neither numbers, truth values nor text.
+        KeyError
+            If there is no column of this name.
         OSError
             If they cannot be read.
         """
-        places = range(len(self.footer.columns)) if columns is None else sorted(set(columns))
+        chosen = self.footer.columns if columns is None else [self._named(name) for name in columns]
+        schema = self.footer.schema_of(chosen)
+        every = range(len(self.footer.groups)) if groups is None else groups
+        values = tuple(self._column(column, every) for column in chosen)
+        return Table(Schema(tuple(map(_as_found, schema, values)), schema.metadata), values)
+
+    def tables(self, rows: int, groups: Sequence[int] | None = None) -> Iterator[Table]:
+        """The rows of these row groups, at most so many at a time; errors as of `table`."""
         for group in range(len(self.footer.groups)) if groups is None else groups:
-            if not self.footer.groups[group].rows:
-                continue
-            self._check(places, group)
-            reader = self._reader(places, [group], rows)
-            while (batch := _contained(lambda: next(reader, None))) is not None:  # noqa: B023 (called at once)
-                yield batch
+            table = self.table([group])
+            for begin in range(0, table.num_rows, rows):
+                yield table.slice(begin, rows)
 
-    def table(self, groups: Sequence[int] | None = None) -> Table:
-        """The rows of these row groups, as `batches`; TypeError if one of its columns cannot be in a table."""
-        rows = max((group.rows for group in self.footer.groups), default=0)
-        batches = list(self.batches(groups=groups, rows=rows))
-        return from_arrow(core.Table.from_batches(batches, schema=batches[0].schema if batches else self.schema))
+    def _named(self, name: str) -> ParquetColumn:
+        found = next((one for one in self.footer.columns if one.name == name), None)
+        if found is None:
+            raise KeyError(name)
+        return found
 
-    def _check(self, places: Sequence[int], group: int) -> None:
-        for column in (self.footer.columns[place] for place in places):
-            for chunk in (self.footer.groups[group].chunks[leaf] for leaf in column.leaves):
-                if column.repeated and chunk.values > _LIST_VALUES_MAX:
-                    raise ValueError(f"column {column.name!r} has lists of {chunk.values} values in a row group")
-                try:
-                    check_pages(self.file, chunk)
-                except ValueError as error:
-                    raise ValueError(f"column {column.name!r} is damaged: {error}") from None
+    def _column(self, column: ParquetColumn, groups: Sequence[int]) -> Column:
+        filled = [group for group in groups if self.footer.groups[group].rows]
+        if not filled:
+            return Text((), np.empty(0, np.int32)) if column.kind == STRING else np.empty(0, column.kind)
+        return joined((self._chunk(column, group) for group in filled), sum(self.footer.groups[g].rows for g in filled))
 
-    def _reader(self, places: Sequence[int], groups: Sequence[int], rows: int) -> core.RecordBatchReader:
-        metadata = dict(self.footer.metadata)
-        if _ARROW_SCHEMA in metadata and len(places) < len(self.footer.columns):
-            metadata[_ARROW_SCHEMA] = _contained(lambda: _narrowed(metadata[_ARROW_SCHEMA], places))
-        end = written_footer(self.footer, places, groups, metadata)
-        view = _OtherEnd(self.file, self.footer.begin, end)
-        return _contained(lambda: arrow_io.read_parquet(cast(IO[bytes], view), batch_size=max(1, rows)))
+    def _chunk(self, column: ParquetColumn, group: int) -> Column:
+        chunk = self.footer.chunk(group, column)
+        if chunk.values * len(self.footer.columns) > _GROUP_VALUES_MAX:
+            raise ValueError(f"a row group has {chunk.values} rows, more than a run writes")
+        try:
+            return column_of(self._bytes(chunk), chunk, column)
+        except ValueError as error:
+            raise ValueError(f"column {column.name!r} is not read: {error}") from None
 
-
-class _OtherEnd(io.RawIOBase):
-    """The bytes of a file up to `begin`, followed by others."""
-
-    def __init__(self, file: BinaryIO, begin: int, end: bytes) -> None:
-        super().__init__()
-        self._file, self._begin, self._end, self._at = file, begin, end, 0
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        origin = {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._begin + len(self._end)}
-        self._at = origin[whence] + offset
-        return self._at
-
-    def tell(self) -> int:
-        return self._at
-
-    def read(self, size: int = -1) -> bytes:
-        if self._at < self._begin:
-            self._file.seek(self._at)
-            data = self._file.read(min(size, self._begin - self._at))
-        else:
-            first = self._at - self._begin
-            data = self._end[first : first + size]
-        self._at += len(data)
-        return data
+    def _bytes(self, chunk: ColumnChunk) -> memoryview:
+        if isinstance(self.content, bytes):
+            return memoryview(self.content)[chunk.begin : chunk.begin + chunk.stored_bytes]
+        self.content.seek(chunk.begin)
+        return memoryview(self.content.read(chunk.stored_bytes))
 
 
-def _narrowed(encoded: str, places: Sequence[int]) -> str:
-    """Arrow's schema in the metadata, as of only these columns."""
-    whole = arrow_io.read_ipc_stream(io.BytesIO(base64.b64decode(encoded) + _END_OF_STREAM)).schema
-    schema = core.Schema([whole.field(place) for place in places], metadata=whole.metadata)
-    sink = io.BytesIO()
-    arrow_io.write_ipc_stream(core.Table.from_batches([], schema=schema), sink)
-    return base64.b64encode(sink.getvalue().removesuffix(_END_OF_STREAM)).decode()
-
-
-def _contained(action: Callable[[], _T]) -> _T:
-    """Its result; any error of arro3 as a ValueError of one sentence."""
-    try:
-        return action()
-    except (OSError, MemoryError):
-        raise
-    except Exception as error:
-        raise ValueError(_first_line(error)) from None
-    except BaseException as error:
-        if type(error).__name__ != "PanicException":  # of pyo3; it has no module from which it could be imported
-            raise
-        raise ValueError(_first_line(error)) from None
-
-
-def _first_line(error: BaseException) -> str:
-    lines = str(error).strip().splitlines()
-    return lines[0][:200] if lines else type(error).__name__
+def _as_found(field: Field, column: Column) -> Field:
+    """Integers with nulls are doubles now."""
+    kind = STRING if isinstance(column, Text) else column.dtype.name
+    return field if kind == field.kind else Field(field.name, kind, field.metadata)

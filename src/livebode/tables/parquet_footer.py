@@ -1,28 +1,43 @@
-"""The footer of a Parquet file: columns, row groups and statistics, and a footer for some of them.
+"""The footer of a Parquet file: columns, row groups and statistics.
 
-The structs are those of parquet.thrift, https://github.com/apache/parquet-format.
+The structs are those of parquet.thrift, https://github.com/apache/parquet-format. Of a row group only what is asked for
+becomes an object: a footer can have thousands of columns in row groups.
 """
 
 from __future__ import annotations
 
+import base64
 import os
-import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isnan
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
-from livebode.tables.thrift_compact import BINARY, I32, I64, LIST, STRUCT, CompactReader, binary, integer, list_of
-from livebode.tables.thrift_compact import struct_of as _struct
+import numpy as np
 
-MAGIC = b"PAR1"
+from livebode.tables.parquet_format import ARROW_SCHEMA, BYTE_ARRAY, FORMS, MAGIC, OPTIONAL, REPEATED, REQUIRED
+from livebode.tables.schema import STRING, Field, Schema
+from livebode.tables.schema_message import schema_from_message
+from livebode.tables.thrift_compact import BINARY, I32, I64, LIST, STRUCT, Struct, decode, field
+
 _FOOTER_BYTES_MAX = 1 << 23
-_REPEATED = 2
-_SIGNED = range(15, 19)  # converted types INT_8 to INT_64
-_PLAIN_NUMBERS = {1: "<i", 2: "<q", 4: "<f", 5: "<d"}  # physical types whose statistics are numbers
-_ENCODINGS = {0, *range(2, 10)}
-_DEPTH_MAX = 64
 _FILE_TAIL = 8
+_DEPTH_MAX = 64
+# Fields of FileMetaData, SchemaElement, KeyValue, RowGroup, ColumnChunk, ColumnMetaData and Statistics.
+_ELEMENTS, _ROWS, _GROUPS, _PAIRS, _ENCRYPTED = field(2, LIST), field(3, I64), field(4, LIST), field(5, LIST), 8
+_TYPE, _REPETITION, _NAME, _CHILDREN, _CONVERTED = (
+    field(1, I32), field(3, I32), field(4, BINARY), field(5, I32), field(6, I32),
+)  # fmt: skip
+_LOGICAL = field(10, STRUCT)
+_KEY, _VALUE = field(1, BINARY), field(2, BINARY)
+_CHUNKS, _SIZE, _GROUP_ROWS = field(1, LIST), field(2, I64), field(3, I64)
+_OTHER_FILE, _ABOUT = field(1, BINARY), field(3, STRUCT)
+_CODEC, _VALUES, _UNCOMPRESSED, _COMPRESSED = field(4, I32), field(5, I64), field(6, I64), field(7, I64)
+_DATA_BEGIN, _DICTIONARY_BEGIN, _STATISTICS = field(9, I64), field(11, I64), field(12, STRUCT)
+_MAXIMUM, _MINIMUM, _NULLS, _OLD_MAXIMUM, _OLD_MINIMUM = (
+    field(5, BINARY), field(6, BINARY), field(3, I64), field(1, BINARY), field(2, BINARY),
+)  # fmt: skip
+_KINDS = {(form.physical, form.converted): kind for kind, form in FORMS.items()}
+_KINDS |= {(1, 17): "int32", (2, 18): "int64"}
 
 
 class Statistics(NamedTuple):
@@ -33,60 +48,34 @@ class Statistics(NamedTuple):
     nulls: int | None
 
 
-@dataclass(frozen=True)
-class ColumnChunk:
-    """The values of a leaf of the schema in a row group, and where its pages are in the file."""
+class ColumnChunk(NamedTuple):
+    """The values of a column in a row group, and where its pages are in the file."""
 
-    physical_type: int
-    encodings: tuple[int, ...]
-    path: tuple[bytes, ...]
+    physical: int
     codec: int
     values: int
-    size_bytes: int
-    """Without compression."""
-    compressed_bytes: int
-    data_begin: int
-    dictionary_begin: int | None
-    minimum: bytes | None
-    maximum: bytes | None
-    nulls: int | None
-
-    @property
-    def begin(self) -> int:
-        """First byte of its pages."""
-        return self.data_begin if self.dictionary_begin is None else self.dictionary_begin
-
-
-@dataclass(frozen=True)
-class RowGroup:
-    """Consecutive rows."""
-
-    rows: int
-    chunks: tuple[ColumnChunk, ...]
-
-    @property
-    def size_bytes(self) -> int:
-        """Size of its values without compression."""
-        return sum(chunk.size_bytes for chunk in self.chunks)
-
-
-@dataclass(frozen=True)
-class _Element:
-    raw: bytes
-    name: str
-    children: int
-    repeated: bool
-    annotated: bool
+    begin: int
+    stored_bytes: int
 
 
 @dataclass(frozen=True)
 class ParquetColumn:
-    """A column of the table: one leaf of the schema, or several where it is nested."""
+    """A column of the table; its kind is None if it is not a plain number, truth value or text."""
 
     name: str
-    elements: tuple[_Element, ...]
-    leaves: range
-    repeated: bool
+    kind: str | None
+    optional: bool
+    leaf: int
+    """Number of its first leaf in the schema."""
+
+
+@dataclass(frozen=True)
+class RowGroup:
+    """Consecutive rows. `size_bytes` is that without compression, as the footer states it."""
+
+    rows: int
+    size_bytes: int
+    chunks: Sequence[Any]
 
 
 @dataclass(frozen=True)
@@ -94,7 +83,6 @@ class Footer:
     """What a footer states. `begin` is its first byte in the file."""
 
     begin: int
-    root: _Element
     columns: tuple[ParquetColumn, ...]
     groups: tuple[RowGroup, ...]
     metadata: Mapping[str, str]
@@ -104,18 +92,58 @@ class Footer:
         """Number of all rows."""
         return sum(group.rows for group in self.groups)
 
+    def schema_of(self, columns: Sequence[ParquetColumn]) -> Schema:
+        """The schema of a table of these columns, with their metadata; TypeError if one cannot be in a table."""
+        if wrong := [one.name for one in columns if one.kind is None]:
+            raise TypeError(f"column {wrong[0]!r} is of a type that a table does not have: read it with PyArrow")
+        found = self._arrow_fields()
+        fields = tuple(Field(one.name, one.kind or "", found.get(one.name, {})) for one in columns)
+        return Schema(fields, {key: value for key, value in self.metadata.items() if key != ARROW_SCHEMA})
+
     def statistics(self, group: int, name: str) -> Statistics:
         """Those of a column in a row group; KeyError if there is no such column."""
         column = next((one for one in self.columns if one.name == name), None)
         if column is None:
             raise KeyError(name)
-        chunk = self.groups[group].chunks[column.leaves.start]
-        if len(column.elements) > 1 or column.elements[0].annotated:
-            return Statistics(None, None, chunk.nulls)
-        layout = _PLAIN_NUMBERS.get(chunk.physical_type, "")
-        bounds = [_number(layout, data) for data in (chunk.minimum, chunk.maximum)]
-        low, high = bounds if None not in bounds else (None, None)
-        return Statistics(low, high, chunk.nulls)
+        found = _inner(_inner(self.groups[group].chunks[column.leaf], _ABOUT), _STATISTICS)
+        data = found.get(_MINIMUM, found.get(_OLD_MINIMUM)), found.get(_MAXIMUM, found.get(_OLD_MAXIMUM))
+        low, high = (None if one is None else _number(column, one) for one in data)
+        return (
+            Statistics(low, high, found.get(_NULLS))
+            if None not in (low, high)
+            else Statistics(None, None, found.get(_NULLS))
+        )
+
+    def chunk(self, group: int, column: ParquetColumn) -> ColumnChunk:
+        """Where a column of a row group is; ValueError if the footer contradicts itself there."""
+        whole = self.groups[group].chunks[column.leaf]
+        about = _inner(whole, _ABOUT)
+        try:
+            physical, codec, values, stored, begin = (
+                about[key] for key in (_TYPE, _CODEC, _VALUES, _COMPRESSED, _DATA_BEGIN)
+            )
+        except KeyError as missing:
+            raise ValueError(f"column {column.name!r} has no field {missing.args[0] >> 4}") from None
+        begin = min(begin, about.get(_DICTIONARY_BEGIN) or begin)
+        if _OTHER_FILE in whole:
+            raise ValueError(f"column {column.name!r} is in another file")
+        if values != self.groups[group].rows:
+            raise ValueError(f"column {column.name!r} has {values} values in {self.groups[group].rows} rows")
+        if not len(MAGIC) <= begin <= begin + stored <= self.begin:
+            raise ValueError(f"column {column.name!r} is outside of the file")
+        if column.kind is None or physical != FORMS[column.kind].physical:
+            raise ValueError(f"column {column.name!r} is of type {physical}")
+        return ColumnChunk(physical, codec, values, begin, stored)
+
+    def _arrow_fields(self) -> dict[str, Mapping[str, str]]:
+        """Metadata of columns, which Parquet has no place for."""
+        encoded = self.metadata.get(ARROW_SCHEMA)
+        if encoded is None:
+            return {}
+        try:
+            return {one.name: one.metadata for one in schema_from_message(base64.b64decode(encoded))}
+        except TypeError:  # of a column that is not read
+            return {}
 
 
 def read_footer(file: BinaryIO) -> Footer:
@@ -124,7 +152,7 @@ def read_footer(file: BinaryIO) -> Footer:
     Raises
     ------
     ValueError
-        If it is damaged, is not Parquet, or has parts that are not read: encryption, columns in other files.
+        If it is damaged, is not Parquet, or is encrypted.
     """
     size = file.seek(0, os.SEEK_END)
     file.seek(max(0, size - _FILE_TAIL))
@@ -139,211 +167,54 @@ def read_footer(file: BinaryIO) -> Footer:
         raise ValueError(f"its footer has {length} bytes, more than {_FOOTER_BYTES_MAX}")
     file.seek(begin)
     try:
-        return _parsed(file.read(length), begin)
-    except ValueError as error:
+        return _parsed(decode(file.read(length))[0], begin)
+    except (ValueError, KeyError, AttributeError) as error:
         raise ValueError(f"its footer is damaged: {error}") from None
 
 
-def written_footer(footer: Footer, places: Sequence[int], groups: Sequence[int], metadata: Mapping[str, str]) -> bytes:
-    """A footer, with the end of a file, in place of this one: only these columns and row groups, by number.
-
-    It has no statistics: readers would use them for nothing but filters.
-    """
-    columns = [footer.columns[place] for place in places]
-    root = _struct((4, BINARY, binary(footer.root.name.encode())), (5, I32, integer(len(columns))))
-    elements = [root, *(element.raw for column in columns for element in column.elements)]
-    leaves = [leaf for column in columns for leaf in column.leaves]
-    chosen = [footer.groups[group] for group in groups]
-    entries = [
-        _struct((1, BINARY, binary(key.encode())), (2, BINARY, binary(value.encode())))
-        for key, value in metadata.items()
-    ]
-    data = _struct(
-        (1, I32, integer(2)),
-        (2, LIST, list_of(STRUCT, elements)),
-        (3, I64, integer(sum(group.rows for group in chosen))),
-        (4, LIST, list_of(STRUCT, [_written_group(group, leaves) for group in chosen])),
-        (5, LIST, list_of(STRUCT, entries)),
-    )
-    return data + len(data).to_bytes(4, "little") + MAGIC
-
-
-def _written_group(group: RowGroup, leaves: Iterable[int]) -> bytes:
-    chunks = [group.chunks[leaf] for leaf in leaves]
-    return _struct(
-        (1, LIST, list_of(STRUCT, [_written_chunk(chunk) for chunk in chunks])),
-        (2, I64, integer(sum(chunk.size_bytes for chunk in chunks))),
-        (3, I64, integer(group.rows)),
-    )
-
-
-def _written_chunk(chunk: ColumnChunk) -> bytes:
-    fields = [
-        (1, I32, integer(chunk.physical_type)),
-        (2, LIST, list_of(I32, [integer(one) for one in chunk.encodings])),
-        (3, LIST, list_of(BINARY, [binary(name) for name in chunk.path])),
-        (4, I32, integer(chunk.codec)),
-        (5, I64, integer(chunk.values)),
-        (6, I64, integer(chunk.size_bytes)),
-        (7, I64, integer(chunk.compressed_bytes)),
-        (9, I64, integer(chunk.data_begin)),
-    ]
-    if chunk.dictionary_begin is not None:
-        fields.append((11, I64, integer(chunk.dictionary_begin)))
-    return _struct((2, I64, integer(0)), (3, STRUCT, _struct(*fields)))
-
-
-def _parsed(data: bytes, begin: int) -> Footer:
-    reader = CompactReader(data)
-    elements: list[_Element] = []
-    groups: list[RowGroup] = []
-    metadata: dict[str, str] = {}
-    rows = None
-    for number, kind in reader.fields():
-        if (number, kind) == (2, LIST):
-            elements = [_element(reader) for _ in reader.items(STRUCT)]
-        elif (number, kind) == (3, I64):
-            rows = reader.integer()
-        elif (number, kind) == (4, LIST):
-            groups = [_group(reader) for _ in reader.items(STRUCT)]
-        elif (number, kind) == (5, LIST):
-            metadata = dict(_entry(reader) for _ in reader.items(STRUCT))
-        elif (number, kind) == (8, STRUCT):
-            raise ValueError("the file is encrypted")
-        else:
-            reader.skip(kind)
-    columns = _columns(elements)
-    for group in groups:
-        _check(group, columns, begin)
-    footer = Footer(begin, elements[0], columns, tuple(groups), metadata)
-    if footer.rows != rows:
-        raise ValueError(f"it declares {rows} rows, and row groups of {footer.rows}")
+def _parsed(data: Struct, begin: int) -> Footer:
+    if any(key >> 4 == _ENCRYPTED for key in data):
+        raise ValueError("the file is encrypted")
+    elements = _structs(data, _ELEMENTS)
+    columns, leaves = _columns(elements)
+    groups = tuple(_group(one, leaves) for one in _structs(data, _GROUPS))
+    metadata = {_text(pair.get(_KEY, b"")): _text(pair.get(_VALUE, b"")) for pair in _structs(data, _PAIRS)}
+    footer = Footer(begin, columns, groups, metadata)
+    if footer.rows != data.get(_ROWS):
+        raise ValueError(f"it declares {data.get(_ROWS)} rows, and row groups of {footer.rows}")
     return footer
 
 
-def _element(reader: CompactReader) -> _Element:
-    begin = reader.at
-    name, children, repeated, annotated, signed = "", 0, False, False, False
-    for number, kind in reader.fields():
-        if (number, kind) == (4, BINARY):
-            name = reader.binary().decode()
-            if "\0" in name:  # arro3 ends the process at one
-                raise ValueError("the name of a column contains a null character")
-        elif (number, kind) == (5, I32):
-            children = reader.integer()
-        elif (number, kind) == (3, I32):
-            repeated = reader.integer() == _REPEATED
-        elif (number, kind) == (6, I32):
-            annotated, signed = True, reader.integer() in _SIGNED
-        else:
-            annotated |= number == 10
-            reader.skip(kind)
-    return _Element(bytes(reader.data[begin : reader.at]), name, children, repeated, annotated and not signed)
+def _group(data: Struct, leaves: int) -> RowGroup:
+    rows, chunks = data.get(_GROUP_ROWS, -1), _structs(data, _CHUNKS)
+    if len(chunks) != leaves or rows < 0:
+        raise ValueError(f"a row group has {rows} rows and {len(chunks)} columns of {leaves}")
+    return RowGroup(rows, data.get(_SIZE, 0), chunks)
 
 
-def _entry(reader: CompactReader) -> tuple[str, str]:
-    texts = {1: "", 2: ""}
-    for number, kind in reader.fields():
-        if number in texts and kind == BINARY:
-            texts[number] = reader.binary().decode("utf-8", "replace")
-        else:
-            reader.skip(kind)
-    return texts[1], texts[2]
-
-
-def _group(reader: CompactReader) -> RowGroup:
-    rows, chunks = -1, []
-    for number, kind in reader.fields():
-        if (number, kind) == (1, LIST):
-            chunks = [_chunk(reader) for _ in reader.items(STRUCT)]
-        elif (number, kind) == (3, I64):
-            rows = reader.integer()
-        else:
-            reader.skip(kind)
-    return RowGroup(rows, tuple(chunks))
-
-
-def _chunk(reader: CompactReader) -> ColumnChunk:
-    found = None
-    for number, kind in reader.fields():
-        if (number, kind) == (3, STRUCT):
-            found = _column_metadata(reader)
-        elif number == 1:
-            raise ValueError("it has columns in other files")
-        elif number in (8, 9):
-            raise ValueError("the file is encrypted")
-        else:
-            reader.skip(kind)
-    if found is None:
-        raise ValueError("a column has no position")
-    return found
-
-
-_NUMBERS = {1: I32, 4: I32, 5: I64, 6: I64, 7: I64, 9: I64, 11: I64}
-_REQUIRED = [1, 4, 5, 6, 7, 9]
-
-
-def _column_metadata(reader: CompactReader) -> ColumnChunk:
-    value: dict[int, int] = {}
-    encodings: list[int] = []
-    path: list[bytes] = []
-    bounds: dict[int, bytes] = {}
-    nulls = None
-    for number, kind in reader.fields():
-        if _NUMBERS.get(number) == kind:
-            value[number] = reader.integer()
-        elif (number, kind) == (2, LIST):
-            encodings = [reader.integer() for _ in reader.items(I32)]
-        elif (number, kind) == (3, LIST):
-            path = [reader.binary() for _ in reader.items(BINARY)]
-        elif (number, kind) == (12, STRUCT):
-            bounds, nulls = _statistics(reader)
-        else:
-            reader.skip(kind)
-    if missing := [number for number in _REQUIRED if number not in value]:
-        raise ValueError(f"a column has no field {missing[0]}")
-    physical_type, codec, values, size_bytes, compressed_bytes, data_begin = (value[number] for number in _REQUIRED)
-    if physical_type not in range(8) or codec not in range(8) or not set(encodings) <= _ENCODINGS:
-        raise ValueError(f"a column declares type {physical_type}, codec {codec} and encodings {encodings[:8]}")
-    return ColumnChunk(
-        physical_type, tuple(encodings), tuple(path), codec, values, size_bytes, compressed_bytes, data_begin,
-        value.get(11) or None, bounds.get(6, bounds.get(2)), bounds.get(5, bounds.get(1)), nulls,
-    )  # fmt: skip
-
-
-def _statistics(reader: CompactReader) -> tuple[dict[int, bytes], int | None]:
-    bounds: dict[int, bytes] = {}
-    nulls = None
-    for number, kind in reader.fields():
-        if number in (1, 2, 5, 6) and kind == BINARY:
-            bounds[number] = reader.binary()
-        elif (number, kind) == (3, I64):
-            nulls = reader.integer()
-        else:
-            reader.skip(kind)
-    return bounds, nulls
-
-
-def _columns(elements: Sequence[_Element]) -> tuple[ParquetColumn, ...]:
+def _columns(elements: Sequence[Struct]) -> tuple[tuple[ParquetColumn, ...], int]:
+    """The columns, and the number of leaves."""
     if not elements:
         raise ValueError("it has no schema")
     columns: list[ParquetColumn] = []
     at, leaf = 1, 0
-    for _ in range(elements[0].children):
+    for _ in range(elements[0].get(_CHILDREN, 0)):
         end, leaves = _end_of(elements, at, 0)
-        part = tuple(elements[at:end])
-        columns.append(ParquetColumn(part[0].name, part, range(leaf, leaf + leaves), any(one.repeated for one in part)))
+        columns.append(_column(elements[at], leaf))
         at, leaf = end, leaf + leaves
     if at != len(elements):
         raise ValueError("its schema has elements outside of the columns")
-    return tuple(columns)
+    names = [column.name for column in columns]
+    if len(set(names)) < len(names):
+        raise ValueError("two columns have the same name")
+    return tuple(columns), leaf
 
 
-def _end_of(elements: Sequence[_Element], at: int, depth: int) -> tuple[int, int]:
+def _end_of(elements: Sequence[Struct], at: int, depth: int) -> tuple[int, int]:
     """The element after the one at `at` with all that is in it, and the number of leaves."""
     if at >= len(elements) or depth > _DEPTH_MAX:
         raise ValueError("its schema is not a tree")
-    children, leaves = elements[at].children, 0
+    children, leaves = elements[at].get(_CHILDREN, 0), 0
     at += 1
     for _ in range(children):
         at, inner = _end_of(elements, at, depth + 1)
@@ -351,23 +222,40 @@ def _end_of(elements: Sequence[_Element], at: int, depth: int) -> tuple[int, int
     return at, leaves if children > 0 else 1
 
 
-def _check(group: RowGroup, columns: Sequence[ParquetColumn], begin: int) -> None:
-    leaves = columns[-1].leaves.stop if columns else 0
-    if len(group.chunks) != leaves or group.rows < 0:
-        raise ValueError(f"a row group has {group.rows} rows and {len(group.chunks)} columns of {leaves}")
-    for column in columns:
-        for chunk in (group.chunks[leaf] for leaf in column.leaves):
-            if min(chunk.compressed_bytes, chunk.size_bytes, chunk.values) < 0:
-                raise ValueError(f"column {column.name!r} has a negative size")
-            within = len(MAGIC) <= chunk.begin <= chunk.data_begin <= chunk.begin + chunk.compressed_bytes <= begin
-            if chunk.values and not within:
-                raise ValueError(f"column {column.name!r} is outside of the file")
-            if chunk.values != group.rows and not column.repeated:
-                raise ValueError(f"column {column.name!r} has {chunk.values} values in {group.rows} rows")
+def _column(element: Struct, leaf: int) -> ParquetColumn:
+    repetition = element.get(_REPETITION, REQUIRED)
+    plain = repetition != REPEATED and not element.get(_CHILDREN, 0)
+    return ParquetColumn(element[_NAME].decode(), _kind(element) if plain else None, repetition == OPTIONAL, leaf)
 
 
-def _number(layout: str, data: bytes | None) -> float | None:
-    if not layout or data is None or len(data) != struct.calcsize(layout):
+def _kind(element: Struct) -> str | None:
+    physical, converted, logical = element.get(_TYPE, -1), element.get(_CONVERTED), element.get(_LOGICAL)
+    if converted is None and logical:  # only newer writers state a text so, and times of nanoseconds
+        return STRING if physical == BYTE_ARRAY and field(1, STRUCT) in logical else None
+    return _KINDS.get((physical, converted))
+
+
+def _structs(data: Struct, key: int) -> list[Struct]:
+    found = data.get(key, [])
+    if not all(type(one) is dict for one in found):
+        raise ValueError("a list has values of another type")
+    return list(found)
+
+
+def _inner(data: Struct, key: int) -> Struct:
+    found: Struct = data.get(key, {})
+    return found
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "replace")
+
+
+def _number(column: ParquetColumn, data: bytes) -> float | None:
+    if column.kind in (None, STRING, "bool"):
         return None
-    (value,) = struct.unpack(layout, data)
-    return None if isnan(value) else value
+    dtype = np.dtype(FORMS[column.kind or ""].dtype)
+    if len(data) != dtype.itemsize:
+        return None
+    (value,) = np.frombuffer(data, dtype).tolist()
+    return None if value != value else value

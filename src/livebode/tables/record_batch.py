@@ -7,13 +7,15 @@ other writers are read as well. A message is untrusted data: what is read from i
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.tables.flat_buffers import field as field_at
+from livebode.tables.flat_buffers import number_at, referred, root
 from livebode.tables.schema import STRING, Schema
 from livebode.tables.table import Column, Table
 from livebode.tables.text import Text
@@ -25,7 +27,7 @@ _HEAD = struct.Struct("<I4x6HiBBHIq2x5HiIIq4xI")
 _MESSAGE = 20, 12, 22, 6, 5, 8, 12, 12, 0, 3, 4, 24
 _BATCH = 10, 24, 12, 4, 8, 10
 _TO_BUFFERS, _TO_NODES = 16, 28  # from the places of these offsets; the nodes are after the buffers
-_HEADER_TYPE, _HEADER, _BODY_BYTES = 1, 2, 3  # numbers of the fields of Message, and below of RecordBatch
+_HEADER_TYPE, _HEADER = 1, 2  # numbers of the fields of Message, and below of RecordBatch
 _ROWS, _NODES, _BUFFERS, _COMPRESSION = 0, 1, 2, 3
 _RECORD_BATCH = 3
 
@@ -37,7 +39,7 @@ class _Buffer(NamedTuple):
 
 def to_message(table: Table) -> bytes:
     """The rows; the schema is not among them."""
-    buffers = [data for column in table.columns for data in _buffers_of(column)]
+    buffers = [data for column in table.columns for data in buffers_of(column)]
     starts = list(accumulate((len(data) + -len(data) % 8 for data in buffers), initial=0))
     places = [number for start, data in zip(starts, buffers) for number in (start, len(data))]
     nodes = [table.num_rows, 0] * len(table.columns)
@@ -60,59 +62,38 @@ def from_message(payload: memoryview, schema: Schema) -> Table:
         If the bytes are not such a message, are compressed, contain nulls, or several columns refer to the same bytes:
         they could expand to any size.
     """
-    columns = nullable_columns(payload, [field.kind for field in schema])
-    if any(valid is not None for _, valid in columns):
-        raise ValueError("the rows contain nulls")
-    return Table(schema, tuple(column for column, _ in columns))
-
-
-def nullable_columns(payload: memoryview, kinds: Sequence[str]) -> list[tuple[Column, NDArray[np.bool_] | None]]:
-    """Columns of these kinds, and where each is not null; None without a null. Errors as in `from_message`."""
     metadata, body = _split(payload)
-    message = _root(metadata)
-    (header_type,) = _at("B", metadata, message, _HEADER_TYPE)
-    header = _referred(metadata, message, _HEADER)
+    message = root(metadata)
+    header_type = number_at("B", metadata, message, _HEADER_TYPE)
+    header = referred(metadata, message, _HEADER)
     if header_type != _RECORD_BATCH or header is None:
         raise ValueError("it is not a record batch")
-    if _field(metadata, header, _COMPRESSION) is not None:
+    if field_at(metadata, header, _COMPRESSION) is not None:
         raise ValueError("compressed rows")
-    (rows,) = _at("q", metadata, header, _ROWS)
+    rows = number_at("q", metadata, header, _ROWS)
     nodes, pairs = _pairs(metadata, header, _NODES), _pairs(metadata, header, _BUFFERS)
     buffers = [_Buffer(start, length) for start, length in pairs]
-    if rows < 0 or len(nodes) != len(kinds) or any(length != rows for length, _ in nodes):
+    if rows < 0 or len(nodes) != len(schema) or any(length != rows for length, _ in nodes):
         raise ValueError("its columns differ from its schema")
     if any(min(one) < 0 for one in buffers) or sum(one.length for one in buffers) > len(payload):
         raise ValueError(f"{len(payload)} bytes expand to more")
-    if len(buffers) != sum(3 if kind == STRING else 2 for kind in kinds):
+    if len(buffers) != sum(3 if field.kind == STRING else 2 for field in schema):
         raise ValueError("its buffers differ from its schema")
+    if any(nulls for _, nulls in nodes):
+        raise ValueError("the rows contain nulls")
     each = iter(buffers)
-    columns: list[tuple[Column, NDArray[np.bool_] | None]] = []
-    for kind, (_, nulls) in zip(kinds, nodes):
-        known = next(each)
-        valid = _bits(body, known, rows) if nulls else None
-        if kind == STRING:
-            columns.append((_text(body, next(each), next(each), rows), valid))
-        else:
-            columns.append((_numbers(body, next(each), kind, rows), valid))
-    return columns
-
-
-def messages(stream: memoryview) -> Iterator[memoryview]:
-    """Each message of an IPC stream in memory."""
-    at = 0
-    while at + _PREFIX.size <= len(stream) and (length := _PREFIX.unpack_from(stream, at)[1]):
-        metadata = bytes(stream[at + _PREFIX.size : at + _PREFIX.size + length])
-        message = _root(metadata)
-        body_bytes = (
-            0 if _field(metadata, message, _BODY_BYTES) is None else _at("q", metadata, message, _BODY_BYTES)[0]
+    columns: list[Column] = []
+    for kind in (field.kind for field in schema):
+        next(each)  # bits of nulls
+        columns.append(
+            _text(body, next(each), next(each), rows) if kind == STRING else _numbers(body, next(each), kind, rows)
         )
-        end = at + _PREFIX.size + length + body_bytes
-        yield stream[at:end]
-        at = end
+    return Table(schema, tuple(columns))
 
 
-def _buffers_of(column: Column) -> Iterator[bytes | memoryview]:
-    yield b""  # no bits of nulls
+def buffers_of(column: Column) -> Iterator[bytes | memoryview]:
+    """Arrow's buffers of a column, of which the first, the bits of nulls, is empty."""
+    yield b""
     if isinstance(column, Text):
         letters = [word.encode() for word in column.words]
         lengths = np.array([0, *map(len, letters)], dtype=np.int32)
@@ -121,7 +102,7 @@ def _buffers_of(column: Column) -> Iterator[bytes | memoryview]:
     elif column.dtype == np.bool_:
         yield np.packbits(column, bitorder="little").tobytes()
     else:
-        yield column.tobytes()
+        yield np.ascontiguousarray(column).view(np.uint8).data
 
 
 def _numbers(body: memoryview, buffer: _Buffer, kind: str, rows: int) -> NDArray[Any]:
@@ -161,37 +142,12 @@ def _split(payload: memoryview) -> tuple[bytes, memoryview]:
     return bytes(payload[begin : begin + length]), payload[begin + length :]
 
 
-def _root(data: bytes) -> int:
-    return int(struct.unpack_from("<I", data)[0])
-
-
-def _at(code: str, data: bytes, table: int, number: int) -> tuple[int, ...]:
-    """The value of a field; 0 if it is absent."""
-    place = _field(data, table, number)
-    return (0,) if place is None else struct.unpack_from("<" + code, data, place)
-
-
-def _referred(data: bytes, table: int, number: int) -> int | None:
-    place = _field(data, table, number)
-    return None if place is None else place + int(struct.unpack_from("<I", data, place)[0])
-
-
 def _pairs(data: bytes, table: int, number: int) -> list[tuple[int, int]]:
     """A vector of two numbers each."""
-    place = _referred(data, table, number)
+    place = referred(data, table, number)
     if place is None:
         return []
     (count,) = struct.unpack_from("<I", data, place)
     if place + 4 + 16 * count > len(data):
         raise ValueError("a vector is cut")
     return list(struct.iter_unpack("<qq", data[place + 4 : place + 4 + 16 * count]))
-
-
-def _field(data: bytes, table: int, number: int) -> int | None:
-    """Position of a field of a FlatBuffers table; None if it is absent."""
-    layout = table - struct.unpack_from("<i", data, table)[0]
-    entry = 4 + 2 * number
-    if entry >= struct.unpack_from("<H", data, layout)[0]:
-        return None
-    offset = struct.unpack_from("<H", data, layout + entry)[0]
-    return table + offset if offset else None

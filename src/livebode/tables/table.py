@@ -74,7 +74,7 @@ class Table:
         TypeError
             If a column contains neither numbers, truth values nor text.
         """
-        from livebode.tables.exchange import from_arrow  # arro3 is loaded where tables are exchanged
+        from livebode.tables.exchange import from_arrow  # nanoarrow is loaded where tables are exchanged
 
         return data if isinstance(data, Table) else from_arrow(data)
 
@@ -139,9 +139,9 @@ class Table:
         return self.schema.__arrow_c_schema__()
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
-        from livebode.tables.exchange import to_arrow
+        from livebode.tables.exchange import to_arrow_stream
 
-        return to_arrow(self).__arrow_c_stream__(requested_schema)
+        return to_arrow_stream(self).__arrow_c_stream__(requested_schema)
 
 
 def _is_of(column: Column, field: Field) -> bool:

@@ -20,8 +20,8 @@ from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE, Frame,
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import check_version, format_of
 from livebode.tables import Schema, Table
-from livebode.tables.exchange import schema_from_message, schema_to_message
 from livebode.tables.record_batch import from_message
+from livebode.tables.schema_message import schema_from_message, schema_to_message
 
 FOLDER, ASIDE = "open", "damaged"
 _LENGTH = struct.Struct("<I")

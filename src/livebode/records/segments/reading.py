@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from arro3.io import write_parquet
-
 from livebode.core import Event, RecordError
 from livebode.records.inside import is_folder
 from livebode.records.segments import journal
@@ -18,6 +16,7 @@ from livebode.records.segments.manifest import NAME, Manifest, Segment
 from livebode.records.segments.segment_file import open_segment
 from livebode.tables import Table
 from livebode.tables.parquet_file import ParquetFile
+from livebode.tables.parquet_writer import ParquetWriter
 
 _ROWS = 1 << 14
 Report = Callable[[Event], None]
@@ -149,8 +148,11 @@ def _part(run: Path, segment: Segment, merged: Segment, before: int, report: Rep
     if (file := whole(run, merged, report)) is None:
         return None
     sink = io.BytesIO()
-    write_parquet(file.table().slice(before, segment.rows), sink)
-    return ParquetFile(sink)
+    table = file.table().slice(before, segment.rows)
+    writer = ParquetWriter(sink, table.schema)
+    writer.write(table)
+    writer.close()
+    return ParquetFile(sink.getvalue())
 
 
 def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import os
 from pathlib import Path
 
@@ -52,7 +51,7 @@ def open_segment(run: Path, segment: Segment) -> ParquetFile:
             _verified.clear()
         _verified.add(key)
     try:
-        content = ParquetFile(io.BytesIO(data))
+        content = ParquetFile(data)
     except ValueError as error:
         raise RecordError(
             "damaged", f"it is not Parquet ({error})", "restore it from a backup", path=str(run / segment.name)
@@ -71,7 +70,7 @@ def _check_size(footer: Footer, segment: Segment) -> None:
             rows=footer.rows,
         )
     size_bytes = sum(group.size_bytes for group in footer.groups)
-    values = sum(chunk.values for group in footer.groups for chunk in group.chunks)
+    values = footer.rows * len(footer.columns)
     if max(values, size_bytes // 8) > _VALUES_MAX:
         raise RecordError(
             "too-large",

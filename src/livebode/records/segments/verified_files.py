@@ -80,8 +80,7 @@ class _VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
             sink = pa.BufferOutputStream()
             pq.write_table(self._schema.empty_table(), sink)
             return pa.BufferReader(sink.getvalue())
-        file.file.seek(0)
-        return pa.BufferReader(file.file.read())
+        return pa.BufferReader(file.content)
 
     def open_input_stream(self, path: str) -> pa.NativeFile:
         return self.open_input_file(path)
