@@ -181,7 +181,7 @@ def _parts_of(run: RunRecord, tables: list[str], damages: list[Event]) -> dict[s
     for table in tables:
         groups = segment_groups(run.path, [one for one in segments if one.table == table], damages)
         found[table] = [_Part(group.rows, group.first_s, group.last_s) for group in groups]
-        found[table] += [_Part(pa.Table.from_batches([batch])) for batch in rows.get(table, ())]
+        found[table] += [_Part(pa.table(batch)) for batch in rows.get(table, ())]
     return {table: parts for table, parts in found.items() if parts}
 
 
