@@ -1,6 +1,6 @@
-/* Prints a hash of numbers read from random text, the same on every machine and compiler. Buffers have their exact
- * size, so that sanitizers see what is beyond them. Exit code 1 if a number that is written is not read with the same
- * bits, or a wrong call is not refused. */
+/* Prints a hash of numbers read from random text and random runs, the same on every machine and compiler. Buffers have
+ * their exact size, so that sanitizers see what is beyond them. Exit code 1 if a number that is written is not read
+ * with the same bits, or a wrong call is not refused. */
 #include <inttypes.h>
 #include <string.h>
 
@@ -188,6 +188,26 @@ static void demand_round_trip(const uint64_t *powers, uint32_t seed)
     free(numbers), free(back), free(integers), free(text);
 }
 
+static uint64_t hash_of_random_runs(uint32_t seed, uint64_t hash)
+{
+    uint32_t state = seed;
+    const size_t length = 1u + next(&state) % 40u, count = 1u + next(&state) % 200u;
+    const unsigned width = next(&state) % (LB_RUN_WIDTH_MAX + 1u);
+    uint8_t *data = flags(length);
+    uint32_t *out = (uint32_t *)claim(count, sizeof(uint32_t));
+    for (size_t i = 0; i < length; ++i) {
+        data[i] = (uint8_t)(next(&state) % (i % 8u ? 256u : 64u)); /* short runs, and some that are too long */
+    }
+    const lb_status status = lb_runs_decode(data, length, width, count, out);
+    DEMAND(status == LB_OK || status == LB_ERROR_SIZE);
+    for (size_t i = 0; status == LB_OK && i < count; ++i) {
+        hash = (hash ^ out[i]) * 1099511628211u;
+    }
+    DEMAND(lb_runs_decode(data, length, LB_RUN_WIDTH_MAX + 1u, count, out) == LB_ERROR_SIZE);
+    free(data), free(out);
+    return hash;
+}
+
 static void refuse_misuse(const uint64_t *powers)
 {
     lb_table_layout layout = layout_of(powers, 1), missing = layout;
@@ -200,6 +220,9 @@ static void refuse_misuse(const uint64_t *powers)
     layout.width = 0;
     DEMAND(lb_table_read(&layout, empty, 1, ROWS, out, &rows, &used) == LB_ERROR_SIZE);
     uint8_t text[1];
+    uint32_t integers[1];
+    DEMAND(lb_runs_decode(NULL, 1, 1, 1, integers) == LB_ERROR_NULL);
+    DEMAND(lb_runs_decode(empty, 1, 1, 1, NULL) == LB_ERROR_NULL);
     DEMAND(lb_table_write(powers, NULL, 1, NULL, 1, text, 1, &used) == LB_ERROR_NULL);
 }
 
@@ -210,6 +233,7 @@ int main(void)
     for (uint32_t seed = 1; seed < 3000; ++seed) {
         total = hash_of_random_rows(powers, seed, total);
         demand_round_trip(powers, seed);
+        total = hash_of_random_runs(seed, total);
     }
     free(powers);
     printf("%016" PRIx64 "\n", total);

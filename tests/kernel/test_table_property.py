@@ -57,6 +57,7 @@ def test_a_number_is_written_as_by_pyarrow_with_the_digits_of_repr(values):
     assert all(Decimal(word).normalize() == Decimal(repr(value)).normalize() for word, value in finite)
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(-(2**63), 2**63 - 1), st.integers(0, 2)), min_size=1, max_size=20))
 def test_integers_and_words_are_written_as_they_are(rows):
     integers, at = (np.array(column) for column in zip(*rows, strict=True))

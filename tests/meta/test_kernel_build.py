@@ -47,7 +47,7 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86, spe
     if not spectra64:
         jobs += [(f"lines/{name}", name, []) for name in ("lines", "rows", "sizes")]
         jobs += [(f"repeating/{name}", name, []) for name in ("numbers", "hum", "distortion", "periods")]
-        table = "nearest", "number", "moment", "read", "shortest", "write"
+        table = "nearest", "number", "moment", "read", "shortest", "write", "runs"
         jobs += [(f"table/{name}", f"table_{name}", []) for name in table]
     for name, isa in SETS.items() if dispatch else ():
         jobs.append(("lines/rows", f"rows_{name}", [f"-DLB_LINES_NAME=lb_lines_{name}", *isa]))

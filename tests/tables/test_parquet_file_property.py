@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from livebode.tables import Table
 from livebode.tables.parquet_file import ParquetFile
-from livebode.tables.parquet_levels import decoded
 
 KINDS = [
     pa.float64(), pa.float32(), pa.int64(), pa.int32(), pa.int16(), pa.uint8(), pa.uint64(), pa.bool_(), pa.string(),
@@ -145,8 +144,3 @@ def test_a_column_of_another_type_is_named_and_the_others_are_read(kind):
     sink = io.BytesIO()
     pq.write_table(pa.table({"t": pa.array([None], kind), "z": [0.5]}), sink, compression="none")
     assert ParquetFile(sink.getvalue()).table(columns=["z"])["z"].tolist() == [0.5]
-
-
-def test_a_width_that_cannot_be_is_refused():
-    with pytest.raises(ValueError, match="33 bits"):
-        decoded(memoryview(b"\x02\x01"), 33, 1)

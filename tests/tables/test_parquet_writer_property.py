@@ -40,7 +40,7 @@ def written(counts: list[int]) -> bytes:
 
 
 @given(st.lists(st.integers(0, 300), max_size=6))
-@settings(max_examples=25)
+@settings(max_examples=25, deadline=None)
 def test_pyarrow_reads_the_rows_the_groups_and_their_statistics(counts: list[int]) -> None:
     file = pq.ParquetFile(pa.BufferReader(written(counts)), page_checksum_verification=True)
     assert Table.from_arrow(file.read()).equals(rows(0, sum(counts)))
@@ -88,7 +88,7 @@ def columns(draw: st.DrawFn) -> Table:
 
 
 @given(columns(), st.booleans())
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 def test_every_kind_of_column_is_read_by_pyarrow_and_by_livebode(table: Table, repeating: bool) -> None:
     sink = io.BytesIO()
     writer = ParquetWriter(sink, table.schema, table.column_names if repeating else [])
@@ -141,7 +141,7 @@ def test_half_precision_is_refused() -> None:
 
 
 @given(st.binary(max_size=60), st.integers(0, 2000))
-@settings(max_examples=150)
+@settings(max_examples=150, deadline=None)
 def test_damaged_thrift_is_a_value_error(noise: bytes, at: int) -> None:
     data = written([3])[-1500:-8]
     for damaged in (noise, data[: at % len(data)] + noise + data[at % len(data) :]):

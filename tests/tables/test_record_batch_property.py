@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -40,13 +40,13 @@ def as_written_by_pyarrow(table: Table) -> bytes:
 
 
 @given(tables(rows_min=1))
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_the_bytes_are_those_of_pyarrow(table: Table) -> None:
     assert to_message(table) == as_written_by_pyarrow(table)
 
 
 @given(tables())
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_rows_come_back_from_any_place_in_memory(table: Table) -> None:
     message = to_message(table)
     for shift in (0, 3):
@@ -54,7 +54,7 @@ def test_rows_come_back_from_any_place_in_memory(table: Table) -> None:
 
 
 @given(tables(rows_min=1), st.data())
-@settings(max_examples=150)
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_a_damaged_message_is_an_error_or_no_more_than_its_bytes(table: Table, data: st.DataObject) -> None:
     message = bytearray(to_message(table))
     for _ in range(data.draw(st.integers(1, 4))):
@@ -112,7 +112,7 @@ def _sharing(message: bytes) -> bytes:
 
 
 @given(tables())
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_a_schema_comes_back_also_from_pyarrow(table: Table) -> None:
     assert schema_from_message(schema_to_message(table.schema)) == table.schema
     assert schema_from_message(pa.schema(table).serialize().to_pybytes()) == table.schema

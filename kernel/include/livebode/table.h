@@ -1,8 +1,8 @@
-/* Rows of a delimited table as columns of numbers, and back. Only on hosts.
+/* Rows of a delimited table as columns of numbers, and back; integers of a Parquet file. Only on hosts.
  *
  * A number that is read is the double nearest to its text; a number that is written is the shortest text that gives the
  * same double. The Python definition is livebode.sources.rows for what is read, and
- * repr for the digits that are written. */
+ * repr for the digits that are written; livebode.kernel.runs_twin for integers in runs. */
 #ifndef LIVEBODE_TABLE_H
 #define LIVEBODE_TABLE_H
 
@@ -73,6 +73,15 @@ typedef struct {
  * does not exist. */
 lb_status lb_table_write(const uint64_t *powers, const lb_table_column *columns, size_t width,
                          const lb_table_words *words, size_t rows, uint8_t *out, size_t room, size_t *length);
+
+/* Bits of an integer in runs, at most. */
+#define LB_RUN_WIDTH_MAX 32u
+
+/* Decode `count` integers of `width` bits from Parquet's runs, in which a value is either repeated or packed with seven
+ * others. Bytes behind the last run are not read.
+ *
+ * LB_ERROR_NULL for a missing pointer, LB_ERROR_SIZE for a larger width, or where the bytes have fewer integers. */
+lb_status lb_runs_decode(const uint8_t *data, size_t length, unsigned width, size_t count, uint32_t *out);
 
 #ifdef __cplusplus
 }

@@ -1,7 +1,7 @@
 """The sliding DFT, the line stage, the verdicts on lines and the fit in C, and their NumPy twins, the definitions.
 
 The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.estimation.repeating_twin`,
-`livebode.kernel.fit_twin` and `livebode.kernel.belt_twin`.
+`livebode.kernel.fit_twin`, `livebode.kernel.belt_twin` and `livebode.kernel.runs_twin`.
 """
 
 from livebode.kernel._belt import (
@@ -67,6 +67,7 @@ from livebode.kernel._repeating import (
     Tones,
     judge_periods,
 )
+from livebode.kernel._runs import decode_runs
 from livebode.kernel._sizes import largest_sizes
 from livebode.kernel._sliding import SlidingDFT
 from livebode.kernel._table import MOMENT, NO_MOMENT, NUMBER, SKIPPED, TableLayout, Words, read_rows, write_rows
@@ -128,6 +129,7 @@ __all__ = [
     "chosen_instruction_set",
     "curve_at",
     "curve_splines",
+    "decode_runs",
     "fft_is_cheaper",
     "fit",
     "fit_epsilon",

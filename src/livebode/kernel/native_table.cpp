@@ -1,5 +1,5 @@
-// Rows of text as columns of numbers and back, for livebode.kernel._table, whose tuples are read here: their order is
-// that of the classes there.
+// Rows of text as columns of numbers and back, and integers in runs, for livebode.kernel._table and _runs. The tuples
+// that are read here have the order of the classes there.
 #include "native_table.h"
 
 #include <nanobind/nanobind.h>
@@ -82,10 +82,25 @@ size_t write_rows(nb::handle powers, nb::tuple columns, nb::tuple words, nb::han
     return length;
 }
 
+// Whether the bytes have so many integers.
+bool decode_runs(nb::handle data, unsigned width, nb::handle out)
+{
+    const Bytes bytes(data);
+    const size_t count = length_of(out, 0);
+    const Array integers(out, sizeof(long) == sizeof(uint32_t) ? "I L" : "I", {count}, WRITE);
+    lb_status status = LB_OK;
+    call(count, [&] {
+        status = lb_runs_decode(bytes.array, bytes.length, width, count, integers.data<uint32_t>());
+        return LB_OK;
+    });
+    return status == LB_OK;
+}
+
 } // namespace
 
 void bind_table(nb::module_ &m)
 {
     m.def("read_rows", &read_rows);
     m.def("write_rows", &write_rows);
+    m.def("decode_runs", &decode_runs);
 }

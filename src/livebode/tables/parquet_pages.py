@@ -10,6 +10,7 @@ import lz4.block
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.kernel import decode_runs
 from livebode.tables.parquet_footer import ColumnChunk, ParquetColumn
 from livebode.tables.parquet_format import (
     BIT_PACKED,
@@ -25,7 +26,6 @@ from livebode.tables.parquet_format import (
     RLE_DICTIONARY,
     UNCOMPRESSED,
 )  # fmt: skip
-from livebode.tables.parquet_levels import decoded
 from livebode.tables.schema import STRING
 from livebode.tables.table import Column
 from livebode.tables.text import Text
@@ -120,7 +120,7 @@ class _Pages:
             size = int.from_bytes(data[:4], "little")
             if about[_LEVELS] != RLE or size > len(data) - 4:
                 raise ValueError(f"a page declares levels of {size} bytes")
-            known = decoded(data[4 : 4 + size], 1, values) != 0
+            known = decode_runs(data[4 : 4 + size], 1, values) != 0
             data = data[4 + size :]
         count = values if known is None else int(np.count_nonzero(known))
         found = self._encoded(about.get(_ENCODING), data, count)
@@ -134,7 +134,7 @@ class _Pages:
             raise ValueError(
                 f"a page declares encoding {encoding}" + (", without a dictionary" if encoding in (2, 8) else "")
             )
-        at = decoded(data[1:], data[0] if data else 33, count) if count else np.empty(0, np.uint32)
+        at = decode_runs(data[1:], data[0] if data else 33, count) if count else np.empty(0, np.uint32)
         if count and at.max() >= len(self._words):
             raise ValueError(f"a page has a word that is not among {len(self._words)}")
         if isinstance(self._words, list):
