@@ -21,6 +21,7 @@ from livebode.tables.parquet_format import (
     RLE,
     RLE_DICTIONARY,
     UNCOMPRESSED,
+    WRITER,
 )  # fmt: skip
 from livebode.tables.schema import Field, Schema
 from livebode.tables.schema_message import schema_to_message
@@ -100,7 +101,7 @@ class ParquetWriter:
             (3, I64, integer(self._rows)),
             (4, LIST, list_of(STRUCT, self._groups)),
             (5, LIST, metadata),
-            (6, BINARY, binary(b"livebode")),
+            (6, BINARY, binary(WRITER.encode())),
             (7, LIST, list_of(STRUCT, [_TYPE_ORDER] * len(self._schema))),
         )
         self._file.write(footer + len(footer).to_bytes(4, "little") + MAGIC)
