@@ -15,7 +15,7 @@ import numpy as np
 
 from livebode.tables.parquet_footer import ColumnChunk, Footer, ParquetColumn, read_footer
 from livebode.tables.parquet_foreign import foreign_column
-from livebode.tables.parquet_pages import ForeignForm, column_of, joined
+from livebode.tables.parquet_pages import ForeignFormError, column_of, joined
 from livebode.tables.schema import STRING, Field, Schema
 from livebode.tables.table import Column, Table
 from livebode.tables.text import Text
@@ -94,7 +94,7 @@ class ParquetFile:
         try:
             try:
                 return column_of(self._bytes(chunk), chunk, column)
-            except ForeignForm as form:
+            except ForeignFormError as form:
                 return foreign_column(self.content, group, column.name, chunk.values, str(form))
         except ValueError as error:
             raise ValueError(f"column {column.name!r} is not read: {error}") from None

@@ -38,7 +38,7 @@ _DATA, _DICTIONARY = field(5, STRUCT), field(7, STRUCT)
 _VALUES, _ENCODING, _LEVELS, _REPETITIONS = (field(number, I32) for number in range(1, 5))
 
 
-class ForeignForm(ValueError):
+class ForeignFormError(ValueError):
     """Values in a form of Parquet that livebode does not write."""
 
 
@@ -47,14 +47,14 @@ def column_of(data: memoryview, chunk: ColumnChunk, column: ParquetColumn) -> Co
 
     Raises
     ------
-    ForeignForm
+    ForeignFormError
         If a page has a form that livebode does not write.
     ValueError
         If a page is damaged.
     """
     if chunk.codec not in (UNCOMPRESSED, LZ4_RAW):
         name = CODECS[chunk.codec] if 0 <= chunk.codec < len(CODECS) else chunk.codec
-        raise ForeignForm(f"it is compressed by {name}")
+        raise ForeignFormError(f"it is compressed by {name}")
     return joined(iter(_Pages(data, chunk, column)), chunk.values)
 
 
@@ -102,7 +102,7 @@ class _Pages:
                 left -= len(values)
                 yield values
             elif kind != INDEX_PAGE:
-                raise ForeignForm(f"a page is of kind {kind}")
+                raise ForeignFormError(f"a page is of kind {kind}")
 
     def _dictionary(self, header: Struct, body: memoryview) -> NDArray[Any] | list[str]:
         about = header.get(_DICTIONARY, {})
@@ -137,7 +137,7 @@ class _Pages:
             found = self._plain(data, count)
             return Text.of(found) if isinstance(found, list) else found
         if encoding not in (PLAIN_DICTIONARY, RLE_DICTIONARY):
-            raise ForeignForm(f"a page declares encoding {encoding}")
+            raise ForeignFormError(f"a page declares encoding {encoding}")
         if self._words is None:
             raise ValueError(f"a page declares encoding {encoding}, without a dictionary")
         at = decoded(data[1:], data[0] if data else 33, count) if count else np.empty(0, np.uint32)

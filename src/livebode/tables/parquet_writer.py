@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Collection
 from functools import lru_cache
+from pathlib import Path
 from typing import BinaryIO
 
 import lz4.block
@@ -105,6 +106,15 @@ class ParquetWriter:
             (7, LIST, list_of(STRUCT, [_TYPE_ORDER] * len(self._schema))),
         )
         self._file.write(footer + len(footer).to_bytes(4, "little") + MAGIC)
+
+
+def write_parquet(path: Path, table: Table, rows: int = 1 << 16) -> None:
+    """Write a table as a new file, in row groups of so many rows."""
+    with path.open("wb") as file:
+        writer = ParquetWriter(file, table.schema)
+        for begin in range(0, table.num_rows, rows):
+            writer.write(table.slice(begin, rows))
+        writer.close()
 
 
 @lru_cache(64)
