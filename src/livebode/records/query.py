@@ -7,18 +7,19 @@ from dataclasses import asdict, dataclass
 from math import nan
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.dataset as ds
-from pyarrow.fs import LocalFileSystem
-
 from livebode.core import Event, UsageError
 from livebode.core.clock import RunClock, moment, moments_by
-from livebode.core.installing import not_installed
+from livebode.core.installing import needing, not_installed
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, RunRecord
 from livebode.records.segments.manifest import TIERS
 from livebode.records.segments.verified_files import segment_groups
+
+with needing("PyArrow", "query", "a query"):
+    import pyarrow as pa
+    import pyarrow.dataset as ds
+    from pyarrow.fs import LocalFileSystem
 
 _TABLES = ("responses", "parameters", "samples", *TIERS)
 _SINGLE_EVENTS = pa.schema(

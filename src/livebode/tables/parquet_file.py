@@ -1,7 +1,8 @@
 """Parquet files of runs: only the columns and row groups that are asked for.
 
-Plain flat columns, compressed by LZ4 or not at all: what livebode writes, and wrote with PyArrow before. A value that a
-file does not have is NaN.
+Plain flat columns, compressed by LZ4 or not at all: what livebode writes, and wrote with PyArrow before. Columns that
+another program wrote in another form are read by PyArrow where it is installed. A value that a file does not have is
+NaN.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import BinaryIO
 import numpy as np
 
 from livebode.tables.parquet_footer import ColumnChunk, Footer, ParquetColumn, read_footer
-from livebode.tables.parquet_pages import column_of, joined
+from livebode.tables.parquet_foreign import foreign_column
+from livebode.tables.parquet_pages import ForeignFormError, column_of, joined
 from livebode.tables.schema import STRING, Field, Schema
 from livebode.tables.table import Column, Table
 from livebode.tables.text import Text
@@ -90,7 +92,10 @@ class ParquetFile:
         if chunk.values * len(self.footer.columns) > _GROUP_VALUES_MAX:
             raise ValueError(f"a row group has {chunk.values} rows, more than a run writes")
         try:
-            return column_of(self._bytes(chunk), chunk, column)
+            try:
+                return column_of(self._bytes(chunk), chunk, column)
+            except ForeignFormError as form:
+                return foreign_column(self.content, group, column.name, chunk.values, str(form))
         except ValueError as error:
             raise ValueError(f"column {column.name!r} is not read: {error}") from None
 

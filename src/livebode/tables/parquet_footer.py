@@ -28,7 +28,7 @@ _TYPE, _REPETITION, _NAME, _CHILDREN, _CONVERTED = (
     field(1, I32), field(3, I32), field(4, BINARY), field(5, I32), field(6, I32),
 )  # fmt: skip
 _LOGICAL = field(10, STRUCT)
-_KEY, _VALUE = field(1, BINARY), field(2, BINARY)
+_WRITER, _KEY, _VALUE = field(6, BINARY), field(1, BINARY), field(2, BINARY)
 _CHUNKS, _SIZE, _GROUP_ROWS = field(1, LIST), field(2, I64), field(3, I64)
 _OTHER_FILE, _ABOUT = field(1, BINARY), field(3, STRUCT)
 _CODEC, _VALUES, _UNCOMPRESSED, _COMPRESSED = field(4, I32), field(5, I64), field(6, I64), field(7, I64)
@@ -80,12 +80,13 @@ class RowGroup:
 
 @dataclass(frozen=True)
 class Footer:
-    """What a footer states. `begin` is its first byte in the file."""
+    """What a footer states. `begin` is its first byte in the file, `writer` the program that wrote it."""
 
     begin: int
     columns: tuple[ParquetColumn, ...]
     groups: tuple[RowGroup, ...]
     metadata: Mapping[str, str]
+    writer: str
 
     @property
     def rows(self) -> int:
@@ -179,7 +180,7 @@ def _parsed(data: Struct, begin: int) -> Footer:
     columns, leaves = _columns(elements)
     groups = tuple(_group(one, leaves) for one in _structs(data, _GROUPS))
     metadata = {_text(pair.get(_KEY, b"")): _text(pair.get(_VALUE, b"")) for pair in _structs(data, _PAIRS)}
-    footer = Footer(begin, columns, groups, metadata)
+    footer = Footer(begin, columns, groups, metadata, _text(data.get(_WRITER, b"")))
     if footer.rows != data.get(_ROWS):
         raise ValueError(f"it declares {data.get(_ROWS)} rows, and row groups of {footer.rows}")
     return footer

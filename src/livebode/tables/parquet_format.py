@@ -9,6 +9,8 @@ from livebode.tables.schema import STRING
 MAGIC = b"PAR1"
 ARROW_SCHEMA = "ARROW:schema"
 """Key of Arrow's schema in the metadata of a file; it has the metadata of the columns."""
+WRITER = "livebode"
+"""Named in the footer of a file that the house wrote."""
 UNCOMPRESSED, LZ4_RAW = 0, 7
 PLAIN, PLAIN_DICTIONARY, RLE, BIT_PACKED, RLE_DICTIONARY = 0, 2, 3, 4, 8
 DATA_PAGE, INDEX_PAGE, DICTIONARY_PAGE, DATA_PAGE_V2 = range(4)

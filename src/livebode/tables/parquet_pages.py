@@ -38,17 +38,23 @@ _DATA, _DICTIONARY = field(5, STRUCT), field(7, STRUCT)
 _VALUES, _ENCODING, _LEVELS, _REPETITIONS = (field(number, I32) for number in range(1, 5))
 
 
+class ForeignFormError(ValueError):
+    """Values in a form of Parquet that livebode does not write."""
+
+
 def column_of(data: memoryview, chunk: ColumnChunk, column: ParquetColumn) -> Column:
     """The values in the bytes of a column; a null is NaN, in a column of integers too, False or "".
 
     Raises
     ------
+    ForeignFormError
+        If a page has a form that livebode does not write.
     ValueError
-        If a page is damaged, or of a kind that no run writes.
+        If a page is damaged.
     """
     if chunk.codec not in (UNCOMPRESSED, LZ4_RAW):
         name = CODECS[chunk.codec] if 0 <= chunk.codec < len(CODECS) else chunk.codec
-        raise ValueError(f"it is compressed by {name}, which needs PyArrow: install livebode[parquet]")
+        raise ForeignFormError(f"it is compressed by {name}")
     return joined(iter(_Pages(data, chunk, column)), chunk.values)
 
 
@@ -96,7 +102,7 @@ class _Pages:
                 left -= len(values)
                 yield values
             elif kind != INDEX_PAGE:
-                raise ValueError(f"a page is of kind {kind}, which needs PyArrow: install livebode[parquet]")
+                raise ForeignFormError(f"a page is of kind {kind}")
 
     def _dictionary(self, header: Struct, body: memoryview) -> NDArray[Any] | list[str]:
         about = header.get(_DICTIONARY, {})
@@ -130,10 +136,10 @@ class _Pages:
         if encoding == PLAIN:
             found = self._plain(data, count)
             return Text.of(found) if isinstance(found, list) else found
-        if encoding not in (PLAIN_DICTIONARY, RLE_DICTIONARY) or self._words is None:
-            raise ValueError(
-                f"a page declares encoding {encoding}" + (", without a dictionary" if encoding in (2, 8) else "")
-            )
+        if encoding not in (PLAIN_DICTIONARY, RLE_DICTIONARY):
+            raise ForeignFormError(f"a page declares encoding {encoding}")
+        if self._words is None:
+            raise ValueError(f"a page declares encoding {encoding}, without a dictionary")
         at = decode_runs(data[1:], data[0] if data else 33, count) if count else np.empty(0, np.uint32)
         if count and at.max() >= len(self._words):
             raise ValueError(f"a page has a word that is not among {len(self._words)}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Collection
 from functools import lru_cache
+from pathlib import Path
 from typing import BinaryIO
 
 import lz4.block
@@ -21,6 +22,7 @@ from livebode.tables.parquet_format import (
     RLE,
     RLE_DICTIONARY,
     UNCOMPRESSED,
+    WRITER,
 )  # fmt: skip
 from livebode.tables.schema import Field, Schema
 from livebode.tables.schema_message import schema_to_message
@@ -100,10 +102,19 @@ class ParquetWriter:
             (3, I64, integer(self._rows)),
             (4, LIST, list_of(STRUCT, self._groups)),
             (5, LIST, metadata),
-            (6, BINARY, binary(b"livebode")),
+            (6, BINARY, binary(WRITER.encode())),
             (7, LIST, list_of(STRUCT, [_TYPE_ORDER] * len(self._schema))),
         )
         self._file.write(footer + len(footer).to_bytes(4, "little") + MAGIC)
+
+
+def write_parquet(path: Path, table: Table, rows: int = 1 << 16) -> None:
+    """Write a table as a new file, in row groups of so many rows."""
+    with path.open("wb") as file:
+        writer = ParquetWriter(file, table.schema)
+        for begin in range(0, table.num_rows, rows):
+            writer.write(table.slice(begin, rows))
+        writer.close()
 
 
 @lru_cache(64)

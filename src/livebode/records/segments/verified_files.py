@@ -6,14 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-import pyarrow as pa
-import pyarrow.dataset as ds
-import pyarrow.parquet as pq
-from pyarrow.fs import FileInfo, FileSystemHandler, FileType, PyFileSystem
-
 from livebode.core import Event
+from livebode.core.installing import needing
 from livebode.records.segments import reading
 from livebode.records.segments.manifest import Segment
+
+with needing("PyArrow", "query", "a query"):
+    import pyarrow as pa
+    import pyarrow.dataset as ds
+    import pyarrow.parquet as pq
+    from pyarrow.fs import FileInfo, FileSystemHandler, FileType, PyFileSystem
 
 _GROUPS_MAX = 16  # DuckDB needs some milliseconds to plan each
 
