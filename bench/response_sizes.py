@@ -24,6 +24,7 @@ from livebode.records import RESPONSES, as_batch
 from livebode.records.table_file import ColumnTable, TableFile
 from livebode.records.wide_responses import from_wide, to_wide, wide_options
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
+from livebode.tables import Table
 
 RATE_HZ, WINDOW, HOP, SECONDS = 4000.0, 400, 20, 60.0
 COUNTS = 1, 7, 21, 101
@@ -48,7 +49,7 @@ def tracked(count: int) -> Responses:
 def long_bytes(responses: Responses, path: Path, left_out: set[str]) -> int:
     """Of the file that the run directory would have, without some columns."""
     batch = as_batch(responses)
-    batch = batch.select([name for name in batch.schema.names if name not in left_out])
+    batch = batch.select([name for name in batch.column_names if name not in left_out])
     repeating = tuple(name for name in RESPONSES.repeating if name not in left_out)
     file = TableFile(path, ColumnTable(batch.schema, repeating))
     file.write(batch)
@@ -76,7 +77,7 @@ def in_messages(responses: Responses) -> str:
     grids = {part.axis: grid_of(part.responses) for part in parts}
     rounded = len(ResultMessage(1, "worker:1", rows=response_table(parts), grids=grids).to_bytes())
     exact = _packed(pa.concat_tables([to_wide(part.responses, lossless=True) for part in parts]))
-    long = _packed(pa.Table.from_batches([as_batch(part.responses) for part in parts]))
+    long = _packed(pa.table(Table.join([as_batch(part.responses) for part in parts])))
     sizes = (one / (EACH * AXES_IN_MESSAGE) for one in (rounded, exact, long))
     return "  ".join(f"{size:6.0f}" for size in sizes)
 

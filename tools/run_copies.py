@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from livebode.records.segments.json_lines import to_line
 from livebode.records.summary_file import COPY, RUN, read_summary, to_document
+from livebode.tables import Table
+from livebode.tables.parquet_file import ParquetFile
+from livebode.tables.parquet_writer import ParquetWriter
 from tools.parquet_parts import parts_of
 
 
@@ -60,12 +61,13 @@ def copy_run(
 
 
 def _scaled(file: Path, to: Path, factors: Mapping[str, float]) -> None:
-    table = pq.read_table(file)
-    name = table["name"].to_numpy(zero_copy_only=False)
-    factor = np.ones(len(name))
+    table = ParquetFile(file.read_bytes()).table()
+    factor = np.ones(len(table))
     for one, by in factors.items():
-        factor[name == one] = by
-    for column in ("value", "sigma"):
-        at = table.schema.get_field_index(column)
-        table = table.set_column(at, table.schema.field(column), pa.array(table[column].to_numpy() * factor))
-    pq.write_table(table, to)
+        factor[table.text("name").where(one)] = by
+    columns = {name: table[name] * factor for name in ("value", "sigma")}
+    scaled = tuple(columns.get(field.name, column) for field, column in zip(table.schema, table.columns))
+    with to.open("wb") as out:
+        writer = ParquetWriter(out, table.schema)
+        writer.write(Table(table.schema, scaled))
+        writer.close()

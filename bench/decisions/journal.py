@@ -19,34 +19,34 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.frames import ROWS, to_frame
 from livebode.records.segments.journal import FOLDER, Commit, Journal, head, name_of
 from livebode.records.table_file import ColumnTable
+from livebode.tables import Table
+from livebode.tables.record_batch import from_message, to_message
 
 STATE, SAMPLES, RESPONSES, LINES, SYNC_S = 60_000, 1000, 5, 21, 1.0
 KILLS, FLIPS = 10, 200
 _RNG = np.random.default_rng(0)
 
 
-def batch(first: int, rows: int, columns: int) -> pa.RecordBatch:
-    number = pa.array(np.arange(first, first + rows))
-    values = [pa.array(_RNG.standard_normal(rows)) for _ in range(columns)]
-    return pa.RecordBatch.from_arrays([number, *values], ["sample", *(f"c{i}" for i in range(columns))])
+def batch(first: int, rows: int, columns: int) -> Table:
+    values = {f"c{i}": _RNG.standard_normal(rows) for i in range(columns)}
+    return Table.of({"sample": np.arange(first, first + rows), **values})
 
 
-def rows(commit: int) -> dict[str, pa.RecordBatch]:
+def rows(commit: int) -> dict[str, Table]:
     return {
         "samples": batch(commit * SAMPLES, SAMPLES, 3),
         "responses": batch(commit * SAMPLES, RESPONSES, 6 * LINES),
     }
 
 
-def values(of: pa.RecordBatch) -> bytes:
+def values(of: Table) -> bytes:
     """Everything in the rows."""
-    return b"".join(column.to_numpy().tobytes() for column in of.columns)
+    return b"".join(of[name].tobytes() for name in of.column_names)
 
 
 class ByJournal:
@@ -69,8 +69,8 @@ class ByJournal:
         self._file.sync()
 
 
-def body(of: pa.RecordBatch) -> bytes:
-    return of.serialize().to_pybytes()
+def body(of: Table) -> bytes:
+    return to_message(of)
 
 
 class BySqlite:
@@ -199,7 +199,7 @@ def reads(name: str, run: Path) -> tuple[list[bytes], bytes, int]:
         bad = base.execute("PRAGMA integrity_check").fetchone() != ("ok",)
         stored = base.execute("SELECT rows FROM parts WHERE name = 'samples' ORDER BY number").fetchall()
         return (
-            [values(pa.ipc.read_record_batch(part, schema)) for (part,) in stored],
+            [values(from_message(memoryview(part), schema)) for (part,) in stored],
             base.execute("SELECT state FROM state").fetchone()[0],
             int(bad),
         )

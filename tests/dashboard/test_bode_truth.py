@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from playwright.sync_api import Browser
 
@@ -143,7 +144,7 @@ def test_wrapped_and_unwrapped_phase_and_a_removed_delay_are_those_of_numpy(tab:
 def test_margins_are_marked_where_the_model_crosses(tab: Tab, run: Path) -> None:
     """Delay margin: where |L| = 1, the least of phase above −180° over frequency; within the band only this one is."""
     show(tab, "open loop")
-    rows = [row for table in RunRecord.open(run).tables("parameters") for row in table.to_pylist()]
+    rows = [row for table in map(pa.table, RunRecord.open(run).tables("parameters")) for row in table.to_pylist()]
     at_s = max(r["time_s"] for r in rows if r["model"] == "margins")
     fitted = {r["name"]: r["value"] for r in rows if r["model"] == "two-mass" and r["time_s"] == at_s}
     model = model_named("two-mass", output="velocity", radius_m=FIT["radius_m"])
@@ -232,7 +233,7 @@ def test_peaks_of_a_known_two_mass_response(tab: Tab) -> None:
 
 
 def test_the_search_finds_the_resonance_of_the_fit(tab: Tab, run: Path) -> None:
-    rows = [row for table in RunRecord.open(run).tables("parameters") for row in table.to_pylist()]
+    rows = [row for table in map(pa.table, RunRecord.open(run).tables("parameters")) for row in table.to_pylist()]
     last = {r["name"]: r["value"] for r in rows if r["model"] == "two-mass"}
     tab.js("bode.go(20)")
     tab.page.keyboard.press("n")

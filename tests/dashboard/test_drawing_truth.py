@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from playwright.sync_api import Browser
 
@@ -142,7 +143,7 @@ def test_model_and_margins_are_those_of_the_parameters(browser: Browser, whole: 
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
-        rows = [row for table in RunRecord.open(whole).tables("parameters") for row in table.to_pylist()]
+        rows = [row for table in map(pa.table, RunRecord.open(whole).tables("parameters")) for row in table.to_pylist()]
         tab.until("bode.curves.model")
         at_s = tab.js("bode.curves.model.frame.timeS[0]")
         fitted = {r["name"]: r["value"] for r in rows if r["model"] == "two-mass" and abs(r["time_s"] - at_s) < 1e-9}

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from playwright.sync_api import Browser
 
@@ -110,7 +111,7 @@ def test_contours_have_one_magnitude_of_the_closed_loop(tab: Tab) -> None:
 
 
 def test_margins_are_marked_where_the_fitted_loop_crosses(tab: Tab, run: Path) -> None:
-    rows = [row for table in RunRecord.open(run).tables("parameters") for row in table.to_pylist()]
+    rows = [row for table in map(pa.table, RunRecord.open(run).tables("parameters")) for row in table.to_pylist()]
     last = {r["name"]: r["value"] for r in rows if r["model"] == "margins"}
     show(tab, "nyquist")
     places = tab.page.evaluate(

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from starlette.applications import Starlette
 
@@ -294,7 +295,7 @@ def test_a_trend_is_the_median_of_the_fits_and_shows_the_known_change(shown: tup
         version, waiting = answer["version"], answer["waiting"]
         found |= answer["runs"]
     points = {name: {(p[0], p[1]): p for p in trend["points"]} for name, trend in found.items()}
-    table = next(RunRecord.open(folder / "day 0").tables("parameters")).to_pandas()
+    table = next(map(pa.table, RunRecord.open(folder / "day 0").tables("parameters"))).to_pandas()
     fits = table[(table["name"] == "Keff") & (table["status"] == "ok")]
     model, _, unit, value, bound, low, high, time_s, unix_s, count = points["day 0"]["two-mass", "Keff"]
     assert (model, unit, count) == ("two-mass", "N/m", len(fits))

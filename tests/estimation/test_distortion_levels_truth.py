@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from livebode.core import Block, Event, Lines
-from livebode.core.document import Table
+from livebode.core.document import PrintedTable
 from livebode.estimation import Settings, Tracker
 from livebode.estimation.levels import Level, detection_bins
 from livebode.estimation.successive import SuccessiveTrackers
@@ -151,6 +151,6 @@ def test_a_run_records_prints_and_reports_them(tmp_path: Path) -> None:
     report = run_report(tmp_path / "run", made=datetime.now(UTC))
     (section,) = (section for section in report.sections if section.title == "Distortion")
     table = section.parts[1]
-    assert isinstance(table, Table)
+    assert isinstance(table, PrintedTable)
     level = levels["even"]
     assert table.rows[0][:3] == ("even", f"{level['db']:.1f}", f"{level['low_db']:.1f} … {level['high_db']:.1f}")

@@ -67,13 +67,13 @@ def test_a_damaged_table_leaves_nothing(run: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
     broken.mkdir()
     table = pq.read_table(run / "responses.parquet")
-    pq.write_table(table.slice(0, table.num_rows - 1), broken / "responses.parquet")
+    pq.write_table(table.slice(0, table.num_rows - 1), broken / "responses.parquet", compression="lz4")
     describe(broken, run)
     for to in ("csv", "mat", "netcdf", "uff"):
         done = livebode("export", broken, "--to", to)
         assert done.code == 2
         assert "ends within a response" in done.err
-    pq.write_table(pa.table({"time_s": [1.0]}), broken / "parameters.parquet")
+    pq.write_table(pa.table({"time_s": [1.0]}), broken / "parameters.parquet", compression="lz4")
     describe(broken, run)
     assert "have no column 'schedule'" in livebode("export", broken, "--to", "csv", "--parameters").err
     (broken / "parameters.parquet").write_bytes(b"PAR1")

@@ -43,7 +43,7 @@ def message(number: int, lags_s: tuple[float, ...] = (0.3, 0.8)) -> SinkRows:
         "value": [float(number), np.nan], "sigma": [0.1, np.nan], "unit": ["N/m"] * 2, "status": ["ok", "weak"],
         "epsilon": [0.0, 0.0],
     }  # fmt: skip
-    fitted = pa.table(fits, schema=parameter_table.SCHEMA)
+    fitted = pa.table(fits, schema=pa.schema(parameter_table.SCHEMA))
     logged = [np.full(2, round(1e6 * (stored_s - lag)), np.int64) for lag in lags_s]
     return SinkRows(
         number,

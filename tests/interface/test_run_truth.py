@@ -7,6 +7,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pyarrow as pa
 import pytest
 
 import livebode
@@ -92,7 +93,7 @@ def test_a_wrong_argument_of_a_fit_is_named(run: Run) -> None:
 
 def test_parameters_are_those_that_were_recorded(run: Run) -> None:
     table = run.parameters
-    frame = table.to_pandas().query("name == 'Js' and status == 'ok'")
+    frame = pa.table(table).to_pandas().query("name == 'Js' and status == 'ok'")
     assert len(frame) == np.count_nonzero(run.responses.valid.all(axis=1))
     assert abs(frame["value"].mean() / 0.0028 - 1) < 0.01
     recorded = [json.loads(line) for line in (run.path / "events.jsonl").read_text().splitlines()]

@@ -47,6 +47,8 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86, spe
     if not spectra64:
         jobs += [(f"lines/{name}", name, []) for name in ("lines", "rows", "sizes")]
         jobs += [(f"repeating/{name}", name, []) for name in ("numbers", "hum", "distortion", "periods")]
+        table = "nearest", "number", "moment", "read", "shortest", "write", "runs"
+        jobs += [(f"table/{name}", f"table_{name}", []) for name in table]
     for name, isa in SETS.items() if dispatch else ():
         jobs.append(("lines/rows", f"rows_{name}", [f"-DLB_LINES_NAME=lb_lines_{name}", *isa]))
         jobs.append(("lines/sizes", f"sizes_{name}", [f"-DLB_SIZES_NAME=lb_sizes_{name}", *isa]))
@@ -166,7 +168,8 @@ def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factor
     for name, (compiler, _, objects) in builds.items():
         (tmp_path / f"run {name}").mkdir()
         hashes[name] = tuple(
-            program(tmp_path / f"run {name}", compiler, objects, part) for part in ("bits", "lines", "repeating")
+            program(tmp_path / f"run {name}", compiler, objects, part)
+            for part in ("bits", "lines", "repeating", "table")
         )
     assert len(set(hashes.values())) == 1, hashes
 
@@ -198,6 +201,7 @@ def test_sanitizers_find_nothing(tmp_path):
     program(tmp_path, compiler, objects, "bits", *sanitize)
     program(tmp_path, compiler, objects, "lines", *sanitize)
     program(tmp_path, compiler, objects, "repeating", *sanitize)
+    program(tmp_path, compiler, objects, "table", *sanitize)
 
 
 VIOLATIONS = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 
 from livebode.records import RunRecord
 from tests.support.command import livebode, signals
@@ -50,7 +51,7 @@ url = "http://127.0.0.1:{free_port()}/{SECRET}"
     run = RunRecord.open(tmp_path / "run")
     assert last["status"]["responses"] == len(run.responses())
     assert last["response"]["frequency_hz"] == [50.0, 100.0, 200.0]
-    rows = [row for table in run.tables("parameters") for row in table.to_pylist() if row["name"] == "J"]
+    rows = [row for table in map(pa.table, run.tables("parameters")) for row in table.to_pylist() if row["name"] == "J"]
     assert np.isnan(rows[-1]["value"])  # no belt: a fit that is not valid has no value
     assert {one["name"]: one["value"] for one in last["measurements"]}["J"] is None
     assert len(receiver.texts) == len(run.events())

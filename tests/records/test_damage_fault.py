@@ -19,16 +19,18 @@ from hypothesis import strategies as st
 from livebode.core import DamageWarning, Event, RecordError
 from livebode.records import RunRecord
 from livebode.records.segments.damage import total
-from livebode.records.segments.frames import COMMIT, ROWS, frames, to_frame
+from livebode.records.segments.frames import COMMIT, ROWS, TABLE, frames, to_frame
 from livebode.records.segments.journal import Commit, Journal, head, name_of, read_sealed
 from livebode.records.segments.json_lines import in_line, to_line
 from livebode.records.segments.manifest import TIERS
 from livebode.records.table_file import ColumnTable
+from livebode.tables import Schema, Table
+from livebode.tables.record_batch import to_message
 from tests.support.errors import refused
 from tests.support.recorded import check_beginning, expected, machine, record_machine, same
 
 SAMPLES = 2600
-TABLE = ColumnTable(pa.schema([("sample", pa.int64()), ("time_s", pa.float64())]))
+TABLES = {name: ColumnTable(Schema.of(sample="int64", time_s="float64")) for name in "ab"}
 
 
 @dataclass(frozen=True)
@@ -49,12 +51,12 @@ def commit(number: int) -> Commit:
 
 def journal_of(commits: int) -> tuple[bytes, list[Piece]]:
     """A journal with a row of both tables before each commit, and its frames."""
-    data, pieces = head({"a": TABLE, "b": TABLE}, commit(0)), []
+    data, pieces = head(TABLES, commit(0)), []
     pieces.append(Piece(0, len(data), None, None))
     for k in range(1, commits + 1):
-        rows = pa.record_batch([pa.array([10 * k - 1]), pa.array([k - 0.1])], schema=TABLE.schema)
+        rows = to_message(Table.of({"sample": np.array([10 * k - 1]), "time_s": np.array([k - 0.1])}))
         for at, table in enumerate("ab"):
-            frame = to_frame(ROWS, rows.serialize(), table=at)
+            frame = to_frame(ROWS, rows, table=at)
             pieces.append(Piece(len(data), len(data) + len(frame), table, k))
             data += frame
         frame = commit(k).to_frame()
@@ -74,7 +76,7 @@ def read(run: Path, data: bytes) -> Journal:
 
 
 def rows_of(found: Journal, table: str) -> list[int]:
-    return [(sample + 1) // 10 for batch in found.rows.get(table, []) for sample in batch["sample"].to_pylist()]
+    return [(sample + 1) // 10 for batch in found.rows.get(table, []) for sample in batch["sample"].tolist()]
 
 
 @settings(deadline=None)
@@ -161,7 +163,7 @@ def test_a_journal_that_expands_is_refused_in_a_sentence(tmp_path: Path, attack:
         message = message.replace(struct.pack("<q", 8 * rows * columns), struct.pack("<q", 8 * rows), 1)
         message = message[: -8 * rows * (columns - 1)]
         assert pa.ipc.read_record_batch(pa.py_buffer(message), schema).nbytes > 30 * len(message)
-    data = head({"a": ColumnTable(schema)}, commit(0)) + to_frame(ROWS, message) + commit(1).to_frame()
+    data = b"".join([to_frame(TABLE, b"a\0", schema.serialize()), to_frame(ROWS, message), commit(1).to_frame()])
     (tmp_path / "open").mkdir()
     with (tmp_path / name_of(1)).open("wb") as file:
         file.write(data)
@@ -202,7 +204,7 @@ def test_the_next_journal_gives_the_rows_of_a_damaged_end(tmp_path: Path) -> Non
     data[PIECES[-1].start + 30] ^= 1
     data[PIECES[-2].start + 30] ^= 1
     read(tmp_path, bytes(data))
-    (tmp_path / name_of(2)).write_bytes(head({"a": TABLE, "b": TABLE}, commit(COMMITS)))
+    (tmp_path / name_of(2)).write_bytes(head(TABLES, commit(COMMITS)))
     found = read_sealed(tmp_path, 1)
     assert rows_of(found, "a") == list(range(1, COMMITS + 1))
     assert rows_of(found, "b") == list(range(1, COMMITS))
@@ -250,9 +252,9 @@ def test_a_changed_file_of_a_finished_run_is_reported_and_the_rest_is_read(finis
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DamageWarning)
         run = RunRecord.open(other)
-        found = run.responses(), run.events(), list(run.tables("samples"))
+        found = run.responses(), run.events(), list(map(pa.table, run.tables("samples")))
         for tier in TIERS:
-            list(run.tables(tier))
+            list(map(pa.table, run.tables(tier)))
     reported = [str(damage.details["file"]) for damage in run.damages]
     assert reported == ([] if name.name == "run-copy.json" else [str(name)] * len(reported))
     assert reported or name.name == "run-copy.json"
@@ -306,7 +308,9 @@ def check_damage(run: Path, reported: Event, journal: str) -> None:
     assert RunRecord.open(run).summary["record"]["damaged"] == {
         "files": [f"damaged/{journal}"], **{key: details[key] for key in ("samples", "seconds", "rows")},
     }  # fmt: skip
-    number = np.concatenate([table["sample"].to_numpy() for table in RunRecord.open(run).tables("samples")])
+    number = np.concatenate(
+        [table["sample"].to_numpy() for table in map(pa.table, RunRecord.open(run).tables("samples"))]
+    )
     lost = np.setdiff1d(np.arange(SAMPLES), number)
     assert lost.size == details["rows"].get("samples", 0)
     responses = RunRecord.open(run).responses()

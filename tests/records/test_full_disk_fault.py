@@ -12,6 +12,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from livebode.core import Block, Channel, Event
@@ -84,7 +85,7 @@ def test_the_lost_samples_are_reported_exactly(tmp_path: Path) -> None:
         store.finish(SUMMARY, {}, finished=True)
     assert taken == [True] * 5 + [False] * 22 + [True] * 13
     run = RunRecord.open(tmp_path / "run")
-    number = np.concatenate([table["sample"].to_numpy() for table in run.tables("samples")])
+    number = np.concatenate([table["sample"].to_numpy() for table in map(pa.table, run.tables("samples"))])
     missing = np.setdiff1d(np.arange(4000), number)
     lost = resumed.details["lost"]["samples"]
     assert lost == {"rows": missing.size, "first_sample": missing[0], "last_sample": missing[-1]}
@@ -110,7 +111,7 @@ def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(
             resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
         unclosed = [event.kind for event in events]
         assert (tmp_path / "run/open/000001.journal").stat().st_size > 30_000
-        (table,) = RunRecord.open(tmp_path / "run").tables("samples")
+        (table,) = map(pa.table, RunRecord.open(tmp_path / "run").tables("samples"))
         taken.append(_second(store, 20, None, hard))
     events: list[Event] = []
     with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
@@ -120,7 +121,7 @@ def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(
     assert all(taken)
     assert unclosed == ["record-unclosed"] * 5  # of 18 attempts the 1st, 2nd, 4th, 8th and 16th
     assert table.num_rows == 2000
-    assert sum(table.num_rows for table in RunRecord.open(tmp_path / "run").tables("samples")) == 2100
+    assert sum(table.num_rows for table in map(pa.table, RunRecord.open(tmp_path / "run").tables("samples"))) == 2100
 
 
 def test_segments_are_closed_again_when_the_next_journal_could_be_opened(tmp_path: Path) -> None:
@@ -191,7 +192,7 @@ def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> No
     # Samples went first, all but those closed last, and of responses the newest stay.
     newest = run.segments[-1].name.removeprefix("responses/")
     assert [segment.name for segment in run.segments if segment.table == "samples"] == [f"samples/{newest}"]
-    number = np.concatenate([table["sample"].to_numpy() for table in run.tables("responses")])
+    number = np.concatenate([table["sample"].to_numpy() for table in map(pa.table, run.tables("responses"))])
     assert np.array_equal(number, np.arange(number[0], 40 * 50_000))
     assert number[0] > 0
     marks = [event for event in run.events() if event.kind == "mark"]

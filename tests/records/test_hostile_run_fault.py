@@ -54,7 +54,7 @@ def outside(folder: Path) -> Path:
         (place / inner).mkdir(parents=True)
     rows = pa.table({"sample": pa.array([SECRET]), "time_s": [0.0], "w": [0.0]})
     for name in ("responses/000001.parquet", "samples/000001.parquet", "x.parquet", "deep/er/000009.parquet"):
-        pq.write_table(rows, place / name)
+        pq.write_table(rows, place / name, compression="lz4")
     for name in ("thesis.tex", "open/000001.journal", "open/000002.journal", "events.jsonl", "run.json"):
         (place / name).write_text("years of work\n")
     return place
@@ -124,7 +124,9 @@ def make_hostile(run: Path, place: Path, rng: np.random.Generator) -> None:
 def attempts(run: Path, folder: Path) -> list[Callable[[], Any]]:
     return [
         lambda: [
-            table for name in ("responses", "samples", "parameters") for table in RunRecord.open(run).tables(name)
+            table
+            for name in ("responses", "samples", "parameters")
+            for table in map(pa.table, RunRecord.open(run).tables(name))
         ],
         lambda: RunRecord.open(run).events(),
         lambda: query(RunRecord.open(run), "FROM samples", 100_000).rows,
@@ -217,7 +219,7 @@ def test_a_segment_that_expands_beyond_reason_is_named_and_left_out(
     (run / "manifest.jsonl").write_bytes(b"".join(to_line(line) * 2 for line in lines))
     assert len(content) < n // 8
     with pytest.warns(DamageWarning, match="more than a segment can have"):
-        assert sum(table.num_rows for table in RunRecord.open(run).tables("samples")) < 2600
+        assert sum(table.num_rows for table in map(pa.table, RunRecord.open(run).tables("samples"))) < 2600
 
 
 @pytest.mark.parametrize("seed", range(2))

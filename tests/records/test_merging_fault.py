@@ -64,8 +64,8 @@ def test_a_reader_that_listed_the_segments_before_they_were_merged_reads_them(tm
     for segment in before:
         file = reading.whole(tmp_path, segment, damages.append)
         assert file is not None
-        table = file.read()
-        assert (table.num_rows, table["sample"][0].as_py()) == (segment.rows, segment.first_sample)
+        table = file.table()
+        assert (table.num_rows, table["sample"][0]) == (segment.rows, segment.first_sample)
     assert not damages
     assert sum(len(part) for part in batches) == np.count_nonzero(RESPONSES.time_s <= 4.0)
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -102,7 +103,9 @@ def test_a_run_is_read_while_it_is_written(tmp_path: Path) -> None:
             if (directory / "run.json").exists():
                 run = RunRecord.open(directory)
                 seen, reported = run.responses(), each(run)
-                number = np.concatenate([np.zeros(0, int), *(t["sample"].to_numpy() for t in run.tables("samples"))])
+                number = np.concatenate(
+                    [np.zeros(0, int), *(t["sample"].to_numpy() for t in map(pa.table, run.tables("samples")))]
+                )
                 assert same(seen, responses[: len(seen)])
                 assert reported == list(events[: len(reported)])
                 assert np.array_equal(number, np.arange(number.size))
@@ -136,7 +139,7 @@ def test_a_machine_that_cannot_go_back_leaves_a_gap(tmp_path: Path) -> None:
     run = RunRecord.open(tmp_path / "run")
     assert not run.finished  # it was stopped, and may go on
     assert run.summary["counts"]["gaps"] == 1
-    number = np.concatenate([table["sample"].to_numpy() for table in run.tables("samples")])
+    number = np.concatenate([table["sample"].to_numpy() for table in map(pa.table, run.tables("samples"))])
     assert np.array_equal(number, np.r_[:held, held + missing : held + missing + SAMPLES])
     # The same as if the machine had fallen silent for so long.
     tracker = Tracker(SETTINGS)

@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from livebode.core import Block, Lines, RecordError
@@ -40,7 +41,7 @@ def test_an_unfinished_run_is_read_exactly(folder: Path) -> None:
     assert (len(responses), responses.sample[-1], responses.unit) == (32, 639, "")
     expected = json.loads((folder / "expected.json").read_text())
     assert stored.content(responses) == expected["responses"]
-    tables = run.tables("samples")
+    tables = map(pa.table, run.tables("samples"))
     samples = np.concatenate([np.array([table[name] for name in NAMES]) for table in tables], axis=1)
     assert stored.digest(samples) == expected["samples"]
     assert [(event.kind, event.sample) for event in run.events()] == [("non-finite", 300)]
@@ -67,7 +68,7 @@ def test_a_finished_run_is_read_exactly(folder: Path) -> None:
     assert responses.time_s[-1] == 1.47375
     last = [-0.03821601125010516 - 0.09665834465355533j, -0.035937500000000004 - 0.03125j]
     assert responses.value[-1].tolist() == last
-    rows = [row for table in run.tables("parameters") for row in table.to_pylist()]
+    rows = [row for table in map(pa.table, run.tables("parameters")) for row in table.to_pylist()]
     assert len(rows) == 90
     assert (rows[-3]["name"], rows[-3]["value"], rows[-3]["status"]) == ("J", 0.03837103485160787, "ok")
     assert [event.kind for event in run.events()].count("fit-failed") == 3

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
@@ -14,15 +13,15 @@ from hypothesis import strategies as st
 
 from livebode.records import table_file
 from livebode.records.table_file import ColumnTable, TableFile
+from livebode.tables import Schema, Table
 from tools.parquet_parts import parts_of
 
-TABLE = ColumnTable(pa.schema([("sample", pa.int64()), ("time_s", pa.float64()), ("re", pa.float64())]), ("time_s",))
+TABLE = ColumnTable(Schema.of(sample="int64", time_s="float64", re="float64"), ("time_s",))
 
 
-def rows(first: int, count: int) -> pa.RecordBatch:
+def rows(first: int, count: int) -> Table:
     sample = np.arange(first, first + count)
-    columns = [pa.array(sample), pa.array(sample // 7 / 100), pa.array(np.sin(sample))]
-    return pa.record_batch(columns, schema=TABLE.schema)
+    return Table(TABLE.schema, (sample, sample // 7 / 100, np.sin(sample)))
 
 
 @given(st.lists(st.integers(0, 60), max_size=30), st.integers(1, 100))
@@ -45,9 +44,9 @@ def test_the_parts_are_those_of_the_written_file(
 
 def test_the_error_of_a_group_is_raised_by_the_next_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_file, "_GROUP_ROWS", 10)
-    other = pa.record_batch([pa.array(["a"] * 10)], names=["sample"])
+    other = Table.of({"sample": np.arange(10.0)})
     file = TableFile(tmp_path / "rows.parquet", TABLE)
     file.write(other)
-    with pytest.raises(pa.ArrowInvalid):
+    with pytest.raises(ValueError, match="schema"):
         file.write(rows(0, 10))
     file.close()

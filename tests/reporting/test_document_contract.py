@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from pypdf import PdfReader
 
 from livebode.core import Event
-from livebode.core.document import Document, Finding, Listing, Paragraph, Picture, Section, Table
+from livebode.core.document import Document, Finding, Listing, Paragraph, Picture, PrintedTable, Section
 from livebode.core.installing import install_command
 from livebode.report.html import to_html
 from livebode.report.pdf import save_pdf
@@ -49,7 +49,12 @@ def hostile(text: str, pictures: bool = False) -> Document:
     bode = {"responses": measured(6, 1, unit=text), "names": (text, text)}
     curves = {"time_s": np.arange(3.0), "curves": [(text, text, np.ones(3), np.ones(3))]}
     drawn = (Picture("bode", bode, text), Picture("tracking", data, text), Picture("parameters", curves, text))
-    parts = (Paragraph(text), Table((text, "n"), ((text, text),), (1,), text), Listing(text), *drawn[1:] * pictures)
+    parts = (
+        Paragraph(text),
+        PrintedTable((text, "n"), ((text, text),), (1,), text),
+        Listing(text),
+        *drawn[1:] * pictures,
+    )
     sections, finding = (Section(text, parts),), Finding("alarm", text)
     return Document(
         text, text, ((text, text),), (finding,), sections, text, text, result=(finding, finding),
@@ -136,7 +141,7 @@ def test_a_report_needs_nothing_else_and_holds_no_secret(moving: Path, monkeypat
 def test_long_logs_are_grouped_and_long_runs_thinned_with_a_note(moving: Path) -> None:
     document = run_report(moving, made=MADE)
     (events,) = (s for s in document.sections if s.title == "Alarms and events")
-    grouped, in_full = (p for p in events.parts if isinstance(p, Table))
+    grouped, in_full = (p for p in events.parts if isinstance(p, PrintedTable))
     assert {row[0]: row[1] for row in grouped.rows} == {"change": "60", "gap": "3,000"}
     assert len(in_full.rows) == 40
     assert "20 events between them not shown" in in_full.note

@@ -10,11 +10,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from pypdf import PdfReader
 from pypdf.generic import DictionaryObject
 
-from livebode.core.document import Document, Picture, Table
+from livebode.core.document import Document, Picture, PrintedTable
 from livebode.fitting import mean_response
 from livebode.records import RunRecord
 from livebode.report.figures import drawn
@@ -77,7 +78,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_table_of_lines_is_the_mean_with_its_bounds(run: Path) -> None:
     document = run_report(run, made=MADE)
-    (table,) = parts(document, Table, "Frequency response")
+    (table,) = parts(document, PrintedTable, "Frequency response")
     responses = RunRecord.open(run).responses()
     mean = mean_response(responses)
     size, radius = np.abs(mean.value[0]), mean.bound(np.sqrt(np.log(20)))[0]
@@ -114,12 +115,15 @@ def test_parameters_over_time_are_those_of_the_table(run: Path) -> None:
     document = run_report(run, made=MADE)
     (picture,) = parts(document, Picture, "Parameters")
     rows = [
-        row for table in RunRecord.open(run).tables("parameters") for row in table.to_pylist() if row["name"] == "Keff"
+        row
+        for table in map(pa.table, RunRecord.open(run).tables("parameters"))
+        for row in table.to_pylist()
+        if row["name"] == "Keff"
     ]
     curves = {name: (value, half) for name, _, value, half in picture.data["curves"]}
     np.testing.assert_array_equal(curves["Keff"][0], [row["value"] for row in rows])
     np.testing.assert_allclose(curves["Keff"][1], 1.96 * np.array([row["sigma"] for row in rows]))
-    (table,) = parts(document, Table, "Parameters")
+    (table,) = parts(document, PrintedTable, "Parameters")
     keff = next(row for row in table.rows if row[0] == "Keff")
     newest = next(row for row in reversed(rows) if row["status"] == "ok")
     assert float(keff[3]) == pytest.approx(newest["value"], rel=1e-3)
@@ -133,7 +137,7 @@ def test_page_and_paper_hold_the_same_numbers(run: Path) -> None:
     document = run_report(run, made=MADE, appendix=True)
     page = Page((run / "report.html").read_text("utf-8")).text
     paper = " ".join("\n".join(p.extract_text() for p in PdfReader(run / "report.pdf").pages).split())
-    for table in (t for s in document.sections for t in s.parts if isinstance(t, Table)):
+    for table in (t for s in document.sections for t in s.parts if isinstance(t, PrintedTable)):
         for row in table.rows:
             for text in row:
                 if re.fullmatch(r"[-+]?[\d,.]+(e[-+]\d+)?", text):
@@ -149,7 +153,7 @@ def test_page_and_paper_hold_the_same_numbers(run: Path) -> None:
         assert words in page, words
         assert words in paper, words
     own = json.loads((run / "run.json").read_text("utf-8"))["loop"]["margins"]["phase_margin"]
-    (margins,) = parts(document, Table, "Margins of the loop")
+    (margins,) = parts(document, PrintedTable, "Margins of the loop")
     row = next(row for row in margins.rows if row[0] == "phase margin")
     assert abs(float(row[1]) - own["value"]) < own["bound_95"]
 
@@ -170,7 +174,7 @@ def test_page_and_paper_have_the_same_content(run: Path) -> None:
         assert text.count(squeezed(f"{foot} {i} / {len(sheets)}")) == 1
         paper += text.replace(squeezed(f"{foot} {i} / {len(sheets)}"), "")
     headings = {squeezed("".join(t.headings)) for s in run_report(run, made=MADE).sections for t in s.parts
-                if isinstance(t, Table) and any(t.headings)}  # fmt: skip
+                if isinstance(t, PrintedTable) and any(t.headings)}  # fmt: skip
     for heading in headings:
         paper = paper.replace(heading, "", paper.count(heading) - page.count(heading))
     assert Counter(paper) == Counter(page)
@@ -297,7 +301,7 @@ def test_before_and_after_draw_both_means_and_mark_what_differs(tmp_path: Path) 
     assert dots == sum(int(p.difference.differs.sum()) for p in comparison.found.places)
     done = livebode("compare", *paths, "--out", tmp_path / "both")
     assert done.code == 0, done.err
-    (lines,) = parts(document, Table, "Frequency response")
+    (lines,) = parts(document, PrintedTable, "Frequency response")
     assert lines.headings[9] == "detectable %"
     seen = comparison.found.overall.seen
     np.testing.assert_allclose([float(row[9]) for row in lines.rows], 100 * seen, rtol=0.05)

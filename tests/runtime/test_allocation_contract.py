@@ -10,7 +10,9 @@ import pytest
 
 PROGRAM = """
 import ctypes, threading
-import pyarrow as pa
+import sys
+if "before" in sys.argv:
+    import pyarrow as pa
 from livebode.runtime.allocation import share_between_threads
 
 share_between_threads()
@@ -26,6 +28,7 @@ threads = [threading.Thread(target=work) for _ in range(8)]
 for thread in threads:
     thread.start()
 together.wait()
+import pyarrow as pa
 print(pa.default_memory_pool().backend_name, flush=True)
 library = ctypes.CDLL(None)
 library.fdopen.restype = ctypes.c_void_p
@@ -36,9 +39,10 @@ together.wait()
 """
 
 
+@pytest.mark.parametrize("arrow_is_loaded", ["before", "later"])
 @pytest.mark.skipif(sys.platform != "linux", reason="only glibc has arenas")
-def test_threads_of_a_session_share_an_arena() -> None:
-    done = subprocess.run([sys.executable, "-c", PROGRAM], check=True, capture_output=True, text=True)
+def test_threads_of_a_session_share_an_arena(arrow_is_loaded: str) -> None:
+    done = subprocess.run([sys.executable, "-c", PROGRAM, arrow_is_loaded], check=True, capture_output=True, text=True)
     assert done.stdout.startswith("system")
     arenas = re.findall("<heap nr=", done.stdout)
     assert len(arenas) <= 2  # the main thread's, and one of a library that was loaded before

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from livebode import example_axis
@@ -55,7 +56,7 @@ def tracked(
 
 
 def parameters(of: RunRecord) -> list[tuple[str, str, float, str]]:
-    rows = [row for table in of.tables("parameters") for row in table.to_pylist()]
+    rows = [row for table in map(pa.table, of.tables("parameters")) for row in table.to_pylist()]
     return [(row["model"], row["name"], row["value"], row["status"]) for row in rows if row["value"] == row["value"]]
 
 

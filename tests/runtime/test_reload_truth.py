@@ -62,7 +62,7 @@ def test_every_sample_is_in_one_of_the_records_and_no_window_is_lost(tmp_path: P
     tracker = Tracker(Settings(**{**SETTINGS.__dict__, "hop": 10}))
     assert same(RunRecord.open(runs[3]).responses(), tracker.process(block(sent).cut(int(first), sent)))
     assert summary_of(runs[1])["fit"]["model"] == "rigid"
-    assert pa.concat_tables(RunRecord.open(runs[1]).tables("parameters")).num_rows > 0
+    assert pa.concat_tables(map(pa.table, RunRecord.open(runs[1]).tables("parameters"))).num_rows > 0
     applied = [[e for e in events(run) if e.kind == "configuration-applied"] for run in runs]
     assert [[e.details["sections"] for e in found] for found in applied] == [[["fit"]], [["fit"]], [["tracking"]], []]
     assert [found[0].sample for found in applied[:3]] == [numbers(run)[-1] + 1 for run in runs[:3]]

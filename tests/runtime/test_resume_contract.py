@@ -67,7 +67,7 @@ def test_correction_fits_and_monitoring_continue_in_a_resumed_run(
     outcome = record_axis(follower(), tmp_path / "run")
     runs = [RunRecord.open(tmp_path / name) for name in ("run", "whole")]
     assert same(runs[0].responses(), runs[1].responses())
-    parameters = [pa.concat_tables(run.tables("parameters")).combine_chunks() for run in runs]
+    parameters = [pa.concat_tables(map(pa.table, run.tables("parameters"))).combine_chunks() for run in runs]
     assert parameters[0].num_rows > 1000
     # NaN is not equal to itself, and its text is.
     assert str(parameters[0].to_pydict()) == str(parameters[1].to_pydict())

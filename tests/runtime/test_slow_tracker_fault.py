@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from livebode.records import RunRecord
@@ -52,7 +53,7 @@ def test_samples_that_exceed_the_queue_become_a_gap_and_memory_is_bounded(tmp_pa
     assert "loss" in kinds
     assert "gap" in kinds
     assert run.summary["counts"]["missing"] == run.summary["source"]["lost"] > 0
-    tables = list(run.tables("samples"))
+    tables = list(map(pa.table, run.tables("samples")))
     number, sent = (np.concatenate([t[name].to_numpy() for t in tables]) for name in ("sample", "w"))
     assert np.array_equal(sent, number + sent[0])  # each sample is the one that its number says
 

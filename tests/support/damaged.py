@@ -89,7 +89,7 @@ def seen(path: Path) -> Seen:
         run = RunRecord.open(path)
         rows = {}
         for name in TABLES:
-            tables = [table.to_pylist() for table in run.tables(name)]
+            tables = [table.to_pylist() for table in map(pa.table, run.tables(name))]
             rows[name] = [str(row) for table in tables for row in table]
         for part in run.batches():
             assert len(part)
@@ -196,7 +196,7 @@ def _check_continued(name: str, path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DamageWarning)
         run = RunRecord.open(path)
-        number = pa.concat_tables(run.tables("samples"))["sample"].to_numpy()
+        number = pa.concat_tables(map(pa.table, run.tables("samples")))["sample"].to_numpy()
     damages = [event for event in reported if event.kind == "record-damaged"]
     damages += [damage for damage in run.damages if damage not in damages]
     lost = sum(damage.details.get("rows", {}).get("samples", 0) for damage in damages)

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from livebode.configuration.axis import Axis
 from livebode.records import RunRecord
@@ -71,7 +72,7 @@ def recorded(directory: Path, channel: str) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of the samples in the record, and the numbers that the sender gave them."""
     if not (directory / "run.json").exists():
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    tables = list(RunRecord.open(directory).tables("samples"))
+    tables = list(map(pa.table, RunRecord.open(directory).tables("samples")))
     if not tables:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     return tuple(

@@ -17,5 +17,5 @@ def started(path: Path, out: Path, pictures: bool = False) -> Command:
 
 
 def table(out: Path, what: str = "responses") -> dict[str, np.ndarray]:
-    table = pa.concat_tables(RunRecord.open(out).tables(what))
+    table = pa.concat_tables(map(pa.table, RunRecord.open(out).tables(what)))
     return {name: np.array(column) for name, column in table.to_pydict().items()}

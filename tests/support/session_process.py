@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from livebode.core import Block, Event
 from livebode.records import RunRecord
@@ -84,7 +85,7 @@ def numbers(run: Path) -> np.ndarray:
     """Numbers of the samples in a record, as they stand in it."""
     if not (run / "manifest.jsonl").exists() or not (run / "run.json").exists():
         return np.zeros(0, dtype=np.int64)
-    parts = [table["sample"].to_numpy() for table in RunRecord.open(run).tables("samples")]
+    parts = [table["sample"].to_numpy() for table in map(pa.table, RunRecord.open(run).tables("samples"))]
     return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
 
 
@@ -94,7 +95,7 @@ def summary_of(run: Path) -> dict[str, Any]:
 
 def check_samples(runs: list[Path], sent: int) -> None:
     """That every sample that was sent is in exactly one of these records, as it was sent."""
-    tables = [table for run in runs for table in RunRecord.open(run).tables("samples")]
+    tables = [table for run in runs for table in map(pa.table, RunRecord.open(run).tables("samples"))]
     number = np.concatenate([table["sample"].to_numpy() for table in tables])
     assert np.array_equal(number, np.arange(sent))
     for row, name in enumerate(("w", "u", "y", "n")):

@@ -26,7 +26,7 @@ from livebode.monitoring import (
     places,
 )
 from livebode.records import RunRecord
-from livebode.records.wide_responses import from_wide, to_wide
+from livebode.records.stored_precision import in_stored_precision
 
 _ROLES = ("output", "input", "excitation", "schedule")
 # The belt's parameters referred to the motor shaft; changes are reported in percent.
@@ -238,7 +238,7 @@ def _rows(run: HealthyRun) -> list[WindowRows]:
 
 def _rounded(run: HealthyRun) -> Iterator[Responses]:
     """The responses as a lake stores them."""
-    return (from_wide(to_wide(batch), run.found) for batch in run.steady_batches())
+    return map(in_stored_precision, run.steady_batches())
 
 
 def _joined(batches: list[list[WindowRows]]) -> list[WindowRows]:

@@ -25,7 +25,7 @@ def mode_curves(run: RunRecord, rows_max: int = ROWS_MAX) -> list[ModeCurve]:
     every = max(1, -(-windows // rows_max))
     parts: dict[str, dict[str, list[NDArray[Any]]]] = {}
     for table in run.tables("parameters"):
-        columns = {name: table[name].to_numpy(zero_copy_only=False) for name in _COLUMNS}
+        columns = {name: table.values(name) for name in _COLUMNS}
         used = columns["sample"] // hop % every == 0
         for model in dict.fromkeys(columns["model"]):
             of_model = parts.setdefault(model, {})

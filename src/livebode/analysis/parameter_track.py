@@ -55,7 +55,7 @@ def tracks(run: RunRecord, kept: NDArray[np.int64], time_s: Floats) -> dict[str,
     """Tracks by model, at the responses whose newest samples are `kept`; empty if nothing was fitted."""
     found: dict[str, Track] = {}
     for table in run.tables("parameters"):
-        columns = {name: table[name].to_numpy(zero_copy_only=False) for name in _COLUMNS}
+        columns = {name: table.values(name) for name in _COLUMNS}
         for model in dict.fromkeys(columns["model"]):
             track = found.setdefault(model, Track(time_s, model=model))
             here = columns["model"] == model

@@ -9,14 +9,13 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from livebode.analysis.parameter_track import MARGINS
-from livebode.arrow import to_numpy
 from livebode.core import Event
 from livebode.core.parameters import OK
 from livebode.records import RunRecord
+from livebode.tables import Table
 
 Floats = NDArray[np.float64]
 
@@ -106,13 +105,12 @@ class FittedQuantities:
     def __init__(self) -> None:
         self._found: dict[tuple[str, str], QuantityRows] = {}
 
-    def add(self, table: pa.Table) -> None:
+    def add(self, table: Table) -> None:
         """Add rows as in parameters.parquet."""
-        rows = np.column_stack([to_numpy(table[name].combine_chunks()) for name in ("time_s", "value", "sigma")])
-        coded = [table[name].combine_chunks().dictionary_encode() for name in ("model", "name", "unit", "status")]
-        models, names, units, statuses = (column.dictionary.to_pylist() for column in coded)
-        model, name, unit, status = (to_numpy(column.indices) for column in coded)
-        valid = (np.array(statuses)[status] == OK) & np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0)
+        rows = np.column_stack([table[name] for name in ("time_s", "value", "sigma")])
+        coded = [table.text(name) for name in ("model", "name", "unit")]
+        (models, names, units), (model, name, unit) = ([text.words for text in coded], [text.at for text in coded])
+        valid = table.text("status").where(OK) & np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0)
         both = np.where(valid, model * len(names) + name, -1)
         for code in np.unique(both[both >= 0]).tolist():
             here = np.flatnonzero(both == code)

@@ -72,8 +72,8 @@ class LakeRecord(RecordInOnePiece):
                     self._responses.write(to_wide(document))
                 case FitResults(parts):
                     for part in parts:
-                        rows = pa.Table.from_batches([parameter_rows(part)])
-                        self._parameters.write(rows)
+                        rows = parameter_rows(part)
+                        self._parameters.write(pa.table(rows))
                         self.fitted.add(rows)
                 case Event():
                     self._events.append(document)

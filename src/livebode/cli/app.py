@@ -12,6 +12,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import nullcontext
 from functools import partial
 from typing import Any, cast
 
@@ -26,6 +27,7 @@ from livebode.cli.log_options import File, Level, LogOptions, with_log
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
 from livebode.core import DamageWarning, LivebodeError
+from livebode.core.installing import needing
 from livebode.version import __version__
 
 _HELP = {"help_option_names": ["--help", "-h"]}
@@ -77,8 +79,12 @@ class _Command(_Light, TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error names the options that it concerns."""
+        group = ctx.parent.info_name if ctx.parent else None
+        # Most modules of these packages import PyArrow, which both extras bring.
+        arrow = needing("PyArrow", group, f"livebode {group}") if group in GROUPS else nullcontext()
         try:
-            return super().invoke(ctx)
+            with arrow:
+                return super().invoke(ctx)
         except LivebodeError as error:
             name_options(error, self.params)
             raise

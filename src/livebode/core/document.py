@@ -43,7 +43,7 @@ class Paragraph:
 
 
 @dataclass(frozen=True)
-class Table:
+class PrintedTable:
     """Rows of texts below headings; `numbers` are the right-aligned columns, `note` a line below."""
 
     headings: tuple[str, ...]
@@ -68,7 +68,7 @@ class Listing:
     text: str
 
 
-Part = Paragraph | Table | Picture | Listing
+Part = Paragraph | PrintedTable | Picture | Listing
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from livebode.dashboard.admission import serve_browser
 from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
 from livebode.dashboard.fleet_client import FleetClient
-from livebode.dashboard.fleet_trend import AxisTrends
 from livebode.dashboard.fleet_view import FleetView
 from livebode.records import to_json
 
@@ -41,6 +40,8 @@ class FleetPages:
     def __init__(self, view: FleetView, board: Board, file: Callable[[str], Response], order: Order) -> None:
         self._view, self._board, self._file, self._order = view, board, file, order
         self._paths: tuple[int, bytes] = -1, b""
+        from livebode.dashboard.fleet_trend import AxisTrends  # with PyArrow, which a fleet needs
+
         self._trends = AxisTrends(view.lake)
 
     @property

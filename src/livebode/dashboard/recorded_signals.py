@@ -5,15 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
-from livebode.arrow import to_numpy
-from livebode.core import Block, Channel
+from livebode.core import Block
 from livebode.dashboard.signal_answer import Picture, answer, why_not
 from livebode.dashboard.signal_tap import span_samples
 from livebode.records import RunRecord
-
-_OWN = 2  # columns of the table before its channels: number and time of the sample
+from livebode.records.sample_table import channels_of
+from livebode.tables import Table
 
 
 def recorded_answer(directory: Path, at_s: float, picture: Picture) -> bytes:
@@ -31,16 +29,16 @@ def recorded_block(run: RunRecord, at_s: float) -> Block | None:
     half_s = span_samples(lines.rate_hz, lines.window, 1) / lines.rate_hz / 2
     found = []
     for table in run.tables("samples", span_s=(at_s - half_s, at_s + half_s)):
-        time_s = to_numpy(table["time_s"].combine_chunks())
+        time_s = table["time_s"]
         within = np.flatnonzero((time_s >= at_s - half_s) & (time_s < at_s + half_s))
         if within.size:
             found.append(table.slice(int(within[0]), int(within[-1]) + 1 - int(within[0])))
     if not found:
         return None
-    table = pa.concat_tables(found).combine_chunks()
-    sample, time_s, *values = (to_numpy(column.chunk(0)) for column in table.columns)
+    table = Table.join(found)
+    sample, time_s, *values = (table[name] for name in table.column_names)
     start = int(sample[0])
-    channels = [Channel(f.name, (f.metadata or {}).get(b"unit", b"").decode()) for f in list(table.schema)[_OWN:]]
+    channels = channels_of(table.schema)
     data = np.full((len(channels), int(sample[-1]) + 1 - start), np.nan)
     data[:, sample - start] = values
-    return Block(data, tuple(channels), lines.rate_hz, start, float(time_s[0]) - start / lines.rate_hz)
+    return Block(data, channels, lines.rate_hz, start, float(time_s[0]) - start / lines.rate_hz)

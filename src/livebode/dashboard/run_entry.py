@@ -11,8 +11,6 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any, Literal
 
-import pyarrow.parquet as pq
-
 from livebode.core import LivebodeError
 from livebode.core.clock import RunClock
 from livebode.core.machine_levels import LEVELS
@@ -21,6 +19,7 @@ from livebode.records.notes import read_notes
 from livebode.records.segments.manifest import Manifest
 from livebode.records.summary_file import RUN, read_summary
 from livebode.records.summary_shape import what_is_wrong
+from livebode.tables.parquet_footer import read_footer
 
 RunState = Literal["finished", "recording", "stopped", "broken"]
 _GROWS_S = 10.0
@@ -204,11 +203,8 @@ def _first_s(run: Path) -> float | None:
         if (run / "open").is_dir():
             return next((s.first_s for s in Manifest.read(run).segments if s.table == "responses"), None)
         with open_read(run, "responses.parquet") as file:
-            foot = pq.ParquetFile(file).metadata
-            column = foot.schema.names.index("time_s")
-            statistics = foot.row_group(0).column(column).statistics
-            return float(statistics.min) if statistics is not None and statistics.has_min_max else None
-    except (LivebodeError, OSError, ValueError, IndexError):  # pyarrow's errors are OSError and ValueError
+            return read_footer(file).statistics(0, "time_s").minimum
+    except (LivebodeError, OSError, ValueError, LookupError):
         return None
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from livebode.core import Event, Responses
 from livebode.dashboard.hub import Item
@@ -104,17 +103,16 @@ class Viewed:
     def _parameters(self, span_s: tuple[float, float] | None) -> Iterator[tuple[str, str, str, TrendRows]]:
         """Model, name, unit and rows of each parameter, table by table."""
         for table in self._run.tables("parameters", span_s=span_s):
-            sample = table["sample"].to_numpy()
-            new = table.filter(pa.array(sample > self._parameter_sample))
-            if not new.num_rows:
+            new = table["sample"] > self._parameter_sample
+            if not new.any():
                 continue
-            self._parameter_sample = int(sample[-1])
-            column = {name: new[name].to_numpy() for name in ("time_s", "schedule", "value", "sigma", "status")}
-            model, name, unit = (np.asarray(new[c].to_numpy(), dtype=str) for c in ("model", "name", "unit"))
-            both = np.char.add(np.char.add(model, "\0"), name)
+            self._parameter_sample = int(table["sample"][-1])
+            column = {name: table.values(name)[new] for name in ("time_s", "schedule", "value", "sigma", "status")}
+            model, name, unit = (table.text(c)[new] for c in ("model", "name", "unit"))
+            both = model.at * len(name.words) + name.at
             _, first = np.unique(both, return_index=True)
-            for at in np.sort(first):
+            for at in np.sort(first).tolist():
                 use = both == both[at]
                 one = {c: x[use] for c, x in column.items()}
                 rows = TrendRows(**one | {c: one[c][:, np.newaxis] for c in ("value", "sigma")})
-                yield str(model[at]), str(name[at]), str(unit[at]), rows
+                yield model[at], name[at], unit[at], rows

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import pyarrow as pa
-from pyarrow.csv import CSVWriter, WriteOptions
+from numpy.typing import NDArray
 
-from livebode.arrow import from_numpy
 from livebode.core import RecordError, Responses
 from livebode.export.result import WriteResult
+from livebode.kernel import Words, write_rows
+
+Column = NDArray[Any] | Sequence[str]
+"""Numbers, or text."""
+_ROWS = 1 << 14
 
 
 def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] | None = None) -> WriteResult:
@@ -32,26 +35,44 @@ def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] 
     """
     rows = 0
     with path.open("wb") as file:
-        writer: CSVWriter | None = None
         for part in parts:
             if not len(part):
                 continue
-            batch = _as_batch(part)
-            writer = writer or begin(file, _header(part.unit), batch.schema)
-            writer.write_batch(batch)
+            if not rows:
+                write_header(file, _header(part.unit))
+            write_columns(file, _columns(part))
             rows += len(part)
-        if writer is None:
+        if not rows:
             raise RecordError("no-responses", "the run has no responses to export", "see its events")
-        writer.close()
     return WriteResult(rows)
 
 
-def begin(file: BinaryIO, header: list[str], schema: pa.Schema) -> CSVWriter:
-    """A writer of CSV below this header, which is quoted only where it must be."""
+def write_header(file: BinaryIO, header: Sequence[str]) -> None:
+    """Write the first line; a name is quoted only where it must be."""
     line = io.StringIO()
     csv.writer(line, lineterminator="\n").writerow(header)
     file.write(line.getvalue().encode())
-    return CSVWriter(file, schema, write_options=WriteOptions(include_header=False, quoting_style="needed"))
+
+
+def write_columns(file: BinaryIO, columns: Sequence[Column]) -> None:
+    """Write rows without a header, some at a time; text is quoted.
+
+    >>> file = io.BytesIO()
+    >>> write_columns(file, [np.array([0.1, 2]), ["a", 'b"c']])
+    >>> file.getvalue()
+    b'0.1,"a"\\n2,"b""c"\\n'
+    """
+    for first in range(0, len(columns[0]), _ROWS):
+        file.write(write_rows([_cells(column[first : first + _ROWS]) for column in columns]))
+
+
+def _cells(column: Column) -> NDArray[Any] | Words:
+    if isinstance(column, np.ndarray):
+        return np.ascontiguousarray(column, np.float64 if column.dtype.kind == "f" else np.int64)
+    words = list(dict.fromkeys(column))
+    place = {word: at for at, word in enumerate(words)}
+    quoted = ['"' + word.replace('"', '""') + '"' for word in words]
+    return Words([word.encode() for word in quoted], np.array([place[word] for word in column]))
 
 
 def _header(unit: str) -> list[str]:
@@ -71,25 +92,24 @@ def _header(unit: str) -> list[str]:
     ]
 
 
-def _as_batch(part: Responses) -> pa.RecordBatch:
+def _columns(part: Responses) -> list[Column]:
     rows, lines = part.value.shape
     value = part.value.ravel()
     with np.errstate(divide="ignore"):
         magnitude_db = 20 * np.log10(np.abs(value))
-    columns = {
-        "time": np.repeat(part.time_s, lines),
-        "schedule": np.repeat(part.schedule, lines),
-        "frequency": np.tile(part.lines.frequency_hz, rows),
-        "re": value.real.copy(),
-        "im": value.imag.copy(),
-        "magnitude": magnitude_db,
-        "phase": np.degrees(np.angle(value)),
-        "sigma": part.sigma.ravel(),
-        "dof": np.repeat(part.dof, lines),
-        "coherence": part.coherence.ravel(),
-        "valid": part.valid.ravel().astype(np.int8),
-        "first": np.repeat(part.first, lines),
-        "sample": np.repeat(part.sample, lines),
-        "ready": np.repeat(part.ready.astype(np.int8), lines),
-    }
-    return pa.RecordBatch.from_arrays([from_numpy(c) for c in columns.values()], names=list(columns))
+    return [
+        np.repeat(part.time_s, lines),
+        np.repeat(part.schedule, lines),
+        np.tile(part.lines.frequency_hz, rows),
+        value.real,
+        value.imag,
+        magnitude_db,
+        np.degrees(np.angle(value)),
+        part.sigma.ravel(),
+        np.repeat(part.dof, lines),
+        part.coherence.ravel(),
+        part.valid.ravel(),
+        np.repeat(part.first, lines),
+        np.repeat(part.sample, lines),
+        np.repeat(part.ready, lines),
+    ]

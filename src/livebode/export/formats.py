@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-import pyarrow as pa
-
 from livebode.core import OutputError, Responses
 from livebode.core.files import whole_file
 from livebode.core.writing import writing
@@ -17,6 +15,7 @@ from livebode.export.matlab import write_mat
 from livebode.export.parameters import write_parameters_csv, write_parameters_mat
 from livebode.export.result import WriteResult
 from livebode.export.universal import write_uff
+from livebode.tables import Table
 
 FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], WriteResult]] = {
     "csv": write_csv,
@@ -26,7 +25,7 @@ FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], W
 }
 """Functions that write responses, by the name of the format."""
 
-TABLES: Mapping[str, Callable[[Path, Iterable[pa.RecordBatch]], WriteResult]] = {
+TABLES: Mapping[str, Callable[[Path, Iterable[Table]], WriteResult]] = {
     "csv": write_parameters_csv,
     "mat": write_parameters_mat,
 }

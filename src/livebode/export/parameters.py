@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
 from livebode.core import OutputError, RecordError
 from livebode.core.installing import needing
-from livebode.export.delimited import begin
+from livebode.export.delimited import write_columns, write_header
 from livebode.export.matlab import VARIABLE
 from livebode.export.result import VALUES_MAX, WriteResult
+from livebode.tables import Table
 
 COLUMNS = ("time_s", "schedule", "name", "value", "sigma", "unit", "model", "status")
-_NUMBERS = ("time_s", "schedule", "value", "sigma")
+_WORDS = ("name", "unit", "model", "status")
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class ParameterTable:
     """
 
     run: Path
-    tables: Callable[[], Iterable[pa.Table]]
+    tables: Callable[[], Iterable[Table]]
 
-    def __iter__(self) -> Iterator[pa.RecordBatch]:
+    def __iter__(self) -> Iterator[Table]:
         any_ = False
         for table in self.tables():
             any_ = True
@@ -47,8 +47,7 @@ class ParameterTable:
                     path=str(self.run),
                     column=missing[0],
                 )
-            schema = pa.schema([(c, pa.float64() if c in _NUMBERS else pa.string()) for c in COLUMNS])
-            yield from table.select(list(COLUMNS)).cast(schema).to_batches()
+            yield table.select(COLUMNS)
         if not any_:
             raise RecordError(
                 "no-parameters",
@@ -58,7 +57,7 @@ class ParameterTable:
             )
 
 
-def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> WriteResult:
+def write_parameters_csv(path: Path, parts: Iterable[Table]) -> WriteResult:
     """Write parameters in long form, part by part, with the names of `COLUMNS`; units have their own column.
 
     Raises
@@ -66,21 +65,22 @@ def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> WriteRe
     RecordError
         If there are none.
     """
-    rows, writer = 0, None
+    rows: int | None = None
     with path.open("wb") as file:
         for part in parts:
-            writer = writer or begin(file, list(COLUMNS), part.schema)
-            writer.write_batch(part)
+            if rows is None:
+                rows = 0
+                write_header(file, COLUMNS)
+            write_columns(file, [part.text(name).to_list() if name in _WORDS else part[name] for name in COLUMNS])
             rows += part.num_rows
-        if writer is None:
+        if rows is None:
             raise RecordError(
                 "no-parameters", "the run has no parameters to export", "run the recording again with a model"
             )
-        writer.close()
     return WriteResult(rows)
 
 
-def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> WriteResult:
+def write_parameters_mat(path: Path, parts: Iterable[Table]) -> WriteResult:
     """Write parameters as a MATLAB struct `livebode` of columns, for `struct2table`; text is in cells.
 
     Raises
@@ -93,7 +93,7 @@ def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> WriteRe
     with needing("SciPy", "analysis", "an export for MATLAB"):
         from scipy.io import savemat
 
-    kept: list[pa.RecordBatch] = []
+    kept: list[Table] = []
     for part in parts:
         kept.append(part)
         if sum(p.num_rows for p in kept) > VALUES_MAX:
@@ -104,14 +104,11 @@ def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> WriteRe
                 format="mat",
                 limit=VALUES_MAX,
             )
-    table = pa.Table.from_batches(kept) if kept else None
+    table = Table.join(kept) if kept else None
     if table is None or not table.num_rows:
         raise RecordError(
             "no-parameters", "the run has no parameters to export", "run the recording again with a model"
         )
-    numbers = {name: table[name].to_numpy()[:, np.newaxis] for name in _NUMBERS}
-    texts = {
-        name: np.array(table[name].to_pylist(), dtype=object)[:, np.newaxis] for name in set(COLUMNS) - set(_NUMBERS)
-    }
-    savemat(path, {VARIABLE: {name: (numbers | texts)[name] for name in COLUMNS}}, appendmat=False, do_compression=True)
+    columns = {name: table.values(name)[:, np.newaxis] for name in COLUMNS}
+    savemat(path, {VARIABLE: columns}, appendmat=False, do_compression=True)
     return WriteResult(table.num_rows)

@@ -178,4 +178,4 @@ def _samples(batches: Sequence[Batch]) -> tuple[pa.Table, dict[str, Any]]:
     columns = [from_numpy(column) for column in (number, time_s, *np.concatenate(parts, axis=1))]
     about = {"epoch": str(first.epoch), "first_sample": int(number[0]), "samples": len(number)}
     missing = int(number[-1] - number[0]) + 1 - len(number)
-    return pa.table(columns, schema=samples_of(first.channels).schema), about | {"missing": missing}
+    return pa.table(columns, schema=pa.schema(samples_of(first.channels).schema)), about | {"missing": missing}

@@ -23,7 +23,7 @@ from livebode.fleet.wide_rows import AxisFits, parameter_table
 from livebode.records.response_table import SCHEMA as RESPONSE_SCHEMA
 from livebode.records.response_table import as_batch
 
-SCHEMA = pa.schema([("axis", pa.string()), ("run", pa.int64()), ("number", pa.int64()), *RESPONSE_SCHEMA])
+SCHEMA = pa.schema([("axis", pa.string()), ("run", pa.int64()), ("number", pa.int64()), *pa.schema(RESPONSE_SCHEMA)])
 """Columns: key of the axis, number in the log of the first message of its run, number of the response within that run,
 and those of responses.parquet, in full precision."""
 
@@ -73,14 +73,14 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> Replay
             axis=axis_path(key),
         )
     parameters = None if axis.fit is None else parameter_table(fits)
-    return ReplayedAxis(pa.Table.from_batches(batches, SCHEMA), parameters)
+    return ReplayedAxis(pa.concat_tables([SCHEMA.empty_table(), *batches]), parameters)
 
 
-def _response_rows(key: str, run: int, number: int, responses: Responses) -> pa.RecordBatch:
+def _response_rows(key: str, run: int, number: int, responses: Responses) -> pa.Table:
     """The responses of an axis's run that begin with this number."""
     numbers = np.repeat(np.arange(number, number + len(responses)), len(responses.lines))
     place = [text([key], np.zeros_like(numbers)), from_numpy(np.full_like(numbers, run)), from_numpy(numbers)]
-    return pa.RecordBatch.from_arrays([*place, *as_batch(responses).columns], schema=SCHEMA)
+    return pa.Table.from_arrays([*place, *pa.table(as_batch(responses)).columns], schema=SCHEMA)
 
 
 def write_replayed(found: ReplayedAxis, path: Path) -> dict[Path, int]:

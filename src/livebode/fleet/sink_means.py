@@ -15,6 +15,7 @@ from livebode.fitting import RunningMean
 from livebode.fleet.sink_rows import US, RunKey, RunPart, SinkRows, mean_place
 from livebode.lake import PARAMETER_MEANS, RESPONSE_MEANS
 from livebode.records.wide_responses import from_wide, to_wide
+from livebode.tables import Table
 
 MINUTE_S, HOUR_S = 60, 3600
 _LATE_S = 5.0
@@ -113,7 +114,7 @@ class MeanTier:
                 group.add(rows)
         for part in message.parameters:
             for key, rows in self._periods(part, counted=counted):
-                self._parameters.setdefault(key, FittedQuantities()).add(rows)
+                self._parameters.setdefault(key, FittedQuantities()).add(Table.from_arrow(rows))
         return found
 
     def _periods(self, part: RunPart, *, counted: bool) -> Iterator[tuple[PeriodKey, pa.Table]]:

@@ -34,7 +34,7 @@ ROWS = pa.schema([*_PLACE, ("digest", pa.int64()), *_WIDE])
 """A row for each response: key of the axis; number in the log of the first message of its run; number of the response
 within that run; digest of all its bits in full precision; and the columns of `wide_schema`, as lists of any length,
 since the axes of a partition have different lines. `from_wide` reads those of one axis."""
-PARAMETERS = pa.schema([*_PLACE, *PARAMETER_SCHEMA])
+PARAMETERS = pa.schema([*_PLACE, *pa.schema(PARAMETER_SCHEMA)])
 """A row for each parameter, derived quantity and margin of a fitted response, which has this number; the other columns
 are those of parameters.parquet."""
 
@@ -117,8 +117,8 @@ def parameter_table(parts: Sequence[AxisFits]) -> pa.Table:
             from_numpy(np.repeat([part.run for part in members], counts)),
             from_numpy(np.repeat(np.concatenate([part.numbers for part in members]), width)),
         ]
-        batches.append(pa.RecordBatch.from_arrays([*place, *parameter_rows(every).columns], schema=PARAMETERS))
-    return pa.Table.from_batches(batches, PARAMETERS).combine_chunks()
+        batches.append(pa.Table.from_arrays([*place, *pa.table(parameter_rows(every)).columns], schema=PARAMETERS))
+    return pa.concat_tables([PARAMETERS.empty_table(), *batches]).combine_chunks()
 
 
 def digests(responses: Responses) -> NDArray[np.int64]:

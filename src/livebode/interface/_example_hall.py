@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
+from livebode.core.installing import needing
 from livebode.core.machine_levels import LEVELS
 from livebode.version import __version__
 
@@ -77,8 +77,10 @@ def write_hall(path: Path) -> None:
     Raises
     ------
     ExtraError
-        If deltalake is not installed.
+        If PyArrow or deltalake is not installed.
     """
+    with needing("PyArrow", "archive", "a lake"):
+        import pyarrow as pa
     from livebode.lake import TABLES, Lake
 
     lake = Lake(str(path))

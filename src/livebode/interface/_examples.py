@@ -5,9 +5,6 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from livebode.configuration import Axis
 from livebode.core import Lines, Responses
 from livebode.estimation import Settings, Tracker
@@ -15,6 +12,8 @@ from livebode.excitation import multisine
 from livebode.interface._run import Run
 from livebode.runtime import Destination, run
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
+from livebode.tables import Table
+from livebode.tables.parquet_writer import write_parquet
 
 _RATE_HZ, _WINDOW, _HOP = 4000.0, 400, 100
 _RUN_IN_S = 0.5  # until the response to the excitation repeats
@@ -116,6 +115,6 @@ def example_run(directory: str | PathLike[str], seconds: float = 1.0) -> Run:
     log = place.with_name(f"{place.name}.parquet")
     block, _ = example_axis(seconds).run()
     names = {f"{channel.name} [{channel.unit}]": channel.name for channel in block.channels}
-    pq.write_table(pa.table({column: block[name] for column, name in names.items()}), log)
+    write_parquet(log, Table.of({column: block[name] for column, name in names.items()}))
     axis = Axis.of(_CONFIGURATION | {"source": {"log": str(log), "rate_hz": _RATE_HZ}}, "the example")
     return Run(run(axis, Destination(place, lambda *_: None)).directory)

@@ -8,8 +8,6 @@ from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
-import pyarrow as pa
-
 from livebode.analysis.averaged import Averaged, averaged
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import loop_report
@@ -24,6 +22,7 @@ from livebode.fitting import Fit
 from livebode.locations import Url, local_copy, location, shared_copy
 from livebode.margins import Margins
 from livebode.records import PARAMETERS, RunRecord
+from livebode.tables import Table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -102,13 +101,15 @@ class Run:
         return self._record.events()
 
     @cached_property
-    def parameters(self) -> pa.Table:
+    def parameters(self) -> Table:
         """Parameters and margins that were fitted during the run, a row for each time and name; empty without [fit].
 
-        A pyarrow Table with the columns ``time_s``, ``schedule``, ``model``, ``name``, ``value``, ``sigma``, ``unit``,
-        ``status`` and others; ``run.parameters.to_pandas()`` is a DataFrame.
+        A table with the columns ``time_s``, ``schedule``, ``model``, ``name``, ``value``, ``sigma``, ``unit``,
+        ``status`` and others: ``run.parameters["value"]`` is an array, ``run.parameters.text("name")`` its words, and
+        ``polars.DataFrame(run.parameters)`` or ``pyarrow.table(run.parameters).to_pandas()`` a DataFrame.
         """
-        return pa.concat_tables([PARAMETERS.schema.empty_table(), *self._record.tables("parameters")])
+        parts = self._record.tables("parameters")
+        return Table.join([Table.empty(PARAMETERS.schema), *parts])
 
     @cached_property
     def _averaged(self) -> Averaged:

@@ -14,16 +14,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
-import pyarrow.parquet as pq
 
 from livebode.core import Block, Lines, OutputError
 from livebode.core.files import whole_directory, whole_files
 from livebode.core.writing import writing
 from livebode.excitation import chirp, multisine
+from livebode.export.delimited import write_columns, write_header
 from livebode.interface._example_hall import write_hall
 from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Standstill, Strokes, TensionLoss
+from livebode.tables import Table
+from livebode.tables.parquet_writer import write_parquet
 
 _RATE_HZ, _WINDOW = 4000.0, 400
 _SENSOR = Sensor(noise_rad_per_s=0.1)
@@ -42,7 +42,7 @@ class Example:
     """
 
     about: str
-    recordings: dict[str, Callable[[], pa.Table]]
+    recordings: dict[str, Callable[[], Table]]
     configurations: tuple[str, ...]
     commands: tuple[str, ...]
     lakes: dict[str, Callable[[Path], None]] = field(default_factory=dict)
@@ -54,50 +54,50 @@ class Example:
     @property
     def usable(self) -> bool:
         """Whether the packages that write it are installed."""
-        return not self.lakes or find_spec("deltalake") is not None
+        return not self.lakes or all(map(find_spec, ("deltalake", "pyarrow")))
 
 
-def _simulated(names: tuple[str, ...], **settings: Any) -> Callable[[], pa.Table]:
-    def simulate() -> pa.Table:
+def _simulated(names: tuple[str, ...], **settings: Any) -> Callable[[], Table]:
+    def simulate() -> Table:
         block, _ = SimulatedAxis(BeltAxis(sensor=_SENSOR, **settings)).run()
         return _table(block, names)
 
     return simulate
 
 
-def _table(block: Block, names: tuple[str, ...]) -> pa.Table:
+def _table(block: Block, names: tuple[str, ...]) -> Table:
     units = {channel.name: channel.unit for channel in block.channels}
     columns = {f"{name} [{units[name]}]": block[name] for name in names}
-    return pa.table({"t [s]": np.arange(len(block)) / block.rate_hz} | columns)
+    return Table.of({"t [s]": np.arange(len(block)) / block.rate_hz} | columns)
 
 
 def _multisine(frequencies: str, amplitude_n_m: float = 1.0) -> np.ndarray:
     return multisine(Lines.parse(frequencies, _RATE_HZ, _WINDOW), amplitude_n_m)
 
 
-def _standstill(seed: int, seconds: float = 2.0) -> Callable[[], pa.Table]:
+def _standstill(seed: int, seconds: float = 2.0) -> Callable[[], Table]:
     period = _multisine("20:140:10", 0.5)
     return _simulated(_SIGNALS, motion=_HELD, excitation_n_m=period, seconds=seconds, run_in_s=0.5, seed=seed)
 
 
-def _moving(seed: int, seconds: float, *faults: TensionLoss) -> Callable[[], pa.Table]:
+def _moving(seed: int, seconds: float, *faults: TensionLoss) -> Callable[[], Table]:
     period = _multisine("20:140:20")
     return _simulated(
         (*_SIGNALS, "x"), motion=_STROKES, excitation_n_m=period, faults=faults, seconds=seconds, seed=seed
     )
 
 
-def _single_chirp() -> pa.Table:
+def _single_chirp() -> Table:
     period = chirp(10, 200, _RATE_HZ, 3 * int(_RATE_HZ), 2.0)
     return _simulated(_SIGNALS, motion=_HELD, excitation_n_m=period, seconds=3.0, seed=6)()
 
 
-def _quiet() -> pa.Table:
+def _quiet() -> Table:
     """An axis at standstill without excitation; the measured torque has a hum."""
     block, _ = SimulatedAxis(BeltAxis(sensor=_SENSOR, motion=_HELD, seconds=3.0, seed=7)).run()
     table = _table(block, ("u", "velocity"))
     hum = _HUM_N_M * np.sin(2 * np.pi * _HUM_HZ * np.arange(len(block)) / block.rate_hz)
-    return table.set_column(1, table.column_names[1], pa.array(block["u"] + hum))
+    return Table.of(dict(zip(table.column_names, table.columns)) | {table.column_names[1]: block["u"] + hum})
 
 
 EXAMPLES = {
@@ -234,12 +234,18 @@ def _lake(path: Path, write: Callable[[Path], None], force: bool) -> Path:
 def _write(example: Example, folder: Path) -> None:
     for name, simulate in example.recordings.items():
         if name.endswith(".csv"):
-            pyarrow.csv.write_csv(simulate(), folder / name)
+            _write_csv(folder / name, simulate())
         else:
-            pq.write_table(simulate(), folder / name)
+            write_parquet(folder / name, simulate())
     for name in example.configurations:
         text = (resources.files("livebode.interface") / "example_files" / name).read_text("utf-8")
         (folder / name).write_text(text, encoding="utf-8", newline="\n")
+
+
+def _write_csv(path: Path, table: Table) -> None:
+    with path.open("wb") as file:
+        write_header(file, table.column_names)
+        write_columns(file, [table[name] for name in table.column_names])
 
 
 def _check(path: Path, written: Path, force: bool) -> None:

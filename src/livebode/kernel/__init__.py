@@ -1,7 +1,7 @@
 """The sliding DFT, the line stage, the verdicts on lines and the fit in C, and their NumPy twins, the definitions.
 
 The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.estimation.repeating_twin`,
-`livebode.kernel.fit_twin` and `livebode.kernel.belt_twin`.
+`livebode.kernel.fit_twin`, `livebode.kernel.belt_twin` and `livebode.kernel.runs_twin`.
 """
 
 from livebode.kernel._belt import (
@@ -67,8 +67,10 @@ from livebode.kernel._repeating import (
     Tones,
     judge_periods,
 )
+from livebode.kernel._runs import decode_runs
 from livebode.kernel._sizes import largest_sizes
 from livebode.kernel._sliding import SlidingDFT
+from livebode.kernel._table import MOMENT, NO_MOMENT, NUMBER, SKIPPED, TableLayout, Words, read_rows, write_rows
 
 __all__ = [
     "ADDED",
@@ -76,15 +78,19 @@ __all__ = [
     "INSTRUCTION_SET_VARIABLE",
     "JUDGED",
     "MEANS",
+    "MOMENT",
     "NEWS",
     "NEWS_GONE",
     "NEWS_INVALID",
     "NOISE_LARGER",
     "NOISE_MOVING",
     "NOISE_SCATTER",
+    "NO_MOMENT",
+    "NUMBER",
     "REASONS",
     "RIGID",
     "SCATTER",
+    "SKIPPED",
     "TWO_MASS",
     "TWO_MASS_GAIN",
     "BeltCourse",
@@ -112,8 +118,10 @@ __all__ = [
     "RepeatingPlan",
     "RepeatingSettings",
     "SlidingDFT",
+    "TableLayout",
     "Tones",
     "WeightSums",
+    "Words",
     "belt_each",
     "belt_replay",
     "belt_response",
@@ -121,6 +129,7 @@ __all__ = [
     "chosen_instruction_set",
     "curve_at",
     "curve_splines",
+    "decode_runs",
     "fft_is_cheaper",
     "fit",
     "fit_epsilon",
@@ -132,4 +141,6 @@ __all__ = [
     "largest_sizes",
     "process_each",
     "process_lines",
+    "read_rows",
+    "write_rows",
 ]

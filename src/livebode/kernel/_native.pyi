@@ -5,6 +5,23 @@ import numpy.typing as npt
 
 Phase = Literal["window", "fixed"]
 
+def read_rows(
+    powers: npt.NDArray[np.uint64],
+    layout: tuple[Any, ...],
+    text: bytes,
+    begin: int,
+    out: npt.NDArray[np.float64],
+    filled: int,
+    /,
+) -> tuple[int, int]: ...
+def write_rows(
+    powers: npt.NDArray[np.uint64],
+    columns: tuple[Any, ...],
+    words: tuple[bytes, bytes, npt.NDArray[np.int64]],
+    out: npt.NDArray[np.uint8],
+    /,
+) -> int: ...
+def decode_runs(data: bytes | memoryview, width: int, out: npt.NDArray[np.uint32], /) -> bool: ...
 def best_instruction_set() -> int: ...
 def process_lines(
     settings: tuple[Any, ...], moments: tuple[Any, ...], windows: tuple[Any, ...], out: tuple[Any, ...], /

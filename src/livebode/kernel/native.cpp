@@ -16,6 +16,7 @@
 #include "native_fit.h"
 #include "native_lines.h"
 #include "native_repeating.h"
+#include "native_table.h"
 
 namespace nb = nanobind;
 
@@ -358,6 +359,7 @@ NB_MODULE(_native, m)
     bind_fit(m);
     bind_repeating(m);
     bind_belt(m);
+    bind_table(m);
     nb::class_<Engine>(m, "Engine")
         .def(nb::init<uint32_t, const std::vector<uint32_t> &, uint32_t, bool, int, double, int>())
         .def_prop_ro("window", &Engine::window)

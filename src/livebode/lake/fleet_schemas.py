@@ -37,9 +37,7 @@ FLEET_RUNS = pa.schema(
 FLEET_RESPONSES = pa.schema([*_RUN, ("number", pa.int64()), ("logged", TIME), *_WIDE])
 """One row for each response, in wide form; its number counts from the beginning of the run."""
 
-FLEET_PARAMETERS = pa.schema(
-    [*_RUN, ("number", pa.int64()), ("logged", TIME), *((one.name, one.type) for one in parameter_table.SCHEMA)]
-)
+FLEET_PARAMETERS = pa.schema([*_RUN, ("number", pa.int64()), ("logged", TIME), *pa.schema(parameter_table.SCHEMA)])
 """One row for each parameter of a fitted response, which has this number."""
 
 FLEET_EVENTS = pa.schema(

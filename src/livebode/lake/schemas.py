@@ -71,7 +71,7 @@ QUANTITIES = pa.schema(
 RESPONSES = pa.schema([*_KEY, *((field.name, in_delta(field.type)) for field in wide_schema(1))])
 """One row for each response, in wide form; the lists have a value for each of the run's frequencies_hz."""
 
-PARAMETERS = pa.schema([*_KEY, *((field.name, field.type) for field in parameter_table.SCHEMA)])
+PARAMETERS = pa.schema([*_KEY, *((field.name, field.type) for field in pa.schema(parameter_table.SCHEMA))])
 """As parameters.parquet of a run."""
 
 EVENTS = pa.schema(

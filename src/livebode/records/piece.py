@@ -7,13 +7,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from livebode.core import Event, RecordError
 from livebode.records.inside import open_read
 from livebode.records.parquet_part import ParquetPart, sha256_of_next
 from livebode.records.segments.damage import KIND
+from livebode.tables import Table
+from livebode.tables.parquet_file import ParquetFile
 
 _verified: dict[tuple[object, ...], list[bool]] = {}
 
@@ -61,14 +60,13 @@ class StoredTable:
             begin += part.rows
         return [number for number, sound in enumerate(whole[:-1]) if sound]
 
-    def batches(self, rows: int) -> Iterator[pa.RecordBatch]:
+    def tables(self, rows: int) -> Iterator[Table]:
         """The intact rows, in parts of at most so many."""
         groups = self.groups()
         if groups == []:
             return
-        # Otherwise the read-ahead data of a long run remains in memory until its end.
-        with pq.ParquetFile(self._run / self._name, pre_buffer=False) as file:
-            yield from file.iter_batches(rows, row_groups=groups)
+        with open_read(self._run, self._name) as file:
+            yield from ParquetFile(file).tables(rows, groups)
 
     def _whole(self, file: BinaryIO, parts: list[ParquetPart]) -> list[bool]:
         """Whether each part is intact; computed once per process, as long as the file is unchanged."""

@@ -7,18 +7,19 @@ from dataclasses import asdict, dataclass
 from math import nan
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.dataset as ds
-from pyarrow.fs import LocalFileSystem
-
 from livebode.core import Event, UsageError
 from livebode.core.clock import RunClock, moment, moments_by
-from livebode.core.installing import not_installed
+from livebode.core.installing import needing, not_installed
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, RunRecord
 from livebode.records.segments.manifest import TIERS
 from livebode.records.segments.verified_files import segment_groups
+
+with needing("PyArrow", "query", "a query"):
+    import pyarrow as pa
+    import pyarrow.dataset as ds
+    from pyarrow.fs import LocalFileSystem
 
 _TABLES = ("responses", "parameters", "samples", *TIERS)
 _SINGLE_EVENTS = pa.schema(
@@ -181,7 +182,7 @@ def _parts_of(run: RunRecord, tables: list[str], damages: list[Event]) -> dict[s
     for table in tables:
         groups = segment_groups(run.path, [one for one in segments if one.table == table], damages)
         found[table] = [_Part(group.rows, group.first_s, group.last_s) for group in groups]
-        found[table] += [_Part(pa.Table.from_batches([batch])) for batch in rows.get(table, ())]
+        found[table] += [_Part(pa.table(batch)) for batch in rows.get(table, ())]
     return {table: parts for table, parts in found.items() if parts}
 
 

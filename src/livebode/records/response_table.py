@@ -6,31 +6,28 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
-from livebode.arrow import from_numpy, to_numpy
 from livebode.core import PER_LINE, PER_RESPONSE, Lines, Responses
 from livebode.records.table_file import ColumnTable
+from livebode.tables import Schema, Table
 
-SCHEMA = pa.schema(
-    [
-        ("first", pa.int64()),
-        ("sample", pa.int64()),
-        ("time_s", pa.float64()),
-        ("schedule", pa.float64()),
-        ("frequency_hz", pa.float64()),
-        ("re", pa.float64()),
-        ("im", pa.float64()),
-        ("sigma", pa.float64()),
-        ("dof", pa.float64()),
-        ("coherence", pa.float64()),
-        ("valid", pa.bool_()),
-        ("input_coherence", pa.float64()),
-        ("weight_re", pa.float64()),
-        ("weight_im", pa.float64()),
-        ("distortion", pa.float64()),
-        ("ready", pa.bool_()),
-    ]
+SCHEMA = Schema.of(
+    first="int64",
+    sample="int64",
+    time_s="float64",
+    schedule="float64",
+    frequency_hz="float64",
+    re="float64",
+    im="float64",
+    sigma="float64",
+    dof="float64",
+    coherence="float64",
+    valid="bool",
+    input_coherence="float64",
+    weight_re="float64",
+    weight_im="float64",
+    distortion="float64",
+    ready="bool",
 )
 """Columns: oldest and newest sample of the window, time of its centre (s), scheduling signal there, line (Hz), complex
 response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
@@ -42,7 +39,7 @@ EARLIER = SCHEMA.names[:-1]
 RESPONSES = ColumnTable(SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
 
 
-def as_batch(responses: Responses) -> pa.RecordBatch:
+def as_batch(responses: Responses) -> Table:
     """The responses in long form, lines within a response in ascending order."""
     rows, lines = responses.value.shape
     per_row = [np.repeat(x, lines) for x in (responses.first, responses.sample, responses.time_s, responses.schedule)]
@@ -63,14 +60,14 @@ def as_batch(responses: Responses) -> pa.RecordBatch:
         responses.distortion.ravel(),
         np.repeat(responses.ready, lines),
     ]
-    return pa.record_batch([from_numpy(c) for c in columns], schema=SCHEMA)
+    return Table(SCHEMA, tuple(columns))
 
 
-def responses_in(table: pa.Table, lines: Lines, found: Mapping[str, Any]) -> Responses:
+def responses_in(table: Table, lines: Lines, found: Mapping[str, Any]) -> Responses:
     """The responses in complete rows of this table; `found` of run.json has quantity and unit."""
     shape = table.num_rows // len(lines), len(lines)
     names = [name for name in SCHEMA.names if name in table.column_names]
-    column: dict[str, Any] = {name: to_numpy(table[name].combine_chunks()).reshape(shape) for name in names}
+    column: dict[str, Any] = {name: table[name].reshape(shape) for name in names}
     value = np.empty(shape, dtype=np.complex128)
     value.real, value.imag = column["re"], column["im"]
     per_line = {name: column[name] for name in PER_LINE if name in column}

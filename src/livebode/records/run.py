@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from livebode.core import (
     DamageWarning,
@@ -36,6 +35,7 @@ from livebode.records.segments.damage import KIND
 from livebode.records.segments.manifest import Manifest, Segment
 from livebode.records.summary_file import RUN, read_summary
 from livebode.records.summary_shape import what_is_wrong
+from livebode.tables import Table
 
 _logger = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of responses at once, times their lines: about 10 MB
@@ -47,7 +47,7 @@ class Files:
 
     paths: list[Path]
     groups: list[int] | None
-    rows: list[pa.RecordBatch]
+    rows: list[Table]
 
 
 def lines_in(found: Mapping[str, Any]) -> Lines:
@@ -181,7 +181,7 @@ class RunRecord:
 
     def responses(self) -> Responses:
         """All responses, as written; an empty batch before the first."""
-        return Responses.join(list(self.batches()) or [responses_in(SCHEMA.empty_table(), self.lines, self.found)])
+        return Responses.join(list(self.batches()) or [responses_in(Table.empty(SCHEMA), self.lines, self.found)])
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
         """All readable responses in order, in parts of bounded size; or the newest, from files up to this size."""
@@ -200,9 +200,9 @@ class RunRecord:
             if len(within := part.between(from_s, to_s)):
                 yield within
 
-    def _in_parts(self, tables: Iterator[pa.Table]) -> Iterator[Responses]:
+    def _in_parts(self, tables: Iterator[Table]) -> Iterator[Responses]:
         lines = self.lines
-        rest: pa.Table | None = None
+        rest: Table | None = None
         for part in tables:
             if part.schema.names not in (SCHEMA.names, EARLIER):
                 raise RecordError(
@@ -214,7 +214,7 @@ class RunRecord:
                 )
             for start in range(0, part.num_rows, _ROWS):
                 piece = part.slice(start, _ROWS)
-                table = piece if rest is None else pa.concat_tables([rest, piece])
+                table = piece if rest is None else Table.join([rest, piece])
                 whole = table.num_rows // len(lines) * len(lines)
                 rest = table.slice(whole)
                 if whole:
@@ -229,7 +229,7 @@ class RunRecord:
 
     def tables(
         self, name: str, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
-    ) -> Iterator[pa.Table]:
+    ) -> Iterator[Table]:
         """The rows of "responses", "parameters" or "samples" in order, part by part; none if it was not recorded.
 
         With `span_s`, segments completely outside of that time are skipped.
@@ -245,8 +245,10 @@ class RunRecord:
             if reading.in_segments(self.path):
                 yield from reading.tables(self.path, name, self.report, size_bytes_max, span_s, finished=self.finished)
             elif (piece := self._piece(name)) is not None:
-                yield from (pa.Table.from_batches([batch]) for batch in piece.batches(_ROWS))
-        except (OSError, pa.ArrowException, KeyError, TypeError) as error:
+                yield from piece.tables(_ROWS)
+        except LivebodeError:  # it is a ValueError
+            raise
+        except (OSError, ValueError, KeyError, TypeError) as error:
             raise _unreadable(file, error) from None
 
     def _piece(self, name: str) -> StoredTable | None:
@@ -275,7 +277,7 @@ class RunRecord:
             for segment in segments:
                 if segment.table in found and reading.whole(self.path, segment, self.report) is not None:
                     found[segment.table].paths.append(self.path / segment.name)
-        except (OSError, pa.ArrowException) as error:
+        except OSError as error:
             raise _unreadable(self.path, error) from None
         return {name: files for name, files in found.items() if files.paths or files.rows}
 
@@ -284,7 +286,7 @@ class RunRecord:
         try:
             if reading.in_segments(self.path):
                 return reading.parts(self.path, self.report, finished=self.finished)
-        except (OSError, pa.ArrowException) as error:
+        except OSError as error:
             raise _unreadable(self.path, error) from None
         return None
 

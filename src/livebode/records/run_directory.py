@@ -9,8 +9,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-
 from livebode.core import Event, Parameters, RecordError, Responses
 from livebode.core.files import whole_directory
 from livebode.core.writing import writing
@@ -68,7 +66,7 @@ class RunDirectory:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         with writing(self.path, RecordError):
             if error is not None:
-                with contextlib.suppress(OSError, pa.ArrowException):  # the closed files are removed below
+                with contextlib.suppress(OSError, ValueError):  # the closed files are removed below
                     self._close()
                 self._place.__exit__(kind, error, error.__traceback__)
                 if isinstance(error, OSError):

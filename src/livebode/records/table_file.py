@@ -9,10 +9,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from livebode.records.parquet_part import ParquetPart, sha256_of_next
+from livebode.tables import Schema, Table
+from livebode.tables.parquet_writer import ParquetWriter
 
 _GROUP_ROWS = 1 << 15  # two groups at a time are in memory: one fills, one is written
 
@@ -25,7 +24,7 @@ class ColumnTable:
     do.
     """
 
-    schema: pa.Schema
+    schema: Schema
     repeating: tuple[str, ...] = ()
 
 
@@ -49,15 +48,16 @@ class TableFile:
     """
 
     def __init__(self, path: Path, table: ColumnTable) -> None:
-        self._path, self._schema = path, table.schema
-        self._file = pq.ParquetWriter(path, table.schema, use_dictionary=list(table.repeating), compression="lz4")
-        self._waiting: list[pa.RecordBatch] = []
+        self._path = path
+        self._file = path.open("wb")
+        self._writer = ParquetWriter(self._file, table.schema, table.repeating)
+        self._waiting: list[Table] = []
         self._rows = 0
         self._parts: list[ParquetPart] = []
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="table")
         self._group: Future[None] | None = None
 
-    def write(self, rows: pa.RecordBatch) -> None:
+    def write(self, rows: Table) -> None:
         if not rows.num_rows:
             return
         self._waiting.append(rows)
@@ -67,12 +67,13 @@ class TableFile:
 
     def close(self) -> list[dict[str, Any]]:
         """Complete the file, and return its parts, for run.json; again: the same."""
-        with contextlib.ExitStack() as ends:
-            ends.callback(self._thread.shutdown)
-            ends.callback(self._file.close)
-            self._flush()
-            self._await_group()
-        if sum(part.size_bytes for part in self._parts) < self._path.stat().st_size:
+        if not self._file.closed:
+            with contextlib.ExitStack() as ends:
+                ends.callback(self._thread.shutdown)
+                ends.callback(self._file.close)
+                self._flush()
+                self._await_group()
+                self._writer.close()
             self._add_part(0)
         return [asdict(part) for part in self._parts]
 
@@ -88,13 +89,14 @@ class TableFile:
         if group is not None:
             group.result()
 
-    def _write(self, waiting: list[pa.RecordBatch], rows: int) -> None:
+    def _write(self, waiting: list[Table], rows: int) -> None:
         # One group, so that it ends with a complete response: a damaged one is skipped without cutting the next.
-        self._file.write_table(pa.Table.from_batches(waiting, self._schema), row_group_size=rows)
+        self._writer.write(Table.join(waiting))
+        self._file.flush()
         self._add_part(rows)
 
     def _add_part(self, rows: int) -> None:
-        """The bytes since the last part; what Arrow has written is in the file at once."""
+        """The bytes since the last part, as they are in the file."""
         with self._path.open("rb") as file:
             file.seek(sum(part.size_bytes for part in self._parts))
             size = os.fstat(file.fileno()).st_size - file.tell()

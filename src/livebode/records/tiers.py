@@ -6,20 +6,19 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
-from livebode.arrow import from_numpy, to_numpy
 from livebode.core import Lines, Responses
 from livebode.fitting import BinnedMeans, binned_means, combined
 from livebode.records.response_table import SCHEMA, as_batch, responses_in
 from livebode.records.run import RunRecord, lines_in
 from livebode.records.segments import reading
 from livebode.records.segments.manifest import TIERS, Segment
+from livebode.tables import Field, Schema, Table
 
 BIN_S = dict(zip(TIERS, (1.0, 60.0, 3600.0)))
 """The tables and the spans of their means."""
 
-TIER_SCHEMA = pa.schema([*SCHEMA, ("count", pa.int64()), ("windows", pa.float64()), ("responses", pa.int64())])
+TIER_SCHEMA = Schema((*SCHEMA, Field("count", "int64"), Field("windows", "float64"), Field("responses", "int64")))
 """Columns: those of the responses, and number of the responses in the mean at the line, of windows without overlap
 with the same information, and of all responses of the span."""
 
@@ -40,7 +39,7 @@ class Thinning:
         hop_s = found.get("hop", self._lines.window) / self._lines.rate_hz
         self._bins = {table: bin_s for table, bin_s in BIN_S.items() if bin_s >= _FEWER * hop_s}
 
-    def tables(self, rows: Mapping[str, pa.Table]) -> dict[str, pa.Table]:
+    def tables(self, rows: Mapping[str, Table]) -> dict[str, Table]:
         """The rows of each tier for the rows of a journal; none if damage cut its responses."""
         responses = rows.get("responses")
         if responses is None or not responses.num_rows or responses.num_rows % len(self._lines):
@@ -68,10 +67,10 @@ def thinned(run: RunRecord, bin_s: float, span_s: tuple[float, float] | None = N
     means: list[BinnedMeans] = []
     for segment in [one for one in (*before, *tier) if _within(one, span_s)]:
         if (file := reading.whole(run.path, segment, run.report)) is not None:
-            table = file.read(use_threads=False)
+            table = file.table()
             means.append(_means_of(table, lines, found, None if segment.table in BIN_S else bin_s))
     if "responses" in rows:
-        means.append(_means_of(pa.Table.from_batches(rows["responses"]), lines, found, bin_s))
+        means.append(_means_of(Table.join(rows["responses"]), lines, found, bin_s))
     if not means:
         return None
     whole = combined(BinnedMeans.join(means), bin_s).means
@@ -82,20 +81,18 @@ def _within(segment: Segment, span_s: tuple[float, float] | None) -> bool:
     return span_s is None or (segment.first_s <= span_s[1] and segment.last_s >= span_s[0])
 
 
-def _rows_of(means: BinnedMeans) -> pa.Table:
+def _rows_of(means: BinnedMeans) -> Table:
     columns = as_batch(means.means).columns
     lines = len(means.means.lines)
     more = means.count.ravel(), means.windows.ravel(), np.repeat(means.responses, lines)
-    return pa.Table.from_arrays([*columns, *(from_numpy(column) for column in more)], schema=TIER_SCHEMA)
+    return Table(TIER_SCHEMA, (*columns, *more))
 
 
-def _means_of(table: pa.Table, lines: Lines, found: Mapping[str, Any], bin_s: float | None) -> BinnedMeans:
+def _means_of(table: Table, lines: Lines, found: Mapping[str, Any], bin_s: float | None) -> BinnedMeans:
     """The means in rows of a tier, or with `bin_s` those of full responses."""
     means = responses_in(table, lines, found)
     if bin_s is not None:
         return binned_means(means, bin_s)
     shape = means.value.shape
-    count, windows, responses = (
-        to_numpy(table[name].combine_chunks()).reshape(shape) for name in ("count", "windows", "responses")
-    )
+    count, windows, responses = (table[name].reshape(shape) for name in ("count", "windows", "responses"))
     return BinnedMeans(means, count, windows, responses[:, 0])

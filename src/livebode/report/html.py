@@ -5,7 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from html import escape
 
-from livebode.core.document import Document, Finding, Listing, Paragraph, Part, Picture, Section, Table
+from livebode.core.document import Document, Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
 from livebode.language import current_language, recognised
 from livebode.report.page_style import STYLE_SHEET
 from livebode.report.svg import pictures_svg, themed_svg
@@ -109,7 +109,7 @@ def _text(text: str) -> str:
     return escape(readable(text))
 
 
-def _table(table: Table) -> str:
+def _table(table: PrintedTable) -> str:
     def cell(tag: str, column: int, text: str) -> str:
         kind = ' class="number"' if column in table.numbers else ""
         tag = tag if text else "td"  # a heading without words is announced as one

@@ -15,7 +15,7 @@ from typing import Any
 import typst
 
 from livebode.core import OutputError
-from livebode.core.document import Document, Finding, Listing, Paragraph, Part, Picture, Section, Table
+from livebode.core.document import Document, Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
 from livebode.language import current_language, recognised
 from livebode.report.html import readable
 from livebode.report.page_style import TONE_COLOURS
@@ -142,7 +142,7 @@ def _heading(text: str) -> str:
 _PAPERS = {"a4": "a4", "letter": "us-letter"}
 
 
-def _widths(table: Table) -> list[int]:
+def _widths(table: PrintedTable) -> list[int]:
     """Shares of the page for the columns; 0 for a column that is as wide as its text, beside one with long texts."""
     every = [table.headings, *table.rows]
     letters = [max(columns(texts[i]) for texts in every) for i in range(len(table.headings))]

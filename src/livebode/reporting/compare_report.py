@@ -17,7 +17,7 @@ from livebode.analysis.changes import Changes, QuantityChange, changes, percent
 from livebode.analysis.difference import ALPHA, Compared, Difference, compare
 from livebode.configuration.recorded import recorded_configuration, recorded_report
 from livebode.configuration.report_section import ReportSection
-from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
+from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, PrintedTable, Section
 from livebode.language import marked, number, recognised, tr, trn
 from livebode.records import RunRecord
 from livebode.records.grouped_events import event_counts
@@ -189,7 +189,7 @@ class Comparison:
             "Hz", tr("before dB"), "±", tr("after dB"), "±", tr("ratio dB"), "±", tr("ratio °"), "±",
             tr("detectable %"), "p", tr("differs"),
         )  # fmt: skip
-        table = Table(headings, tuple(shown), tuple(range(11)), note)
+        table = PrintedTable(headings, tuple(shown), tuple(range(11)), note)
         return Section(tr("Frequency response"), (table,))
 
     def _places(self) -> Section | None:
@@ -221,7 +221,7 @@ class Comparison:
             )
             headings = (tr("place"), tr("direction"), "Hz", tr("ratio dB"), "±", tr("ratio °"), "±", "p")
             shown = tuple(found[:_PLACES_SHOWN])
-            parts.append(Table(headings, shown, tuple(range(2, 8)), note if left_out > 0 else ""))
+            parts.append(PrintedTable(headings, shown, tuple(range(2, 8)), note if left_out > 0 else ""))
         return Section(tr("By place"), tuple(parts))
 
     def _parameters(self) -> Section | None:
@@ -242,14 +242,14 @@ class Comparison:
                     "± of before and after covers 95 % each; ± of the change covers the whole table together "
                     "(Bonferroni)."
                 )
-                parts.append(Table(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8, 9), note))
+                parts.append(PrintedTable(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8, 9), note))
         return Section(tr("Parameters and margins"), tuple(parts))
 
     def _events(self) -> Section:
         counts = [sum(map(event_counts, run.each_event_and_damage()), Counter[str]()) for run in self.found.runs]
         kinds = sorted(counts[0].keys() | counts[1].keys())
         rows = tuple((recognised(kind), *(number(count[kind], ",") for count in counts)) for kind in kinds)
-        parts: list[Part] = [Table((tr("kind"), tr("before"), tr("after")), rows, (1, 2))] if rows else []
+        parts: list[Part] = [PrintedTable((tr("kind"), tr("before"), tr("after")), rows, (1, 2))] if rows else []
         for run, when in zip(self.found.runs, (tr("Before"), tr("After"))):
             monitoring = run.summary.get("monitoring", {})
             judged = monitoring.get("baseline") is not None and "message" in monitoring
@@ -274,7 +274,7 @@ def _settings(before: RunRecord, after: RunRecord) -> Section:
     rows = tuple((*key, _of(one, key), _of(other, key)) for key in sorted({line[:1] for line in one ^ other}))
     if not rows:
         return Section(tr("Settings"), (Paragraph(tr("Both runs have the same settings.")),))
-    return Section(tr("Settings that differ"), (Table((tr("setting"), tr("before"), tr("after")), rows),))
+    return Section(tr("Settings that differ"), (PrintedTable((tr("setting"), tr("before"), tr("after")), rows),))
 
 
 def _flat(values: dict[str, Any], path: str = "") -> list[tuple[str, str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from livebode.core.document import Paragraph, Part, Section, Table
+from livebode.core.document import Paragraph, Part, PrintedTable, Section
 from livebode.language import marked, number, recognised, tr
 from livebode.reporting.report_data import ReportData
 
@@ -39,7 +39,7 @@ def _between(of: ReportData, between: dict[str, Any]) -> list[Part]:
     return [Paragraph(words), _standard_deviations(of, between)]
 
 
-def _standard_deviations(of: ReportData, between: dict[str, Any]) -> Table:
+def _standard_deviations(of: ReportData, between: dict[str, Any]) -> PrintedTable:
     columns = [between[name] for name in ("noise_sigma", "total_sigma", "distortion")]
     rows = [
         (number(f, "g"), *("—" if value is None else number(100 * value / abs(size), ".2g") for value in values))
@@ -48,7 +48,7 @@ def _standard_deviations(of: ReportData, between: dict[str, Any]) -> Table:
     step = -(-len(rows) // _LINES_SHOWN)
     note = tr("Standard deviations in % of the response. One recording: the part beyond its noise.")
     headings = ("Hz", tr("mean, noise"), tr("mean, total"), tr("one recording"))
-    return Table(headings, tuple(rows[::step]), (0, 1, 2, 3), note)
+    return PrintedTable(headings, tuple(rows[::step]), (0, 1, 2, 3), note)
 
 
 def _db(level: float | None) -> str:
@@ -63,7 +63,7 @@ def _levels(levels: dict[str, Any]) -> list[Part]:
     )
     rows = tuple(_row(recognised(word), levels.get(kind)) for kind, word in _KINDS.items())
     headings = (tr("distortion"), "dB", tr("95 % bounds, dB"), tr("noise, dB"), tr("detection lines"))
-    return [Paragraph(words), Table(headings, rows, (1, 2, 3, 4))]
+    return [Paragraph(words), PrintedTable(headings, rows, (1, 2, 3, 4))]
 
 
 def _row(name: str, level: dict[str, Any] | None) -> tuple[str, ...]:

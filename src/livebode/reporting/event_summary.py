@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from livebode.core import Event
 from livebode.core.clock import moment
-from livebode.core.document import Paragraph, Part, Table
+from livebode.core.document import Paragraph, Part, PrintedTable
 from livebode.language import number, recognised, tr, trn
 from livebode.records.grouped_events import each_event, event_counts
 
@@ -79,7 +79,7 @@ class EventSummary:
             for name, k in self.kinds.items()
         )  # fmt: skip
         headings = (tr("kind"), tr("count"), tr("first"), tr("newest"), tr("newest message"))
-        grouped = Table(headings, rows, (1,))
+        grouped = PrintedTable(headings, rows, (1,))
         if not self.reported:
             return (grouped,)
         note = trn(
@@ -88,4 +88,6 @@ class EventSummary:
             self.left_out,
         )
         in_full = tuple((moment(e.time_s, 2), recognised(e.kind), recognised(e.message)) for e in self.in_full)
-        return grouped, Table((tr("time"), tr("kind"), tr("message")), in_full, note=note if self.left_out else "")
+        return grouped, PrintedTable(
+            (tr("time"), tr("kind"), tr("message")), in_full, note=note if self.left_out else ""
+        )

@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Any
 
 from livebode.core.clock import date_and_time
-from livebode.core.document import Document, Finding, Paragraph, Picture, Section, Table, Tone
+from livebode.core.document import Document, Finding, Paragraph, Picture, PrintedTable, Section, Tone
 from livebode.language import listed, number, recognised, tr, trn
 from livebode.report.year import day
 from livebode.reporting.trend_words import (
@@ -178,7 +178,7 @@ class Hall:
             return None
         rows = tuple((one.axis, _recorded(one) or "—", recognised(one.message)) for one in self.alarms[:_ROWS])
         note = tr("The newest runs first. Each was compared with the baseline of its machine.")
-        return Section(tr("Alarms"), (Table((tr("axis"), tr("recorded"), tr("alarm")), rows, (), note),))
+        return Section(tr("Alarms"), (PrintedTable((tr("axis"), tr("recorded"), tr("alarm")), rows, (), note),))
 
     def _changes(self) -> Section | None:
         if not self.changed:
@@ -189,7 +189,7 @@ class Hall:
             tr("runs"),
         )  # fmt: skip
         note = tr("± covers 95 %. Of the rows, at most 5 % are expected to be unchanged.")
-        return Section(tr("Axes that changed"), (Table(headings, rows, (2, 3, 7), note),))
+        return Section(tr("Axes that changed"), (PrintedTable(headings, rows, (2, 3, 7), note),))
 
     def _picture(self) -> Picture | None:
         years = [year_of(history, one.machine, one.trend) for one, history in self.changed[:_PICTURES]]
@@ -217,7 +217,9 @@ class Hall:
         if not rows:
             return None
         note = tr("Axes without a run in the four weeks before the newest run of the hall.")
-        return Section(tr("Axes without data"), (Table((tr("axis"), tr("last run"), tr("runs")), rows, (2,), note),))
+        return Section(
+            tr("Axes without data"), (PrintedTable((tr("axis"), tr("last run"), tr("runs")), rows, (2,), note),)
+        )
 
     def _not_assessed(self) -> Section | None:
         reasons: dict[tuple[str, str], list[str]] = {}
@@ -237,7 +239,7 @@ class Hall:
         if not rows:
             return None
         more = trn("{n:,} more row is not listed.", "{n:,} more rows are not listed.", len(rows) - _ROWS)
-        table = Table(
+        table = PrintedTable(
             (tr("axis"), tr("what"), tr("reason")), tuple(rows[:_ROWS]), (), more if len(rows) > _ROWS else ""
         )
         return Section(tr("Not assessed"), (table,))

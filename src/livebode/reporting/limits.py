@@ -7,7 +7,7 @@ from math import ceil, isfinite, isinf
 
 from livebode.analysis.acceptance import Accepted
 from livebode.configuration.report_section import MAGNITUDES, LimitSection
-from livebode.core.document import TONES, Finding, Paragraph, Section, Table
+from livebode.core.document import TONES, Finding, Paragraph, PrintedTable, Section
 from livebode.language import marked, number, recognised, tr, trn
 from livebode.reporting.wording import with_bound
 
@@ -61,7 +61,7 @@ def limits(found: Sequence[Accepted]) -> Section | None:
         "decide. Where there are several values, over a band or over the travel of the axis, the bound covers all "
         "together with 95 %, and the value that is nearest to the limit is shown."
     )
-    return Section(tr("Limits"), (Table(headings, rows, (2, 3)), Paragraph(rule)))
+    return Section(tr("Limits"), (PrintedTable(headings, rows, (2, 3)), Paragraph(rule)))
 
 
 def _name(limit: LimitSection) -> str:

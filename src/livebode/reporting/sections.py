@@ -10,7 +10,7 @@ import numpy as np
 from livebode.analysis.loop_report import LoopReport
 from livebode.analysis.parameter_track import MARGINS, Track
 from livebode.core.clock import moment
-from livebode.core.document import Listing, Paragraph, Part, Picture, Section, Table
+from livebode.core.document import Listing, Paragraph, Part, Picture, PrintedTable, Section
 from livebode.fitting import Fit
 from livebode.language import listed, marked, number, recognised, tr
 from livebode.margins.margins import WORDS
@@ -57,7 +57,7 @@ def response(of: ReportData) -> Section:
         "{shown} of {count} lines are shown; the picture and the record contain all.",
         shown=len(rows[::step]), count=len(rows),
     )  # fmt: skip
-    table = Table(
+    table = PrintedTable(
         ("Hz", f"dB{_re(of)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid")),
         tuple(rows[::step]), tuple(range(7)), note if step > 1 else "",
     )  # fmt: skip
@@ -105,7 +105,7 @@ def parameters(of: ReportData) -> Section | str:
     late_at = tr("newest, at {time}", time=moment(at, 2)) if newest else tr("newest")
     headings = ("", tr("of the mean"), "±", late_at, "±", tr("unit"))
     parts.append(Paragraph(of.fit_words if of.fit is None else _fitted(of.fit, of.fit_words)))
-    parts.append(Table(headings, tuple(rows), (1, 2, 3, 4), note))
+    parts.append(PrintedTable(headings, tuple(rows), (1, 2, 3, 4), note))
     parts.extend(_over_time(of, track, tr("Parameters")) for track in tracks if _moving(track))
     return Section(tr("Parameters"), tuple(parts))
 
@@ -140,7 +140,7 @@ def motion(of: ReportData) -> Section | None:
     )  # fmt: skip
     columns = zip(model["position_m"], model["stiffness_n_per_m"], model["damping_n_s_per_m"])
     rows = tuple((number(x, ".4g"), number(k, ".5g"), number(b, ".4g")) for x, k, b in columns)
-    table = Table((tr("position in m"), tr("Keff in N/m"), tr("bs in N s/m")), rows, (0, 1, 2))
+    table = PrintedTable((tr("position in m"), tr("Keff in N/m"), tr("bs in N s/m")), rows, (0, 1, 2))
     return Section(tr("Motion"), (Paragraph(words), table))
 
 
@@ -163,7 +163,7 @@ def margins(of: ReportData) -> Section | str:
         mark = tr("between the lines") if between else tr("EXTRAPOLATED: no line checks it")
         rows.append((recognised(WORDS[name]), *with_bound(value, bound[i]), recognised(unit), number(at, ".4g"), mark))
     headings = (tr("margin"), tr("value"), "±", tr("unit"), tr("at Hz"), tr("range"))
-    table = Table(headings, tuple(rows), (1, 2, 4), _about_margins(of.loop, of.fit))
+    table = PrintedTable(headings, tuple(rows), (1, 2, 4), _about_margins(of.loop, of.fit))
     caption = tr(
         "Open loop L of the fit with its 95 % band, and the measured lines. Right: near −1, with the circle of Ms."
     )
@@ -261,7 +261,7 @@ def validation(of: ReportData) -> Section | str:
         for c in v.correlations
     )  # fmt: skip
     headings = (tr("model"), tr("ε with"), tr("lags inside"), tr("largest"), tr("joint p"), tr("counts"))
-    parts.append(Table(headings, rows, (2, 3, 4), " ".join(f"{recognised(n)}." for n in of.judged.notes)))
+    parts.append(PrintedTable(headings, rows, (2, 3, 4), " ".join(f"{recognised(n)}." for n in of.judged.notes)))
     caption = tr(
         "On {recording}: measured and simulated output, and the residual's correlations with their limits.",
         recording=of.judged.on,

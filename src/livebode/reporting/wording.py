@@ -9,7 +9,7 @@ import numpy as np
 import tomli_w
 
 from livebode.core import Response
-from livebode.core.document import Table
+from livebode.core.document import PrintedTable
 from livebode.language import number, tr, trn
 
 BOUND_95 = float(np.sqrt(np.log(20.0)))
@@ -97,9 +97,9 @@ def polar_rows(one: Response, c: float) -> list[tuple[str, str, str, str]]:
     return [polar(complex(v), float(r)) for v, r in zip(one.value, one.bound(c))]
 
 
-def pairs(rows: list[tuple[str, str]]) -> Table:
+def pairs(rows: list[tuple[str, str]]) -> PrintedTable:
     """A table of names and values, without empty values."""
-    return Table(("", ""), tuple((name, value) for name, value in rows if value))
+    return PrintedTable(("", ""), tuple((name, value) for name, value in rows if value))
 
 
 def to_toml(values: dict[str, Any]) -> str:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
 import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 _M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8  # of glibc's malloc.h
 _ARENAS = 1
@@ -25,7 +25,7 @@ def share_between_threads() -> None:
     their own, which the system has again when they are freed; with glibc's threshold, which grows to 32 MB, they leave
     holes among what is retained.
     """
-    pa.set_memory_pool(pa.system_memory_pool())
+    _let_arrow_share()
     if (mallopt := _glibc("mallopt")) is not None:
         mallopt(_M_ARENA_MAX, _ARENAS)
         mallopt(_M_MMAP_THRESHOLD, _OWN_BYTES)
@@ -55,6 +55,14 @@ class FreeMemory:
         if self._trim is not None and time.monotonic() - self._given_s >= _INTERVAL_S:
             self._trim(0)
             self._given_s = time.monotonic()
+
+
+def _let_arrow_share() -> None:
+    """PyArrow takes its memory from the system's allocator: now if it is loaded, otherwise when it will be."""
+    if (arrow := sys.modules.get("pyarrow")) is None:
+        os.environ["ARROW_DEFAULT_MEMORY_POOL"] = "system"
+    else:
+        arrow.set_memory_pool(arrow.system_memory_pool())
 
 
 def _glibc(name: str) -> Callable[..., Any] | None:

@@ -9,8 +9,6 @@ from math import inf
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from livebode.core import Channel, LivebodeError, RecordError
 from livebode.core.clock import RunClock
@@ -21,6 +19,8 @@ from livebode.sources.live import Batch, LiveSource, SourceSettings, make_source
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, with_kinds
 from livebode.sources.live.replayable import ReplaySource, SenderSample
+from livebode.tables import Table
+from livebode.tables.parquet_footer import read_footer
 
 
 class RecordedRun:
@@ -50,7 +50,7 @@ class RecordedRun:
         self.channels: tuple[Channel, ...] = with_kinds(channels_of(first.schema), kinds)
         self.rate_hz = float(self._run.found["rate_hz"])
         pieces = SenderNumbers.of(summary.get("numbering", ())).pieces
-        begun = int(first["sample"][0].as_py())
+        begun = int(first["sample"][0])
         before = [NumberedFrom(begun, 0, begun)] if not pieces or begun < pieces[0].sample else []
         self._pieces = [
             piece._replace(epoch=piece.epoch or number) for number, piece in enumerate([*before, *pieces], 1)
@@ -60,7 +60,10 @@ class RecordedRun:
     def samples(self) -> int:
         """Number of its samples."""
         files = self._run.files(["samples"])["samples"]
-        closed = sum(pq.read_metadata(path).num_rows for path in files.paths)
+        closed = 0
+        for path in files.paths:
+            with path.open("rb") as file:
+                closed += read_footer(file).rows
         return int(closed + sum(batch.num_rows for batch in files.rows))
 
     @property
@@ -93,9 +96,9 @@ class RecordedRun:
         piece, stop = next((one for one in reversed(found) if one[0].sender_sample <= begin.number), found[0])
         return int(min(piece.sample + max(0, begin.number - piece.sender_sample), stop))
 
-    def _of_table(self, table: pa.Table, first: int) -> Iterator[Batch]:
-        number = table["sample"].to_numpy()
-        data = np.stack([table.column(2 + row).to_numpy() for row in range(len(self.channels))])
+    def _of_table(self, table: Table, first: int) -> Iterator[Batch]:
+        number = table["sample"]
+        data = np.stack([table[name] for name in table.column_names[2:]])
         starts = [piece.sample for piece in self._pieces]
         longest = max(1, min(round(self.rate_hz), VALUES_MAX // len(self.channels)))
         cuts = {0, len(number), *(np.flatnonzero(np.diff(number) != 1) + 1).tolist()}

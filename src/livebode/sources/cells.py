@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import UTC, datetime, timedelta
 from enum import Enum
 
 WORDS = "NA", "N/A", "#N/A", "NaN", "nan", "NAN", "-nan", "-NaN", "null", "NULL", "None", "1.#QNAN", "1.#IND", "-1.#IND"
@@ -10,6 +11,11 @@ EMPTY = frozenset([*(" " * count for count in range(33)), *WORDS, *(f'"{word}"' 
 """Cells that mean "no value"."""
 NUMBER = re.compile(r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?|nan)", re.IGNORECASE)
 MOMENT = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d(?::?\d\d(?::?\d\d(?:\.\d{1,9})?)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+YEARS = range(1678, 2262)
+"""Whose nanoseconds fit in 64 bits."""
 
 
 class CellKind(Enum):
@@ -36,6 +42,24 @@ def is_moment(cell: str) -> bool:
     (True, False)
     """
     return MOMENT.fullmatch(cell) is not None
+
+
+def moment_ns(cell: str, *, has_zone: bool) -> int | None:
+    """Nanoseconds since 1970 of a date and time; None if it is not one, or has a zone where the others have none.
+
+    >>> moment_ns("1970-01-01T00:01", has_zone=False), moment_ns("1970-01-01 01:00:00.000250+01:00", has_zone=True)
+    (60000000000, 250000)
+    """
+    match = MOMENT.fullmatch(cell)
+    if match is None or bool(match["zone"]) != has_zone or int(cell[:4]) not in YEARS:
+        return None
+    zone = match["zone"] or ""
+    clock, _, fraction = cell[11 : len(cell) - len(zone)].replace(":", "").partition(".")
+    try:
+        moment = datetime.fromisoformat(f"{cell[:10]}T{clock:0<6}{zone or 'Z'}")
+    except ValueError:
+        return None
+    return (moment - EPOCH) // timedelta(seconds=1) * 1_000_000_000 + int(f"{fraction:0<9}")
 
 
 def is_comment(line: str) -> bool:

@@ -1,4 +1,4 @@
-"""Parquet: streamed in batches, only the requested columns."""
+"""Parquet: livebode's own files are read by its own reader, those of other programs by PyArrow (extra `parquet`)."""
 
 from __future__ import annotations
 
@@ -6,34 +6,70 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-import pyarrow.parquet as pq
-
-from livebode.sources.columnar import schema_columns, schema_scalars, to_numpy
+from livebode.sources.columnar import Content, StoredColumn, columns_of, scalars_of
+from livebode.sources.extras import missing
 from livebode.sources.recording import Chunk, Column, Recording
+from livebode.tables import STRING
+from livebode.tables.parquet_file import ParquetFile
+from livebode.tables.parquet_format import WRITER
 
-BATCH_ROWS_MIN = 1 << 16
-"""Smaller batches cost more in calls than they save in memory."""
+_END_BYTES = 1 << 16  # a footer ends with its writer, and three bytes for each column
 
 
 class ParquetRecording(Recording):
-    """A Parquet file; `samples` is in its footer."""
+    """A Parquet file that livebode wrote, read one row group after the other; `samples` is in its footer."""
 
     format: ClassVar[str] = "parquet"
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        with pq.ParquetFile(path) as file:
-            self.columns, self.skipped = schema_columns(file.schema_arrow, file.metadata.num_rows)
-            self.scalars = schema_scalars(file.schema_arrow)
-            self._names = file.schema_arrow.names
+        with path.open("rb") as content:
+            file = ParquetFile(content)
+            schema, rows = file.schema, file.footer.rows
+        stored = [
+            StoredColumn(one.name, Content.OTHER if one.kind == STRING else Content.NUMBER, one.kind, one.metadata)
+            for one in schema
+        ]
+        self.columns, self.skipped = columns_of(stored, rows)
+        self.scalars = scalars_of(schema.metadata.items())
+        self._names = schema.names
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        del rows  # a row group has so few that it is in memory as a whole
         names = [self._names[column.key] for column in columns]
-        # A column is read once, however often it is in `names`; batches have the file's order. With read-ahead the
-        # whole file would be in memory at its end.
-        with pq.ParquetFile(self.path, page_checksum_verification=True, pre_buffer=False) as file:
-            for batch in file.iter_batches(max(rows, BATCH_ROWS_MIN), columns=names, use_threads=True):
-                yield [to_numpy(batch.column(name)) for name in names]
+        with self.path.open("rb") as content:
+            file = ParquetFile(content)
+            for group in range(len(file.footer.groups)):
+                table = file.table([group], list(dict.fromkeys(names)))
+                yield [table[name] for name in names]
 
 
-READER = ParquetRecording
+def open_parquet(path: Path) -> Recording:
+    """The recording in a Parquet file.
+
+    Raises
+    ------
+    ExtraError
+        If another program wrote it, and PyArrow is not installed.
+    """
+    if _is_own(path):
+        return ParquetRecording(path)
+    try:
+        from livebode.sources.foreign_parquet import ForeignParquetRecording
+    except ModuleNotFoundError as error:
+        raise missing(path, "pyarrow", "parquet") from error
+    return ForeignParquetRecording(path)
+
+
+def _is_own(path: Path) -> bool:
+    with path.open("rb") as content:
+        content.seek(max(0, path.stat().st_size - _END_BYTES))
+        if WRITER.encode() not in content.read():  # a footer of thousands of columns takes seconds to read
+            return False
+        try:
+            return ParquetFile(content).footer.writer == WRITER
+        except ValueError:  # PyArrow reads more forms of a footer, and states what is wrong with it
+            return False
+
+
+READER = open_parquet

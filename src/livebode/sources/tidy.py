@@ -1,4 +1,4 @@
-"""A byte stream simplified for Arrow: UTF-8 without comments, blank lines and a final Ctrl-Z.
+"""A byte stream simplified for the reader of rows: UTF-8 without comments, blank lines and a final Ctrl-Z.
 
 Where blanks separate columns, each run of them becomes a tab.
 """
@@ -54,7 +54,7 @@ class Tidied(io.RawIOBase):
         self._done = not raw
         text = self._kept + self._decoder.decode(raw, final=self._done)
         end = len(text) if self._done else text.rfind("\n") + 1
-        if end == 0 and len(text) > 4 * PIECE:  # no valid line is this long; Arrow reports it
+        if end == 0 and len(text) > 4 * PIECE:  # no valid line is this long; the reader of rows reports it
             end = len(text)
         text, self._kept = text[:end], text[end:]
         text = BLANK_LINE.sub("", COMMENT.sub("", text))

@@ -1,12 +1,15 @@
 """Quantities over months and machines: trends with bounds, changes, and the ranking of a fleet."""
 
+from livebode.core.installing import needing
 from livebode.core.machine_levels import Level
-from livebode.trending.assessment import LIMIT_PERCENT, Assessment, assess
-from livebode.trending.changes import SIGNIFICANT
-from livebode.trending.difference import LevelDifference, differences
-from livebode.trending.fleet import FALSE_DISCOVERIES, LOGARITHMIC, Ranked, discoveries, months_to_limit, urgency
-from livebode.trending.quantity_history import History, MachineHistory, Selection, histories, history
-from livebode.trending.trend import MONTH_S, RUNS_MIN, ChangePoint, Effect, NotAssessed, Trend, trend_of
+
+with needing("PyArrow", "archive", "a trend"):
+    from livebode.trending.assessment import LIMIT_PERCENT, Assessment, assess
+    from livebode.trending.changes import SIGNIFICANT
+    from livebode.trending.difference import LevelDifference, differences
+    from livebode.trending.fleet import FALSE_DISCOVERIES, LOGARITHMIC, Ranked, discoveries, months_to_limit, urgency
+    from livebode.trending.quantity_history import History, MachineHistory, Selection, histories, history
+    from livebode.trending.trend import MONTH_S, RUNS_MIN, ChangePoint, Effect, NotAssessed, Trend, trend_of
 
 __all__ = [
     "FALSE_DISCOVERIES",

@@ -177,14 +177,17 @@ def _write(of: Assessment, out: Path, *, dark: bool, force: bool) -> None:
 
 
 def _write_csv(of: Assessment, path: Path) -> None:
-    import pyarrow as pa
-    import pyarrow.csv
+    import csv
 
     rows = [_row(of, one) for one in of.ranked]
     flat = [{key: value for key, value in row.items() if not isinstance(value, list)} for row in rows]
     for row, own in zip(flat, rows):
+        row["significant"] = str(own["significant"]).lower()
         row["changes"] = "; ".join(f"{c['kind']} {c['date']}" for c in own["changes"])
-    pyarrow.csv.write_csv(pa.Table.from_pylist(flat), path)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, flat[0] if flat else (), lineterminator="\n")
+        table.writeheader()
+        table.writerows(flat)
 
 
 def _day(time_s: float) -> str:

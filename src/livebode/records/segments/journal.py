@@ -12,16 +12,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-
 from livebode.core import RecordError
 from livebode.core.files import sync_directory
 from livebode.records.inside import check_folder, open_read
 from livebode.records.segments.damage import Damage
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE, Frame, frames, to_frame
-from livebode.records.segments.plain_batch import check_schema, plain_batch
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import check_version, format_of
+from livebode.tables import Schema, Table
+from livebode.tables.record_batch import from_message
+from livebode.tables.schema_message import schema_from_message, schema_to_message
 
 FOLDER, ASIDE = "open", "damaged"
 _LENGTH = struct.Struct("<I")
@@ -92,7 +92,7 @@ class Journal:
     Attributes
     ----------
     rows
-        Record batches of each table.
+        The rows of each table, in the parts that were written together.
     first, commit
         The first and the last one; the journal counts up to the end of the last.
     length
@@ -101,14 +101,14 @@ class Journal:
         Damaged places.
     """
 
-    rows: dict[str, list[pa.RecordBatch]] = field(default_factory=dict)
+    rows: dict[str, list[Table]] = field(default_factory=dict)
     first: Commit | None = None
     commit: Commit | None = None
     length: int = 0
     damages: list[Damage] = field(default_factory=list)
-    _behind: dict[str, list[pa.RecordBatch]] = field(default_factory=dict)
+    _behind: dict[str, list[Table]] = field(default_factory=dict)
     _broken_bytes: int = 0
-    _counted: dict[str, list[pa.RecordBatch]] | None = None
+    _counted: dict[str, list[Table]] | None = None
 
     @classmethod
     def read(cls, run: Path, number: int, after: Callable[[], Commit | None] = lambda: None) -> Journal:
@@ -135,7 +135,7 @@ class Journal:
         _check_version(run / name_of(number), found)
         try:
             return cls()._over(iter(found), after)
-        except (ValueError, KeyError, TypeError, RecursionError, struct.error, pa.ArrowException):
+        except (ValueError, KeyError, TypeError, RecursionError, struct.error):
             raise RecordError(
                 "unexpected-content",
                 f"{str(run / name_of(number))!r} has invalid content",
@@ -144,7 +144,7 @@ class Journal:
             ) from None
 
     def _over(self, found: Iterator[Frame], after: Callable[[], Commit | None]) -> Journal:
-        tables: dict[int, tuple[str, pa.Schema]] = {}
+        tables: dict[int, tuple[str, Schema]] = {}
         for frame in found:
             if frame.payload is None or (frame.kind == ROWS and frame.table not in tables):
                 # After a damaged commit there are only rows of one that was still being written.
@@ -156,11 +156,10 @@ class Journal:
                     self._counted = None
             elif frame.kind == TABLE:
                 named, _, layout = bytes(frame.payload).partition(b"\0")
-                tables[frame.table] = named.decode(), pa.ipc.read_schema(pa.py_buffer(layout))
-                check_schema(tables[frame.table][1])
+                tables[frame.table] = named.decode(), schema_from_message(layout)
             elif frame.kind == ROWS:
                 name, schema = tables[frame.table]
-                self._behind.setdefault(name, []).append(plain_batch(frame.payload, schema))
+                self._behind.setdefault(name, []).append(from_message(frame.payload, schema))
             elif frame.kind == COMMIT:
                 self._reach(Commit.of(frame.payload), frame.end)
         if self._broken_bytes:
@@ -201,7 +200,7 @@ class Journal:
         """
         known = self._behind if self._counted is None else self._counted
         begin = since.sample, since.time_s
-        last = [max(batch["sample"].to_numpy()) for batches in known.values() for batch in batches if batch.num_rows]
+        last = [batch["sample"].max() for batches in known.values() for batch in batches if batch.num_rows]
         if not last:
             return Damage(self._broken_bytes, begin, None)
         end = 1 + int(max(last))
@@ -240,7 +239,7 @@ def _check_version(path: Path, found: list[Frame]) -> None:
                 check_version(path, "journal", json.loads(bytes(frame.payload)).get("version"))
 
 
-def _count(batches: Mapping[str, list[pa.RecordBatch]]) -> dict[str, int]:
+def _count(batches: Mapping[str, list[Table]]) -> dict[str, int]:
     return {name: sum(batch.num_rows for batch in of) for name, of in batches.items()}
 
 
@@ -250,7 +249,7 @@ def head(tables: Mapping[str, ColumnTable], commit: Commit) -> bytes:
     It is written twice, because nothing after a damaged schema could be read.
     """
     schemas = [
-        to_frame(TABLE, name.encode() + b"\0", table.schema.serialize().to_pybytes(), table=number)
+        to_frame(TABLE, name.encode() + b"\0", schema_to_message(table.schema), table=number)
         for number, (name, table) in enumerate(tables.items())
     ]
     begin = to_frame(FORMAT, json.dumps(format_of("journal")).encode())

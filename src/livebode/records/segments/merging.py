@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import pyarrow as pa
-
-from livebode.core import RecordError
 from livebode.records.inside import is_folder
 from livebode.records.segments.manifest import SEGMENT_NAME, TABLES, Manifest, Segment, segment_numbers
 from livebode.records.segments.segment_file import open_segment
+from livebode.tables import Table
 
 _MERGED_MAX = 4 << 20
 _BUDGET_SHARE = 32  # the budget removes whole segments
@@ -43,29 +41,29 @@ def groups_to_merge(segments: list[Segment], bytes_max: int) -> Iterator[list[Se
             begin += _FAN_IN
 
 
-def rows_to_merge(run: Path, parts: list[Segment]) -> list[pa.Table] | None:
+def rows_to_merge(run: Path, parts: list[Segment]) -> list[Table] | None:
     """The rows of each segment; None if one is missing, damaged, or of an earlier version with other columns."""
     tables = []
     for part in parts:
         try:
-            tables.append(open_segment(run, part).read(use_threads=False))
-        except (RecordError, FileNotFoundError):
+            tables.append(open_segment(run, part).table())
+        except (FileNotFoundError, TypeError, ValueError):
             return None
         if tables[-1].schema != tables[0].schema:
             return None
     return tables
 
 
-def row_groups(tables: list[pa.Table]) -> Iterator[pa.Table]:
+def row_groups(tables: list[Table]) -> Iterator[Table]:
     """The rows in few parts that end with the end of a table, and so with a whole response."""
-    waiting: list[pa.Table] = []
+    waiting: list[Table] = []
     for table in tables:
         waiting.append(table)
         if sum(one.num_rows for one in waiting) >= _GROUP_ROWS:
-            yield pa.concat_tables(waiting)
+            yield Table.join(waiting)
             waiting = []
     if waiting:
-        yield pa.concat_tables(waiting)
+        yield Table.join(waiting)
 
 
 def unlisted(run: Path, found: Manifest) -> list[str]:

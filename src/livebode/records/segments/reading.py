@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
-
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from livebode.core import Event, RecordError
 from livebode.records.inside import is_folder
@@ -15,7 +13,10 @@ from livebode.records.segments import journal
 from livebode.records.segments.damage import KIND, event_of
 from livebode.records.segments.journal import Journal, last_commit
 from livebode.records.segments.manifest import NAME, Manifest, Segment
-from livebode.records.segments.segment_file import segment_content
+from livebode.records.segments.segment_file import open_segment
+from livebode.tables import Table
+from livebode.tables.parquet_file import ParquetFile
+from livebode.tables.parquet_writer import ParquetWriter
 
 _ROWS = 1 << 14
 Report = Callable[[Event], None]
@@ -27,7 +28,7 @@ def in_segments(run: Path) -> bool:
     return is_folder(run / journal.FOLDER) or (run / NAME).is_file()
 
 
-Rows = dict[str, list[pa.RecordBatch]]
+Rows = dict[str, list[Table]]
 
 
 def parts(run: Path, report: Report, *, finished: bool) -> tuple[list[Segment], Rows]:
@@ -69,7 +70,7 @@ def tables(
     span_s: tuple[float, float] | None = None,
     *,
     finished: bool,
-) -> Iterator[pa.Table]:
+) -> Iterator[Table]:
     """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it, with `span_s` without the
     segments outside of that time. A damaged segment is reported and skipped.
 
@@ -86,49 +87,42 @@ def tables(
         segments = [segment for segment in segments if segment.first_s <= span_s[1] and segment.last_s >= span_s[0]]
     yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), report, span_s)
     if table in rows:
-        yield pa.Table.from_batches(rows[table])
+        yield Table.join(rows[table])
 
 
-def _joined(
-    run: Path, segments: list[Segment], report: Report, span_s: tuple[float, float] | None
-) -> Iterator[pa.Table]:
+def _joined(run: Path, segments: list[Segment], report: Report, span_s: tuple[float, float] | None) -> Iterator[Table]:
     """The rows of segments, small ones combined, because the overhead per part is larger than that of its rows."""
-    held: list[pa.Table] = []
+    held: list[Table] = []
     for segment in segments:
         if (file := whole(run, segment, report)) is None:
             continue
-        # Without Arrow's threads, which can fail at the end of a short process.
-        held.append(file.read_row_groups(_groups_in(file, span_s), use_threads=False))
+        held.append(file.table(_groups_in(file, span_s)))
         if sum(table.num_rows for table in held) >= _ROWS:
-            yield pa.concat_tables(held)
+            yield Table.join(held)
             held = []
     if held:
-        yield pa.concat_tables(held)
+        yield Table.join(held)
 
 
-def _groups_in(file: pq.ParquetFile, span_s: tuple[float, float] | None) -> list[int]:
+def _groups_in(file: ParquetFile, span_s: tuple[float, float] | None) -> list[int]:
     """The row groups of a merged segment with rows in this span of time."""
-    about = file.metadata
-    every = list(range(about.num_row_groups))
+    every = list(range(len(file.footer.groups)))
     if span_s is None or len(every) == 1:
         return every
-    time_s = [about.row_group(group).column(about.schema.names.index("time_s")).statistics for group in every]
-    return [
-        group for group, one in zip(every, time_s)
-        if one is None or not one.has_min_max or (one.min <= span_s[1] and one.max >= span_s[0])
-    ]  # fmt: skip
+    found = []
+    for group in every:
+        first_s, last_s, _ = file.footer.statistics(group, "time_s")
+        if first_s is None or last_s is None or (first_s <= span_s[1] and last_s >= span_s[0]):
+            found.append(group)
+    return found
 
 
-def whole(run: Path, segment: Segment, report: Report) -> pq.ParquetFile | None:
-    """The file of a segment; None if it is damaged, which is reported, or was removed to meet the budget."""
-    data = content(run, segment, report)
-    return None if data is None else pq.ParquetFile(pa.BufferReader(data))
-
-
-def content(run: Path, segment: Segment, report: Report) -> bytes | None:
-    """The bytes of the file; of a segment that was merged in the meantime the same rows as a file."""
+def whole(run: Path, segment: Segment, report: Report) -> ParquetFile | None:
+    """The file of a segment, in memory; of one that was merged in the meantime the same rows. None if it is damaged,
+    which is reported, or was removed to meet the budget.
+    """
     try:
-        return segment_content(run, segment)
+        return open_segment(run, segment)
     except FileNotFoundError:
         now = Manifest.read(run)
         if (place := now.place(segment.name)) is not None:
@@ -150,12 +144,15 @@ def content(run: Path, segment: Segment, report: Report) -> bytes | None:
     return None
 
 
-def _part(run: Path, segment: Segment, merged: Segment, before: int, report: Report) -> bytes | None:
+def _part(run: Path, segment: Segment, merged: Segment, before: int, report: Report) -> ParquetFile | None:
     if (file := whole(run, merged, report)) is None:
         return None
-    sink = pa.BufferOutputStream()
-    pq.write_table(file.read(use_threads=False).slice(before, segment.rows), sink)
-    return bytes(sink.getvalue())
+    sink = io.BytesIO()
+    table = file.table().slice(before, segment.rows)
+    writer = ParquetWriter(sink, table.schema)
+    writer.write(table)
+    writer.close()
+    return ParquetFile(sink.getvalue())
 
 
 def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:

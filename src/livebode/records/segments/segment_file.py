@@ -6,25 +6,19 @@ import hashlib
 import os
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from livebode.core import RecordError
 from livebode.records.inside import open_read
 from livebode.records.segments.manifest import Segment
+from livebode.tables.parquet_file import ParquetFile
+from livebode.tables.parquet_footer import Footer
 
 _VALUES_MAX = 1 << 27  # 1 GiB of numbers; a full journal holds 32 MiB
 _VERIFIED_MAX = 100_000
 _verified: set[tuple[object, ...]] = set()
 
 
-def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
-    """Read the file, as `segment_content`."""
-    return pq.ParquetFile(pa.BufferReader(segment_content(run, segment)))
-
-
-def segment_content(run: Path, segment: Segment) -> bytes:
-    """Content of the file. Its checksum is computed once per process, as long as the file is unchanged.
+def open_segment(run: Path, segment: Segment) -> ParquetFile:
+    """Read the file into memory. Its checksum is computed once per process, as long as the file is unchanged.
 
     Raises
     ------
@@ -57,30 +51,31 @@ def segment_content(run: Path, segment: Segment) -> bytes:
             _verified.clear()
         _verified.add(key)
     try:
-        about = pq.read_metadata(pa.BufferReader(data))
-    except pa.ArrowException as error:
+        content = ParquetFile(data)
+    except ValueError as error:
         raise RecordError(
             "damaged", f"it is not Parquet ({error})", "restore it from a backup", path=str(run / segment.name)
         ) from None
-    _check_size(about, segment)
-    return data
+    _check_size(content.footer, segment)
+    return content
 
 
-def _check_size(about: pq.FileMetaData, segment: Segment) -> None:
-    if about.num_rows != segment.rows:
+def _check_size(footer: Footer, segment: Segment) -> None:
+    if footer.rows != segment.rows:
         raise RecordError(
             "damaged",
-            f"it has {about.num_rows} rows, but the manifest states {segment.rows}",
+            f"it has {footer.rows} rows, but the manifest states {segment.rows}",
             "restore it from a backup",
             path=segment.name,
-            rows=about.num_rows,
+            rows=footer.rows,
         )
-    size_bytes = sum(about.row_group(group).total_byte_size for group in range(about.num_row_groups))
-    if max(about.num_rows * about.num_columns, size_bytes // 8) > _VALUES_MAX:
+    size_bytes = sum(group.size_bytes for group in footer.groups)
+    values = footer.rows * len(footer.columns)
+    if max(values, size_bytes // 8) > _VALUES_MAX:
         raise RecordError(
             "too-large",
-            f"its {about.num_rows} rows are more than a segment can have",
+            f"its {footer.rows} rows are more than a segment can have",
             "move it away",
             path=segment.name,
-            rows=about.num_rows,
+            rows=footer.rows,
         )

@@ -5,13 +5,11 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
+import io
 import logging
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from livebode.core.files import sync_directory, write_whole
 from livebode.records.inside import check_folder, is_folder
@@ -21,15 +19,17 @@ from livebode.records.segments.manifest import Manifest, Retained, Segment
 from livebode.records.segments.merging import groups_to_merge, row_groups, rows_to_merge, unlisted
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
+from livebode.tables import Table
+from livebode.tables.parquet_writer import ParquetWriter
 
 FIRST_TO_GO = "samples"
 _LONG_BYTES, _SHORTER = 128 << 10, 3
 _PLACES_MAX = 512
-Tiers = Callable[[Mapping[str, pa.Table]], Mapping[str, pa.Table]]
+Tiers = Callable[[Mapping[str, Table]], Mapping[str, Table]]
 _logger = logging.getLogger(__name__)
 
 
-def no_tiers(_: Mapping[str, pa.Table]) -> Mapping[str, pa.Table]:
+def no_tiers(_: Mapping[str, Table]) -> Mapping[str, Table]:
     return {}
 
 
@@ -158,7 +158,7 @@ class Shelf:
         before.close()
         self._version = VERSIONS["manifest"]
 
-    def _replace(self, parts: list[Segment], rows: list[pa.Table]) -> None:
+    def _replace(self, parts: list[Segment], rows: list[Table]) -> None:
         name = manifest.name_of(parts[0].table, parts[0].numbers[0], parts[-1].numbers[1])
         segment = self._put(name, parts[0].table, *row_groups(rows))
         lines = manifest.merge_line(parts, segment)
@@ -189,7 +189,7 @@ class Shelf:
 
     def _turn(self, number: int) -> None:
         read = journal.read_sealed(self._run, number)
-        tables = {table: pa.Table.from_batches(batches) for table, batches in read.rows.items()}
+        tables = {table: Table.join(batches) for table, batches in read.rows.items()}
         tables |= self._tiers(tables)
         segments = [
             self._put(manifest.name_of(table, number, number), table, rows) for table, rows in tables.items()
@@ -207,27 +207,28 @@ class Shelf:
             with contextlib.suppress(OSError):  # it is then done when the run is continued
                 journal.set_aside(self._run, number)
 
-    def _put(self, name: str, table: str, *groups: pa.Table) -> Segment:
+    def _put(self, name: str, table: str, *groups: Table) -> Segment:
         folder = self._run / table
         if not is_folder(folder):
             os.mkdir(folder)
             sync_directory(self._run)
-        sink = pa.BufferOutputStream()
-        repeating = list(self._tables["responses" if table in manifest.TIERS else table].repeating)
-        with pq.ParquetWriter(sink, groups[0].schema, compression="lz4", use_dictionary=repeating) as file:
-            for group in groups:
-                file.write_table(group, row_group_size=group.num_rows)
-        data = memoryview(sink.getvalue())
+        sink = io.BytesIO()
+        repeating = self._tables["responses" if table in manifest.TIERS else table].repeating
+        writer = ParquetWriter(sink, groups[0].schema, repeating)
+        for group in groups:
+            writer.write(group)
+        writer.close()
+        data = sink.getbuffer()
         write_whole(self._run / name, data, locked=True)
         first, last = groups[0], groups[-1]
         return Segment(
             name=name,
             table=table,
             rows=sum(group.num_rows for group in groups),
-            first_sample=first["sample"][0].as_py(),
-            last_sample=last["sample"][-1].as_py(),
-            first_s=first["time_s"][0].as_py(),
-            last_s=last["time_s"][-1].as_py(),
+            first_sample=int(first["sample"][0]),
+            last_sample=int(last["sample"][-1]),
+            first_s=float(first["time_s"][0]),
+            last_s=float(last["time_s"][-1]),
             size_bytes=len(data),
             sha256=hashlib.sha256(data).hexdigest(),
         )

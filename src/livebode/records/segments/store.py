@@ -11,8 +11,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-
 from livebode.core import Emit, Event, LivebodeError, RecordError, counted, ignore
 from livebode.core.files import sync_directory, write_whole
 from livebode.core.writing import why, writing
@@ -33,6 +31,7 @@ from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import UnsyncedRows
 from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table_file import ColumnTable
+from livebode.tables import Table
 
 _NEARLY = 15 / 16  # of the bytes of a journal: the next commit may fill it
 _logger = logging.getLogger(__name__)
@@ -131,7 +130,7 @@ class Store:
         with self._writing():
             self._write_summary(summary, finished=False)
 
-    def write(self, table: str, rows: pa.RecordBatch) -> None:
+    def write(self, table: str, rows: Table) -> None:
         """Append rows to a table with the next commit."""
         self._waiting.add(table, rows)
 

@@ -6,14 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-import pyarrow as pa
-import pyarrow.dataset as ds
-import pyarrow.parquet as pq
-from pyarrow.fs import FileInfo, FileSystemHandler, FileType, PyFileSystem
-
 from livebode.core import Event
+from livebode.core.installing import needing
 from livebode.records.segments import reading
 from livebode.records.segments.manifest import Segment
+
+with needing("PyArrow", "query", "a query"):
+    import pyarrow as pa
+    import pyarrow.dataset as ds
+    import pyarrow.parquet as pq
+    from pyarrow.fs import FileInfo, FileSystemHandler, FileType, PyFileSystem
 
 _GROUPS_MAX = 16  # DuckDB needs some milliseconds to plan each
 
@@ -41,7 +43,7 @@ def segment_groups(run: Path, segments: list[Segment], damages: list[Event]) -> 
     first = next((found for one in segments if (found := reading.whole(run, one, damages.append)) is not None), None)
     if first is None:
         return []
-    schema = first.schema_arrow
+    schema = pa.schema(first.schema)
     files = PyFileSystem(_VerifiedFiles(run, segments, schema, damages))
     parquet = ds.ParquetFileFormat()
     size = -(-len(segments) // _GROUPS_MAX)
@@ -75,12 +77,12 @@ class _VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
 
     def open_input_file(self, path: str) -> pa.NativeFile:
         """The content of a segment; no rows if it is damaged."""
-        data = reading.content(self._run, self._segments[path], self._damages.append)
-        if data is None:
+        file = reading.whole(self._run, self._segments[path], self._damages.append)
+        if file is None:
             sink = pa.BufferOutputStream()
             pq.write_table(self._schema.empty_table(), sink)
             return pa.BufferReader(sink.getvalue())
-        return pa.BufferReader(data)
+        return pa.BufferReader(file.content)
 
     def open_input_stream(self, path: str) -> pa.NativeFile:
         return self.open_input_file(path)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import pyarrow as pa
-
-from livebode.arrow import to_numpy
 from livebode.records.segments.frames import ROWS, to_frame
+from livebode.tables import Table
+from livebode.tables.record_batch import to_message
 
 
 @dataclass(frozen=True)
@@ -38,21 +37,21 @@ class UnsyncedRows:
     def __init__(self, tables: tuple[str, ...]) -> None:
         self._tables = tables
         self.rows = dict.fromkeys(tables, 0)
-        self._new: dict[str, list[pa.RecordBatch]] = {}
+        self._new: dict[str, list[Table]] = {}
         self._parts: list[_UnsyncedFrame] = []
         self._written = 0
         self.lost: dict[str, dict[str, int]] = {}
 
-    def add(self, table: str, batch: pa.RecordBatch) -> None:
+    def add(self, table: str, batch: Table) -> None:
         if batch.num_rows:
             self._new.setdefault(table, []).append(batch)
 
     def gather(self) -> None:
         """Create one frame for each table from the added rows."""
         for table, batches in self._new.items():
-            batch = pa.concat_batches(batches) if batches[1:] else batches[0]
-            sample = to_numpy(batch["sample"])
-            frame = to_frame(ROWS, memoryview(batch.serialize()), table=self._tables.index(table))
+            batch = Table.join(batches)
+            sample = batch["sample"]
+            frame = to_frame(ROWS, to_message(batch), table=self._tables.index(table))
             self.rows[table] += batch.num_rows
             self._parts.append(_UnsyncedFrame(table, frame, batch.num_rows, int(sample.min()), int(sample.max())))
         self._new.clear()

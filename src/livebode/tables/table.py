@@ -1,0 +1,166 @@
+"""Table: NumPy columns of equal length with a schema."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.tables.schema import STRING, Field, Schema
+from livebode.tables.text import Text
+
+Column = NDArray[Any] | Text
+"""Numbers or truth values of shape (rows,), or text."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """NumPy columns of equal length with a schema. It has no nulls: a missing value is NaN.
+
+    PyArrow, Polars, DuckDB and pandas read it by Arrow's PyCapsule interface, numbers without a copy:
+    `pyarrow.table(table)`, `polars.DataFrame(table)`.
+
+    Parameters
+    ----------
+    schema
+        Names and kinds of the columns, in their order.
+    columns
+        One for each; of the kind that the schema states.
+
+    Raises
+    ------
+    ValueError
+        If the columns do not fit the schema, or differ in length.
+
+    Examples
+    --------
+    >>> table = Table.of({"sample": np.arange(3), "model": Text.of(["rigid"], np.zeros(3, int))})
+    >>> table.num_rows, table["sample"][1:], table.text("model")[0]
+    (3, array([1, 2]), 'rigid')
+    """
+
+    schema: Schema
+    columns: tuple[Column, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.columns) != len(self.schema) or len({len(column) for column in self.columns}) > 1:
+            raise ValueError("the columns do not fit the schema, or differ in length")
+        for column, field in zip(self.columns, self.schema):
+            if not _is_of(column, field):
+                raise ValueError(f"column {field.name!r} is not of type {field.kind}")
+
+    @classmethod
+    def of(cls, columns: Mapping[str, Column]) -> Table:
+        """These columns, with the kinds that they have."""
+        kinds = {name: STRING if isinstance(c, Text) else c.dtype.name for name, c in columns.items()}
+        return cls(Schema.of(**kinds), tuple(columns.values()))
+
+    @classmethod
+    def empty(cls, schema: Schema) -> Table:
+        """No rows."""
+        return cls(schema, tuple(_no_rows(field) for field in schema))
+
+    @classmethod
+    def from_arrow(cls, data: object) -> Table:
+        """Everything that has Arrow's PyCapsule interface: a table, a record batch, or a stream, which is read.
+
+        A null becomes NaN, and integers in the same column doubles; among truth values it is False, in a text "".
+
+        Raises
+        ------
+        TypeError
+            If a column contains neither numbers, truth values nor text.
+        """
+        from livebode.tables.exchange import from_arrow  # nanoarrow is loaded where tables are exchanged
+
+        return data if isinstance(data, Table) else from_arrow(data)
+
+    @classmethod
+    def join(cls, parts: Sequence[Table]) -> Table:
+        """The rows of all parts, one after the other, with the schema of the first; ValueError if others differ."""
+        if not parts[1:]:
+            return parts[0]
+        names = parts[0].schema.names
+        if any(part.schema.names != names for part in parts):
+            raise ValueError("the tables have different columns")
+        return cls(parts[0].schema, tuple(_joined(columns) for columns in zip(*(part.columns for part in parts))))
+
+    @property
+    def num_rows(self) -> int:
+        return len(self.columns[0]) if self.columns else 0
+
+    @property
+    def column_names(self) -> list[str]:
+        return self.schema.names
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """The numbers of a column; KeyError if there is none of this name, TypeError if it is text."""
+        column = self.columns[self.schema.place(name)]
+        if isinstance(column, Text):
+            raise TypeError(f"column {name!r} is text")
+        return column
+
+    def text(self, name: str) -> Text:
+        """The words of a column; KeyError if there is none of this name, TypeError if it has numbers."""
+        column = self.columns[self.schema.place(name)]
+        if not isinstance(column, Text):
+            raise TypeError(f"column {name!r} is not text")
+        return column
+
+    def values(self, name: str) -> NDArray[Any]:
+        """Any column as an array; of a text its words as objects, shape (rows,)."""
+        column = self.columns[self.schema.place(name)]
+        if not isinstance(column, Text):
+            return column
+        return np.array(column.words or [""], dtype=object)[column.at]
+
+    def slice(self, start: int, rows: int | None = None) -> Table:
+        """So many rows from this one on, or all; without a copy."""
+        part = slice(start, None if rows is None else start + rows)
+        return Table(self.schema, tuple(column[part] for column in self.columns))
+
+    def select(self, names: Sequence[str]) -> Table:
+        """These columns, in this order."""
+        places = [self.schema.place(name) for name in names]
+        schema = Schema(tuple(self.schema.fields[at] for at in places), self.schema.metadata)
+        return Table(schema, tuple(self.columns[at] for at in places))
+
+    def equals(self, other: Table) -> bool:
+        """Whether schema and values are equal, NaN to NaN."""
+        return self.schema == other.schema and all(map(_equal, self.columns, other.columns))
+
+    def __len__(self) -> int:
+        return self.num_rows
+
+    def __arrow_c_schema__(self) -> object:
+        return self.schema.__arrow_c_schema__()
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        from livebode.tables.exchange import to_arrow_stream
+
+        return to_arrow_stream(self).__arrow_c_stream__(requested_schema)
+
+
+def _is_of(column: Column, field: Field) -> bool:
+    if isinstance(column, Text):
+        return field.kind == STRING
+    return field.kind != STRING and column.dtype == field.dtype
+
+
+def _no_rows(field: Field) -> Column:
+    return Text((), np.empty(0, np.int32)) if field.kind == STRING else np.empty(0, field.dtype)
+
+
+def _joined(columns: Sequence[Column]) -> Column:
+    if isinstance(columns[0], Text):
+        return Text.join([column for column in columns if isinstance(column, Text)])
+    return np.concatenate([column for column in columns if not isinstance(column, Text)])
+
+
+def _equal(one: Column, other: Column) -> bool:
+    if isinstance(one, Text) or isinstance(other, Text):
+        return isinstance(one, Text) and one == other
+    return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
