@@ -17,7 +17,7 @@ from livebode.tables.parquet_writer import write_parquet
 from tests.support.loop_runs import AXIS, record
 
 CHIRP = "--excitation w --input u --output velocity --lines 20:140:10 --window 400"
-ABSENT = ("scipy", "matplotlib", "mpl_toolkits", "PIL", "contourpy", "kiwisolver", "fontTools", "pyarrow")
+ABSENT = ("scipy", "matplotlib", "mpl_toolkits", "PIL", "contourpy", "kiwisolver", "fontTools", "pyarrow", "nanoarrow")
 PROGRAM = """
 import contextlib, io, json, sys
 for name in {absent!r}:
