@@ -6,13 +6,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
-
 from livebode.records.parquet_part import ParquetPart, sha256_of_next
 
 
 def parts_of(path: Path) -> list[dict[str, Any]]:
     """The row groups and the end of the file, with their checksums."""
+    import pyarrow.parquet as pq
+
     with path.open("rb") as file:
         about = pq.read_metadata(file)
         groups = [about.row_group(number) for number in range(about.num_row_groups)]

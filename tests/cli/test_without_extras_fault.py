@@ -1,4 +1,4 @@
-"""The core alone: what has to work without SciPy and Matplotlib works, and the rest names the extra that it needs."""
+"""The core alone: what has to work without SciPy, Matplotlib and PyArrow works; the rest names the extra it needs."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ import subprocess
 import sys
 from typing import Any, NamedTuple
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
+from livebode.tables import Table
+from livebode.tables.parquet_writer import write_parquet
 from tests.support.loop_runs import AXIS, record
 
-ABSENT = ("scipy", "matplotlib", "mpl_toolkits", "PIL", "contourpy", "kiwisolver", "fontTools")
+CHIRP = "--excitation w --input u --output velocity --lines 20:140:10 --window 400"
+ABSENT = ("scipy", "matplotlib", "mpl_toolkits", "PIL", "contourpy", "kiwisolver", "fontTools", "pyarrow", "nanoarrow")
 PROGRAM = """
 import contextlib, io, json, sys
 for name in {absent!r}:
@@ -40,11 +46,16 @@ class Answer(NamedTuple):
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
     folder = tmp_path_factory.mktemp("core")
-    record(folder / "log.parquet", 1)
+    log = record(folder / "log.parquet", 1)
+    write_parquet(log, Table.from_arrow(pq.read_table(log)))
     (folder / "axis.toml").write_text(AXIS.format(gain=0.2308, delay=0), encoding="utf-8")
     (folder / "tone.wav").write_bytes(
         b"RIFF\x24\0\0\0WAVEfmt \x10\0\0\0\1\0\1\0\x40\x1f\0\0\x80\x3e\0\0\2\0\x10\0data\0\0\0\0"
     )
+    foreign = pa.table({"t": np.arange(9.0)})
+    pq.write_table(foreign, folder / "foreign.parquet")
+    with pa.ipc.new_file(folder / "foreign.arrow", foreign.schema) as file:
+        file.write_table(foreign)
     run = str(folder / "run")
     commands: dict[str, list[str]] = {
         "run": ["run", str(folder / "axis.toml"), "--out", run],
@@ -54,6 +65,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
         "compare": ["compare", run, run],
         "export": ["export", run, "--to", "csv"],
         "example": ["example", "design"],
+        "example-csv": ["example", "archive"],
         "design": ["design", "example/experiment.toml", "--out", str(folder / "design")],
         "demo": ["demo", "--fast", "--seconds", "16", "--out", str(folder / "demo")],
         "report": ["report", run],
@@ -61,6 +73,13 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
         "modal": ["fit", run, "--model", "modal"],
         "mat": ["export", run, "--to", "mat"],
         "wav": ["inspect", str(folder / "tone.wav")],
+        "csv": ["run", "example/standstill.csv", *CHIRP.split(), "--out", run + "3"],
+        "foreign": ["inspect", str(folder / "foreign.parquet")],
+        "arrow": ["inspect", str(folder / "foreign.arrow")],
+        "query": ["query", run, "SELECT 1"],
+        "lake": ["archive", "list", str(folder)],
+        "archive": ["archive", "run", "example/archive.toml"],
+        "fleet": ["fleet", "demo"],
         "output-only": ["run", str(folder / "log.parquet"), "--output-only", "--output", "y", "--out", run + "2"],
     }
     code = PROGRAM.format(absent=ABSENT, commands=list(commands.values()))
@@ -71,7 +90,8 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "fit", "margins", "inspect", "compare", "export", "example", "design", "demo"]
+    "command",
+    ["run", "fit", "margins", "inspect", "compare", "export", "example", "example-csv", "design", "demo", "csv"],
 )
 def test_the_core_does_its_work_alone(answers: dict[str, Answer], command: str) -> None:
     assert answers[command].code == 0, answers[command].err
@@ -93,10 +113,18 @@ def test_a_command_with_pictures_says_once_how_to_get_them(answers: dict[str, An
         ("mat", "analysis", "an export for MATLAB needs SciPy, which is not installed; run "),
         ("wav", "analysis", "a WAV file needs SciPy, which is not installed; run "),
         ("output-only", "analysis", "a run from the outputs alone needs SciPy, which is not installed; run "),
+        ("foreign", "parquet", "foreign.parquet needs the package pyarrow, which is not installed; run "),
+        ("arrow", "parquet", "foreign.arrow needs the package pyarrow, which is not installed; run "),
+        ("query", "query", "a query needs PyArrow, which is not installed; run "),
+        ("lake", "archive", "a lake needs PyArrow, which is not installed; run "),
+        ("archive", "archive", "the command archive needs PyArrow, which is not installed; run "),
+        ("fleet", "fleet", "the command fleet needs PyArrow, which is not installed; run "),
     ],
 )
 def test_what_needs_an_extra_names_it(answers: dict[str, Answer], command: str, extra: str, sentence: str) -> None:
     assert answers[command].code == 2
     assert sentence in answers[command].err
-    assert {"plots": "matplotlib", "analysis": "scipy"}[extra] in answers[command].err or extra in answers[command].err
+    assert {"plots": "matplotlib", "analysis": "scipy"}.get(extra, "pyarrow") in answers[
+        command
+    ].err or extra in answers[command].err
     assert "Traceback" not in answers[command].err

@@ -23,7 +23,9 @@ def test_the_recipe_for_conda_has_the_version_the_requirements_and_the_licences_
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     project, found = settings["project"], recipe()
     assert found["package"] == {"name": project["name"], "version": project["version"]}
-    required = {requirement.partition(">=")[0]: requirement for requirement in project["dependencies"]}
+    required = {
+        requirement.partition(">=")[0]: requirement.partition(";")[0] for requirement in project["dependencies"]
+    }
     wanted = {NAMES.get(name, name) + " >=" + text.partition(">=")[2] for name, text in required.items()}
     assert set(found["requirements"]["run"]) == wanted | {"python"}
     build = {requirement.replace(">=", " >=") for requirement in settings["build-system"]["requires"]}

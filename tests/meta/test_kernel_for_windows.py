@@ -20,6 +20,7 @@ PROJECT = "cmake_minimum_required(VERSION 3.20)\nproject(all C)\n" + "".join(
 STRING = """#include <stddef.h>
 void *memcpy(void *, const void *, size_t);
 void *memset(void *, int, size_t);
+int memcmp(const void *, const void *, size_t);
 """
 MATH = "#define isfinite(x) __builtin_isfinite(x)\n" + "".join(
     f"double {name}({arguments});\n"
@@ -38,7 +39,7 @@ set(CMAKE_AR {archiver})
 set(CMAKE_MT true)
 set(CMAKE_C_FLAGS_INIT "-imsvc {folder}/include /clang:-ffreestanding -Werror=unknown-argument")
 """
-OF_THE_COMPILER = {"__chkstk", "__security_check_cookie", "__security_cookie", "_fltused", "memcpy", "memset"}
+OF_THE_COMPILER = {"__chkstk", "__security_check_cookie", "__security_cookie", "_fltused", "memcmp", "memcpy", "memset"}
 OF_WINDOWS = {"__imp_IsProcessorFeaturePresent"}
 
 

@@ -183,7 +183,7 @@ class Gaps:
         data = np.random.default_rng(0).standard_normal((3, 40))
         for start in range(0, self.samples, 50):
             if start == 10_000:
-                shutil.copytree(self.run, self.killed)
+                shutil.copytree(self.run, self.killed, ignore=shutil.ignore_patterns(".*.partial"))  # being moved
             yield Block(data, NAMES, RATE_HZ, start=start, gap=start > 0)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from livebode.kernel import NO_MOMENT
@@ -70,6 +70,9 @@ def check(dialect: Dialect, text: bytes) -> None:
 
 
 @settings(max_examples=200, deadline=None)
+@example(
+    Dialect(",", False, ",", headings=("a", "b", "c"), kinds=(CellKind.NUMBER,) * 3), [["", "0", "0.0", "inf"]], "\n"
+)
 @given(DIALECTS, st.lists(st.lists(CELLS, min_size=2, max_size=4), max_size=6), st.sampled_from(["\n", "\r\n", "\r"]))
 def test_rows_have_the_values_of_their_definition(dialect, rows, end):
     text = end.join(dialect.delimiter.join(cells) for cells in rows).encode()

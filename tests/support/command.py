@@ -11,8 +11,6 @@ from pathlib import Path
 from unittest import mock
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from livebode.cli import main
 from livebode.core import Lines
@@ -61,6 +59,9 @@ def signals(samples: int = 2000, noise: float = 0.01, seed: int = 0) -> dict[str
 
 
 def write_parquet(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     pq.write_table(pa.table({name: pa.array(values) for name, values in columns.items()}), path)
     return path
 

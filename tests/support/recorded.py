@@ -8,7 +8,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
 from livebode.configuration.record_section import RecordSection
 from livebode.core import Block, Channel, Event, Responses
@@ -109,7 +108,7 @@ def check_beginning(directory: Path, samples: int, sample_min: int) -> int:
     run, (responses, events) = RunRecord.open(directory), expected(samples)
     found = run.responses()
     assert same(found, responses[: len(found)])
-    kept = [table["sample"].to_numpy() for table in map(pa.table, run.tables("samples"))]
+    kept = [table["sample"] for table in run.tables("samples")]
     number = np.concatenate(kept) if kept else np.zeros(0, dtype=np.int64)
     assert np.array_equal(number, np.arange(number.size))
     assert number.size >= sample_min
@@ -127,9 +126,9 @@ def check_whole(directory: Path, samples: int) -> None:
     assert check_beginning(directory, samples, samples) == samples
     run = RunRecord.open(directory)
     assert run.finished
-    columns = [table.to_pydict() for table in map(pa.table, run.tables("samples"))]
+    tables = list(run.tables("samples"))
     for name, values in zip(NAMES, data(samples)):
-        assert np.array_equal(np.concatenate([c[name] for c in columns]), values, equal_nan=True), name
+        assert np.array_equal(np.concatenate([table[name] for table in tables]), values, equal_nan=True), name
     counts = run.summary["counts"]
     responses = expected(samples)[0]
     assert (counts["samples"], counts["responses"], counts["gaps"]) == (samples, len(responses), 0)

@@ -21,7 +21,6 @@ from livebode.runtime import Destination, run
 from tests.support.command import write_parquet
 from tests.support.recorded import NAMES, Machine
 from tests.support.runs import record
-from tests.support.stateful_cases import baseline
 
 RATE_HZ, SAMPLES, BLOCK, ENDS_AT = 400.0, 1000, 50, 700
 LINES = Lines.parse("40,100", RATE_HZ, 20)
@@ -86,6 +85,8 @@ def digest(array: np.ndarray) -> str:
 
 
 def write(folder: Path) -> None:
+    from tests.support.stateful_cases import baseline
+
     folder.mkdir()
     in_segments(folder / "segments")
     in_one_piece(folder / "piece", folder)

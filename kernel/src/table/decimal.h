@@ -19,8 +19,9 @@ typedef struct {
 /* The shortest decimal that is nearest to x, which is positive and finite. */
 lb_decimal lb_shortest(const uint64_t *powers, double x);
 
-/* The end of the number that begins here, and its value; NULL if there is none, or its digits do not suffice. */
-const uint8_t *lb_number(const uint64_t *powers, const uint8_t *p, const uint8_t *end, uint8_t decimal, double *value);
+/* The end of the number that begins here, and its value; NULL if there is none, or its digits do not suffice.
+ * decimal -1: no mark is one. */
+const uint8_t *lb_number(const uint64_t *powers, const uint8_t *p, const uint8_t *end, int decimal, double *value);
 
 /* The end of the date and time that begins here; NULL if there is none, or in a rarer form. */
 const uint8_t *lb_moment(const uint8_t *p, const uint8_t *end, int has_zone, int64_t *ns);

@@ -50,7 +50,7 @@ static int first_digits(const uint8_t *p, const uint8_t *end, uint64_t *w)
     return more;
 }
 
-const uint8_t *lb_number(const uint64_t *powers, const uint8_t *p, const uint8_t *end, uint8_t decimal, double *value)
+const uint8_t *lb_number(const uint64_t *powers, const uint8_t *p, const uint8_t *end, int decimal, double *value)
 {
     const int is_negative = p < end && *p == '-';
     p += p < end && (*p == '-' || *p == '+');

@@ -88,7 +88,7 @@ static const uint8_t *read_plain(const lb_table_layout *t, uint8_t kind, const u
                                  double *out)
 {
     if (kind == LB_CELL_NUMBER) {
-        return lb_number(t->powers, p, end, t->decimal, out);
+        return lb_number(t->powers, p, end, t->decimal == t->delimiter ? -1 : t->decimal, out);
     }
     int64_t ns = 0;
     p = lb_moment(p, end, t->has_zone, &ns);

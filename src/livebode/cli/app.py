@@ -79,9 +79,9 @@ class _Command(_Light, TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error names the options that it concerns."""
-        group = ctx.parent.info_name if ctx.parent else None
+        group = ctx.parent.info_name if ctx.parent else ""
         # Most modules of these packages import PyArrow, which both extras bring.
-        arrow = needing("PyArrow", group, f"livebode {group}") if group in GROUPS else nullcontext()
+        arrow = needing("PyArrow", group, f"the command {group}") if group in GROUPS else nullcontext()
         try:
             with arrow:
                 return super().invoke(ctx)

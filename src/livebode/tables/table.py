@@ -74,9 +74,11 @@ class Table:
         TypeError
             If a column contains neither numbers, truth values nor text.
         """
+        if isinstance(data, Table):
+            return data
         from livebode.tables.exchange import from_arrow  # nanoarrow is loaded where tables are exchanged
 
-        return data if isinstance(data, Table) else from_arrow(data)
+        return from_arrow(data)
 
     @classmethod
     def join(cls, parts: Sequence[Table]) -> Table:
