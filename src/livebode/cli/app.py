@@ -79,7 +79,7 @@ class _Command(_Light, TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error names the options that it concerns."""
-        group = ctx.parent.info_name if ctx.parent else None
+        group = ctx.parent.info_name if ctx.parent else ""
         # Most modules of these packages import PyArrow, which both extras bring.
         arrow = needing("PyArrow", group, f"the command {group}") if group in GROUPS else nullcontext()
         try:
