@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Lines, RecordError, Responses
+from livebode.records.stored_precision import in_stored_precision
 from livebode.records.wide_responses import from_wide, to_wide, wide_options, wide_schema
 from tests.support.errors import refused
 from tests.support.responses import any_responses, made
@@ -72,6 +73,7 @@ def test_the_wide_form_is_rounded_to_float32_or_exact(
     if lossless:
         assert back.equals(responses)
         return
+    assert back.equals(in_stored_precision(responses))
     assert (back.lines, back.quantity, back.unit) == (responses.lines, responses.quantity, responses.unit)
     for name in EXACT:
         assert np.array_equal(getattr(back, name), getattr(responses, name)), name
