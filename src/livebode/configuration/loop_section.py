@@ -27,12 +27,15 @@ class _ControllerSection(ConfigurationSection):
         "zero-order": the output is held between computations. "none": the controller interpolates.
     delay_ticks
         Delay between reading the input and acting, in samples of the recording, in addition to the hold.
+    lowpass_s
+        Time constant in seconds of a low-pass of first order on the controller's output; 0: no filter.
     """
 
     rate_hz: Positive
     rate_divider: Annotated[int, Field(ge=1)] = 1
     hold: Literal["zero-order", "none"] = "zero-order"
     delay_ticks: Ticks = 0
+    lowpass_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
 
 
 class PIDSection(_ControllerSection):
