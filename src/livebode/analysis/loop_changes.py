@@ -90,7 +90,9 @@ def _of_controller(section: LoopSection, name: str) -> Iterator[LoopChange]:
         return
     yield _number(section, name, "gain", "gain", (part.gain,))
     if part.integral_time_s < inf:
-        yield _number(section, name, "time constant", "integral_time_s", (part.integral_time_s,), "s", least=tick_s / 10)
+        yield _number(
+            section, name, "time constant", "integral_time_s", (part.integral_time_s,), "s", least=tick_s / 10
+        )
         for rule in _RULES:
             if rule != part.integrator:
                 yield _word(section, name, "integrator", "integrator", rule)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -18,6 +19,8 @@ LoopVerdict = Literal["as described", "one change", "not explained"]
 
 ALPHA = 0.002
 """Probability that a true description is not found to be as described."""
+HARMLESS = 5e-4
+"""Share of the signals, and relative change of a number, that is below the accuracy of any description."""
 _ALIKE = 10.0  # of twice the log-likelihood: odds of 150 to 1
 _STEPS_MAX = 25
 _Z95 = 1.96
@@ -86,7 +89,10 @@ class LoopCheck:
         Changes that fit as well as the best one, the best first; the signals do not tell them apart. Empty if the loop
         is as described.
     nearest
-        The change that explains most, if none explains all.
+        The change that explains most, if none explains all and the rest is not harmless.
+    harmless
+        Whether the signals differ from the description significantly, but by less than 0.05 %: no single word explains
+        it, or a number does that changes by less than this.
     windows
         Number of windows.
     """
@@ -95,11 +101,12 @@ class LoopCheck:
     p: float
     explanations: tuple[Explanation, ...]
     nearest: Explanation | None
+    harmless: bool
     windows: int
 
     @property
     def verdict(self) -> LoopVerdict:
-        if self.p >= ALPHA:
+        if self.p >= ALPHA or self.harmless:
             return "as described"
         return "one change" if self.explanations else "not explained"
 
@@ -123,7 +130,10 @@ class LoopCheck:
     def sentence(self) -> str:
         """The verdict."""
         if self.verdict == "as described":
-            return f"loop checked: as described (p = {self.p:.2g}, {self.residual.value.size} lines)"
+            count = self.residual.value.size
+            if self.harmless:
+                return f"loop checked: as described, within {100 * HARMLESS:g} % of the signals at {count} lines"
+            return f"loop checked: as described (p = {self.p:.2g}, {count} lines)"
         away, bound, at_hz = self.largest
         size = f"the controller differs by {100 * away:.3g} ± {100 * bound:.2g} % at {at_hz:g} Hz"
         if np.isnan(away):
@@ -188,14 +198,30 @@ def check_loop(signals: LoopSignals, section: LoopSection) -> LoopCheck:
     residual = signals.judge(described)
     windows = round(signals.dof * (1 + 2 / 36) + 1)
     if (p := residual.p()) >= ALPHA:
-        return LoopCheck(residual, p, (), None, windows)
+        return LoopCheck(residual, p, (), None, False, windows)
     tried = [_explained(signals, change) for change in single_changes(section, signals.lines.rate_hz)]
     tried.sort(key=lambda one: one.score)
-    best = tried[0]
-    if best.p < ALPHA:
-        return LoopCheck(residual, p, (), best, windows)
-    alike = tuple(one for one in tried if one.p >= ALPHA and one.score - best.score < _ALIKE)
-    return LoopCheck(residual, p, alike, None, windows)
+    fitting = [one for one in tried if one.p >= ALPHA]
+    if not fitting and residual.share < HARMLESS:
+        return LoopCheck(residual, p, (), None, True, windows)
+    fitting = fitting or [one for one in tried if one.residual.share < HARMLESS]
+    if not fitting:
+        return LoopCheck(residual, p, (), tried[0], False, windows)
+    best = fitting[0]
+    if _changes_little(best):
+        return LoopCheck(residual, p, (), None, True, windows)
+    # Where a harmless rest remains, all misfits are larger by what it adds.
+    excess = max(1.0, best.residual.misfit / (2 * best.residual.value.size))
+    alike = tuple(one for one in fitting if one.score - best.score < _ALIKE * excess)
+    return LoopCheck(residual, p, alike, None, False, windows)
+
+
+def _changes_little(best: Explanation) -> bool:
+    """Whether it changes a described number by less than its accuracy."""
+    described, value = best.change.described, best.value
+    if best.bound_95 is None or not isinstance(described, float) or not isinstance(value, float):
+        return False
+    return bool(abs(value - described) < HARMLESS * abs(described))
 
 
 def _explained(signals: LoopSignals, change: LoopChange) -> Explanation:
@@ -212,7 +238,7 @@ def _explained(signals: LoopSignals, change: LoopChange) -> Explanation:
     return Explanation(change, value, _Z95 * sigma, residual, residual.p(fitted=1))
 
 
-def _fitted(judged: Any, start: float, least: float) -> tuple[float, float, LoopResidual]:
+def _fitted(judged: Callable[[float], LoopResidual], start: float, least: float) -> tuple[float, float, LoopResidual]:
     """The number with the least misfit, its sigma, and the remainder: Gauss–Newton steps, halved while they fail."""
     value, residual = start, judged(start)
     step = 1e-5 * (abs(start) or 1.0)

@@ -103,7 +103,7 @@ class LoopSignals:
         variance = np.maximum(variance, 0) + self.step**2 + _ROUNDING**2 * np.sum(np.abs(parts) ** 2, axis=1)
         output_variance = self.covariance[:, 2, 2].real * np.abs(weights[:, 2]) ** 2
         known = np.abs(parts[:, 2]) > _WEAK * np.sqrt(output_variance)
-        return LoopResidual(f, parts.sum(axis=1), variance, self.dof, parts[:, 2], known)
+        return LoopResidual(f, parts.sum(axis=1), variance, self.dof, parts[:, 2], np.abs(parts).max(axis=1), known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +120,8 @@ class LoopResidual:
         Complex degrees of freedom of the variance.
     feedback
         F·y of the description, (lines,).
+    largest
+        The largest of |u|, |E·w| and |F·y|, (lines,).
     known
         Where y is large enough to give the controller, (lines,).
     """
@@ -129,6 +131,7 @@ class LoopResidual:
     variance: Floats
     dof: float
     feedback: Complex
+    largest: Floats
     known: NDArray[np.bool_]
 
     @property
@@ -152,6 +155,12 @@ class LoopResidual:
         """
         away = np.abs(self.value) ** 2 / self.variance
         return float(2 * self.dof * np.sum(np.log1p(away / self.dof)))
+
+    @property
+    def share(self) -> float:
+        """Rms over the lines of what noise does not explain of the remainder, over that of the largest signal."""
+        more = np.sum(np.abs(self.value) ** 2 - self.variance)
+        return float(np.sqrt(max(more, 0.0) / np.sum(self.largest**2)))
 
     def p(self, fitted: int = 0) -> float:
         """Probability of a misfit as large as this one, of a true description of which `fitted` numbers were fitted."""
