@@ -66,6 +66,8 @@ def _of_loop(section: LoopSection) -> Iterator[LoopChange]:
         possible = section.velocity is not None or place != "velocity reference"
         if place != section.excitation_at and possible:
             yield _word(section, "", "injection", "excitation_at", place)
+    if section.position is not None:
+        yield _word(section, "", "hold", "velocity_differenced", not section.velocity_differenced)
     yield _number(section, "", "gain", "entry_gain", (section.entry_gain,))
 
 

@@ -200,7 +200,7 @@ def check_loop(signals: LoopSignals, section: LoopSection) -> LoopCheck:
     if (p := residual.p()) >= ALPHA:
         return LoopCheck(residual, p, (), None, False, windows)
     tried = [_explained(signals, change) for change in single_changes(section, signals.lines.rate_hz)]
-    tried.sort(key=lambda one: one.score)
+    tried.sort(key=lambda one: round(one.score, 6))  # two names of the same change come in the order of the list
     fitting = [one for one in tried if one.p >= ALPHA]
     if not fitting and residual.share < HARMLESS:
         return LoopCheck(residual, p, (), None, True, windows)

@@ -15,7 +15,7 @@ from livebode.analysis.validation import clean_stretch
 from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration, without_null
-from livebode.core import Block, RecordError, SignalError
+from livebode.core import Block, Channel, RecordError, SignalError
 from livebode.records import RunRecord
 from livebode.records.loop_check_file import read_loop_check, write_loop_check
 from livebode.records.sample_table import channels_of
@@ -160,7 +160,7 @@ def _recorded(run: RunRecord, names: list[str]) -> Block:
     at = int(np.argmax(lengths))
     first = int(starts[at]) + (0 if clean[starts[at]] else 1)
     stretch = data[:, first : int(starts[at] + lengths[at])]
-    return Block(stretch, tuple(names), float(run.found["rate_hz"]))
+    return Block(stretch, [Channel(name) for name in names], float(run.found["rate_hz"]))
 
 
 def _tables(run: RunRecord, names: list[str]) -> Iterator[tuple[Any, Any]]:

@@ -99,6 +99,8 @@ class LoopSection(ConfigurationSection):
         The velocity controller. It belongs to an output that is a velocity.
     position
         The position controller around the velocity controller.
+    velocity_differenced
+        The velocity is the difference of the last two positions that the position controller reads.
     position_pd
         The whole controller of an output that is a position.
     """
@@ -110,6 +112,7 @@ class LoopSection(ConfigurationSection):
     output_logged: Literal["before", "after"] = "before"
     velocity: PIDSection | None = None
     position: PIDSection | None = None
+    velocity_differenced: bool = False
     position_pd: PositionPDSection | None = None
 
     def build(self, rate_hz: float) -> Loop:
@@ -156,7 +159,9 @@ class LoopSection(ConfigurationSection):
                 )
             return None
         velocity = PID(**self.velocity.model_dump())
-        return velocity if self.position is None else Cascade(velocity, PID(**self.position.model_dump()))
+        if self.position is None:
+            return velocity
+        return Cascade(velocity, PID(**self.position.model_dump()), self.velocity_differenced)
 
     def _entry(self) -> Model | None:
         if self.excitation_at == "plant input":

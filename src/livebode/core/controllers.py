@@ -200,6 +200,14 @@ class Cascade(Algebra):
     at the velocity controller's rate, exact to about 2e-6 where the loop samples both. Velocity feedforward acts on
     the reference only and so does not appear.
 
+    Parameters
+    ----------
+    velocity, position
+        The controllers.
+    velocity_differenced
+        The velocity is the difference of the last two positions times the rate, so that the position is its sum, the
+        backward integral.
+
     Examples
     --------
     >>> loop = Cascade(
@@ -212,8 +220,10 @@ class Cascade(Algebra):
 
     velocity: PID
     position: DriveTiming
+    velocity_differenced: bool = False
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)
-        position = integral(f, self.velocity.rate_hz * self.velocity.rate_divider, "trapezoidal")
+        rule: Rule = "backward" if self.velocity_differenced else "trapezoidal"
+        position = integral(f, self.velocity.rate_hz * self.velocity.rate_divider, rule)
         return np.asarray(self.velocity.response(f) * (1 + self.position.response(f) * position))

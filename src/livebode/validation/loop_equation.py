@@ -150,8 +150,8 @@ class LoopResidual:
     def misfit(self) -> float:
         """Twice the negative logarithm of the product of the lines' p values.
 
-        |value|²/variance follows F(2, 2d), whose p value is (1 + x/d)^−d. By Fisher's method the sum follows χ² with two
-        degrees of freedom for each line.
+        |value|²/variance follows F(2, 2d), whose p value is (1 + x/d)^−d. By Fisher's method the sum follows χ² with
+        two degrees of freedom for each line.
         """
         away = np.abs(self.value) ** 2 / self.variance
         return float(2 * self.dof * np.sum(np.log1p(away / self.dof)))
