@@ -48,6 +48,12 @@ AXES = (
     Axis(
         "encoder of 4096 counts, cogging, friction",
         Drive(position_gain=20.0),
+        Machine(counts_per_turn=4096, cogging_n_m=0.1, friction_n_m=0.05, load_noise_n_m=0.05, **NOISE),
+        Lines.parse("10:140:10", 4000, 400),
+    ),
+    Axis(
+        "the same with a fifth of the noise: steps repeat",
+        Drive(position_gain=20.0),
         Machine(counts_per_turn=4096, cogging_n_m=0.1, friction_n_m=0.05, load_noise_n_m=0.01, **NOISE),
         Lines.parse("10:140:10", 4000, 400),
     ),
