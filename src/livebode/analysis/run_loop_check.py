@@ -160,7 +160,7 @@ def _recorded(run: RunRecord, names: list[str]) -> Block:
     at = int(np.argmax(lengths))
     first = int(starts[at]) + (0 if clean[starts[at]] else 1)
     stretch = data[:, first : int(starts[at] + lengths[at])]
-    return Block(stretch, [Channel(name) for name in names], float(run.found["rate_hz"]))
+    return Block(stretch, tuple(Channel(name) for name in names), float(run.found["rate_hz"]))
 
 
 def _tables(run: RunRecord, names: list[str]) -> Iterator[tuple[Any, Any]]:

@@ -101,7 +101,7 @@ class DriveTiming(Algebra):
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)
         tick = np.exp(-2j * np.pi * f / (self.rate_hz * self.rate_divider))
-        held = 1.0
+        held = np.ones(f.shape, dtype=np.complex128)
         if self.hold == "zero-order":
             held = np.mean([tick**i for i in range(self.rate_divider)], axis=0)
         if self.lowpass_s:
