@@ -1,6 +1,6 @@
 """How often `livebode check-loop` finds a wrong word of the description, and how often it finds one in a right one.
 
-Run `python -m studies.check_loop --runs 500`. The axes are a belt axis, one with an encoder of few counts, cogging and
+Run `python -m studies.check_loop --runs 400`. The axes are a belt axis, one with an encoder of few counts, cogging and
 friction, and one at another rate with correlated noise; on all of them the recorded torque has noise. Each word is
 changed alone. It prints a table: noticed (not as described), named (the change of this word is among those that cannot
 be told apart), and first (it is the first of them; some are the same thing, such as a tick of delay and an output that
@@ -132,7 +132,7 @@ def false_alarms(axis: Axis, runs: int, seed: int) -> float:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=500, help="recordings of each axis and word")
+    parser.add_argument("--runs", type=int, default=400, help="recordings of each axis and word")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     print(f"{given.runs} recordings of {PERIODS} periods for each row; seed {given.seed}")
