@@ -7,9 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from livebode.analysis.loop_check import check_loop
+from livebode.configuration.loop_section import LoopSection
 from livebode.core import Block, Gain, Lines, Loop, PositionPD, Response
 from livebode.estimation import Settings, Tracker
 from livebode.sources import open_log, sinumerik_spectra
+from livebode.validation import LoopSignals
 from tests.support.motor_bench import BENCH, bench_responses, motorbench, whole
 from tests.support.real_recordings import recording
 
@@ -81,13 +84,16 @@ EMPS_GAIN_N_V = 35.15065188248547
 EMPS = Lines.parse("5:61:2", rate_hz=1000, window=1000)
 
 
-@cache
-def emps(estimator: str) -> Response:
-    """From the difference of two runs on one trajectory, which isolates the injection."""
+def emps_signals() -> Block:
+    """The difference of two runs on one trajectory, which isolates the injection; it starts in the first period."""
     names = ("qm", "vir")
     quiet, injected = (whole(f"emps/{run}.mat", names) for run in ("DATA_EMPS", "DATA_EMPS_PULSES"))
     w = whole("emps/DATA_EMPS_PULSES.mat", ("pulses_N",))
-    data = np.vstack([injected.data - quiet.data, w.data])
+    return Block(np.vstack([injected.data - quiet.data, w.data]), (*names, "pulses_N"), 1000.0).cut(1000, len(w))
+
+
+@cache
+def emps(estimator: str) -> Response:
     controller = PositionPD(position_gain=160.18, velocity_gain=243.45, smoothed=True, rate_hz=1000)
     settings = Settings(
         lines=EMPS,
@@ -100,8 +106,27 @@ def emps(estimator: str) -> Response:
         forgetting=1.0,
         loop=Loop(controller, entry=Gain(1.014)),
     )
-    # The injection starts within the first period.
-    return Tracker(settings).process(Block(data, (*names, "pulses_N"), 1000.0).cut(1000, len(w)))[-1]
+    return Tracker(settings).process(emps_signals())[-1]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "key"),
+    [
+        ({}, ""),
+        ({"velocity_gain": 246.0}, "loop.position_pd.velocity_gain"),
+        ({"position_gain": 162.0}, "loop.position_pd.position_gain"),
+        ({"delay_ticks": 1}, "loop.position_pd.delay_ticks"),
+        ({"smoothed": False}, "loop.position_pd.smoothed"),
+    ],
+)
+def test_emps_is_as_described_and_a_wrong_word_is_named(wrong: dict[str, object], key: str) -> None:
+    described = {"position_gain": 160.18, "velocity_gain": 243.45, "smoothed": True, "rate_hz": 1000}
+    section = LoopSection.model_validate({"entry_gain": 1.014, "position_pd": described | wrong})
+    signals = LoopSignals.of(emps_signals(), EMPS, input="vir", excitation="pulses_N", output="qm")
+    found = check_loop(signals, section)
+    print(found.sentence)
+    assert [one.change.key for one in found.explanations[:1]] == ([key] if key else [])
+    assert (found.verdict == "as described") == (not wrong)
 
 
 def test_emps_joint_and_indirect_agree() -> None:

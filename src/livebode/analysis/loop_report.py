@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from livebode.analysis.fits import fit_run
+from livebode.analysis.run_loop_check import NOT_CHECKED, CheckedLoop, checked_loop
 from livebode.configuration.axis import Axis
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
@@ -51,6 +52,8 @@ class LoopReport:
         Proposed change, judged over the places.
     responses
         Measured response, one row.
+    checked
+        Whether the description of the controllers was checked.
     """
 
     fit: Fit
@@ -61,6 +64,7 @@ class LoopReport:
     places: Margins
     tuning: Tuning
     responses: Responses
+    checked: CheckedLoop = NOT_CHECKED
 
     @property
     def message(self) -> str:
@@ -99,6 +103,7 @@ class LoopReport:
             "places": len(self.places),
             "worst_over_places": worst(self.places),
             "tuning": self.tuning.plain(),
+            "loop_check": asdict(self.checked),
         }
 
 
@@ -122,7 +127,8 @@ def loop_of_run(
         section = own or FitSection.model_validate(own_words.get("fit", {}))
     found, words = fit_run(directory, section)
     responses = Responses.join(list(run.steady_batches()))  # the fitted responses
-    return loop_report(found, words, responses, loop.build(responses.lines.rate_hz), peak_sensitivity)
+    report = loop_report(found, words, responses, loop.build(responses.lines.rate_hz), peak_sensitivity)
+    return replace(report, checked=checked_loop(directory, loop))
 
 
 def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sensitivity: float = 2.0) -> LoopReport:

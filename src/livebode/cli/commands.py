@@ -24,6 +24,8 @@ SUMMARIES: Mapping[str, str] = {
     "measure": "Design an excitation, play it on the controller, record, and track the response; Ctrl-C ramps it down.",
     "query": "Query the tables of a run with SQL (DuckDB).",
     "export": "Write the responses or the fitted parameters of a run in a format of other programs.",
+    "check-loop": "Compare the described controllers with the recorded signals: as described, or the change that "
+    "explains them.",
     "margins": "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter "
     "if needed.",
     "validate": "Simulate the fitted model with another recording and test whether the residual correlates with the "
@@ -80,5 +82,6 @@ def subcommand(group: str, name: str) -> Callable[..., Any]:
 
 def command(name: str) -> Callable[..., Any]:
     """The function of a command, from its module `NAME_command`."""
+    name = name.replace("-", "_")
     function: Callable[..., Any] = getattr(import_module(f"livebode.cli.{name}_command"), f"{name}_command")
     return function

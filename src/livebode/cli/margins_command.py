@@ -61,6 +61,7 @@ def show_loop(found: LoopReport) -> None:
     """Print the margins with bounds and marks, and the proposals."""
     low, high = found.fit.band_hz
     print(f"loop around the {found.fit.model.name} model, {found.of}; lines {low:g} … {high:g} Hz")
+    print(f"  {found.checked.sentence}")
     if not found.margins.ok[0]:
         print(f"  no margins: {found.message}")
     else:

@@ -27,12 +27,15 @@ class _ControllerSection(ConfigurationSection):
         "zero-order": the output is held between computations. "none": the controller interpolates.
     delay_ticks
         Delay between reading the input and acting, in samples of the recording, in addition to the hold.
+    lowpass_s
+        Time constant in seconds of a low-pass of first order on the controller's output; 0: no filter.
     """
 
     rate_hz: Positive
     rate_divider: Annotated[int, Field(ge=1)] = 1
     hold: Literal["zero-order", "none"] = "zero-order"
     delay_ticks: Ticks = 0
+    lowpass_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
 
 
 class PIDSection(_ControllerSection):
@@ -96,6 +99,8 @@ class LoopSection(ConfigurationSection):
         The velocity controller. It belongs to an output that is a velocity.
     position
         The position controller around the velocity controller.
+    velocity_differenced
+        The velocity is the difference of the last two positions that the position controller reads.
     position_pd
         The whole controller of an output that is a position.
     """
@@ -107,6 +112,7 @@ class LoopSection(ConfigurationSection):
     output_logged: Literal["before", "after"] = "before"
     velocity: PIDSection | None = None
     position: PIDSection | None = None
+    velocity_differenced: bool = False
     position_pd: PositionPDSection | None = None
 
     def build(self, rate_hz: float) -> Loop:
@@ -153,7 +159,9 @@ class LoopSection(ConfigurationSection):
                 )
             return None
         velocity = PID(**self.velocity.model_dump())
-        return velocity if self.position is None else Cascade(velocity, PID(**self.position.model_dump()))
+        if self.position is None:
+            return velocity
+        return Cascade(velocity, PID(**self.position.model_dump()), self.velocity_differenced)
 
     def _entry(self) -> Model | None:
         if self.excitation_at == "plant input":

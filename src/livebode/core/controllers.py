@@ -51,12 +51,15 @@ class DriveTiming(Algebra):
         "zero-order" (the output is held) or "none" (for a Model of a filter that interpolates by itself).
     delay_ticks
         Whole ticks of the recorded loop between reading its input and acting, beyond the hold.
+    lowpass_s
+        Time constant Tl of a low-pass of first order on its output, 1/(1 + Tl·D) at `rate_hz`; 0: none.
     """
 
     rate_hz: float
     rate_divider: int = 1
     hold: Hold = "zero-order"
     delay_ticks: int = 0
+    lowpass_s: float = 0.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
@@ -77,6 +80,14 @@ class DriveTiming(Algebra):
                 argument=name,
                 value=value,
             )
+        if not 0 <= self.lowpass_s < inf:
+            raise UsageError(
+                "out-of-range",
+                f"lowpass_s={self.lowpass_s} of a controller is not a time constant",
+                "specify 0 or more seconds",
+                argument="lowpass_s",
+                value=self.lowpass_s,
+            )
         if self.hold not in ("zero-order", "none"):
             raise UsageError(
                 "not-one-of",
@@ -90,9 +101,11 @@ class DriveTiming(Algebra):
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)
         tick = np.exp(-2j * np.pi * f / (self.rate_hz * self.rate_divider))
-        held = 1.0
+        held = np.ones(f.shape, dtype=np.complex128)
         if self.hold == "zero-order":
             held = np.mean([tick**i for i in range(self.rate_divider)], axis=0)
+        if self.lowpass_s:
+            held = held / (1 + self.lowpass_s / integral(f, self.rate_hz, "backward"))
         return np.asarray(self.law(f) * held * tick**self.delay_ticks, dtype=np.complex128)
 
     def law(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -187,6 +200,14 @@ class Cascade(Algebra):
     at the velocity controller's rate, exact to about 2e-6 where the loop samples both. Velocity feedforward acts on
     the reference only and so does not appear.
 
+    Parameters
+    ----------
+    velocity, position
+        The controllers.
+    velocity_differenced
+        The velocity is the difference of the last two positions times the rate, so that the position is its sum, the
+        backward integral.
+
     Examples
     --------
     >>> loop = Cascade(
@@ -199,8 +220,10 @@ class Cascade(Algebra):
 
     velocity: PID
     position: DriveTiming
+    velocity_differenced: bool = False
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)
-        position = integral(f, self.velocity.rate_hz * self.velocity.rate_divider, "trapezoidal")
+        rule: Rule = "backward" if self.velocity_differenced else "trapezoidal"
+        position = integral(f, self.velocity.rate_hz * self.velocity.rate_divider, rule)
         return np.asarray(self.velocity.response(f) * (1 + self.position.response(f) * position))

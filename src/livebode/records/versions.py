@@ -7,8 +7,9 @@ from typing import Any
 
 from livebode.core import RecordError
 
-VERSIONS = {"run": 1, "manifest": 2, "journal": 1, "references": 1, "notes": 1}
-"""Newest readable versions: layout of a run directory, manifest.jsonl, journal, references.json and notes.json."""
+VERSIONS = {"run": 1, "manifest": 2, "journal": 1, "references": 1, "notes": 1, "loop check": 1}
+"""Newest readable versions: layout of a run directory, manifest.jsonl, journal, references.json, notes.json and
+loop-check.json."""
 
 
 def format_of(name: str) -> dict[str, Any]:

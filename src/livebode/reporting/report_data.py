@@ -14,6 +14,7 @@ from livebode.analysis.averaged import Averaged, averaged
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import LoopReport, loop_report
 from livebode.analysis.parameter_track import MARGINS, Track, tracks
+from livebode.analysis.run_loop_check import checked_loop
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration, recorded_report
@@ -121,7 +122,7 @@ def read(directory: Path, judged: Judged | None = None, header: ReportSection | 
     run = RunRecord.open(directory)
     configuration, of = recorded_configuration(run.summary), averaged(run)
     fit, fit_words = _fit(configuration, of)
-    loop, loop_words = _loop(configuration, of, fit)
+    loop, loop_words = _loop(run, configuration, of, fit)
     over = tracks(run, of.overview.sample, of.overview.time_s)
     event_summary = EventSummary.of(run.each_event_and_damage())
     own = recorded_report(run.summary) if header is None else header
@@ -140,17 +141,21 @@ def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
     return None, tr("The fit to {what} was rejected: {why}.", what=recognised(words), why=recognised(found.sentence))
 
 
-def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple[LoopReport | None, str]:
-    described = LoopSection.model_validate(configuration.get("loop", {})).build(of.overview.lines.rate_hz)
+def _loop(
+    run: RunRecord, configuration: dict[str, Any], of: Averaged, fit: Fit | None
+) -> tuple[LoopReport | None, str]:
+    section = LoopSection.model_validate(configuration.get("loop", {}))
+    described = section.build(of.overview.lines.rate_hz)
     if described.feedback is None:
         return None, tr("No margins: the run's configuration does not describe the loop ([loop]).")
     if fit is None:
         return None, tr("No margins: they need a fitted model, and there is none.")
     try:
         found = loop_report(fit, "the mean", of.overview, described)
+        checked = checked_loop(run.path, section)
     except LivebodeError as error:
         return None, tr("No margins: {why}.", why=recognised(str(error)))
-    return replace(found, responses=Responses.of(of.response)), ""
+    return replace(found, responses=Responses.of(of.response), checked=checked), ""
 
 
 def recordings(source: dict[str, Any]) -> list[str]:

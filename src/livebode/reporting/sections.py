@@ -181,7 +181,20 @@ def _about_margins(loop: LoopReport, fit: Fit | None) -> str:
         "{verdict}: {sentence}",
         size=size, around=around, at=at_hz, verdict=recognised(loop.tuning.verdict),
         sentence=recognised(loop.tuning.sentence),
-    )  # fmt: skip
+    ) + " " + _about_description(loop)  # fmt: skip
+
+
+def _about_description(loop: LoopReport) -> str:
+    """Whether the margins are of a loop whose description was checked."""
+    if loop.checked.verdict == "not checked":
+        return tr("The description of the controllers was not compared with the signals (livebode check-loop).")
+    if loop.checked.verdict == "as described":
+        return tr("The description of the controllers was compared with the signals: the loop is as described.")
+    return tr(
+        "The description of the controllers was compared with the signals and does not fit, so the margins are wrong: "
+        "{what}.",
+        what=loop.checked.sentence,
+    )
 
 
 def events(of: ReportData) -> Section:

@@ -2,6 +2,7 @@
 
 from livebode.validation.correlation import LIMIT, SMALL, Correlation
 from livebode.validation.lines import FittedModel, LineValidation, fitted_model, validate_at_lines
+from livebode.validation.loop_equation import LoopResidual, LoopSignals
 from livebode.validation.validate import Validation, validate
 
 __all__ = [
@@ -10,6 +11,8 @@ __all__ = [
     "Correlation",
     "FittedModel",
     "LineValidation",
+    "LoopResidual",
+    "LoopSignals",
     "Validation",
     "fitted_model",
     "validate",

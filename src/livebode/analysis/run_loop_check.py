@@ -1,0 +1,176 @@
+"""The loop of a run checked on its samples, and the result of the newest check."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from livebode.analysis.loop_check import LoopCheck, check_loop
+from livebode.analysis.validation import clean_stretch
+from livebode.configuration.axis import Axis
+from livebode.configuration.loop_section import LoopSection
+from livebode.configuration.recorded import recorded_configuration, without_null
+from livebode.core import Block, Channel, RecordError, SignalError
+from livebode.records import RunRecord
+from livebode.records.loop_check_file import read_loop_check, write_loop_check
+from livebode.records.sample_table import channels_of
+from livebode.sources import open_log
+from livebode.validation import LoopSignals
+
+_SAMPLES_MAX = 10_000_000  # of a long live run: its first ones
+_WORDS = {
+    "excitation": "the excitation w (signals.excitation)",
+    "input": "the plant input u (signals.input)",
+    "output": "the output y (signals.output)",
+}
+
+
+@dataclass(frozen=True)
+class CheckedLoop:
+    """Whether the description of a loop was checked, in short.
+
+    Attributes
+    ----------
+    verdict
+        "as described", "one change", "not explained", or "not checked".
+    sentence
+        The result, or why there is none.
+    """
+
+    verdict: str
+    sentence: str
+
+
+NOT_CHECKED = CheckedLoop("not checked", "loop not checked: its description was not compared with the signals")
+CHANGED = CheckedLoop("not checked", "loop not checked: another description was compared with the signals")
+
+
+def check_loop_of_run(
+    directory: Path, section: LoopSection | None = None, channels: dict[str, str | None] | None = None
+) -> tuple[LoopCheck, LoopSection]:
+    """Check a run's loop, and the description that was checked: `section`, else that of the run.
+
+    The samples are those of its recordings, else those that the run recorded; the longest stretch without a gap.
+
+    Parameters
+    ----------
+    directory
+        Of the run.
+    section
+        Another description of the loop.
+    channels
+        Channels by role (excitation, input, output) that replace those of the run.
+
+    Raises
+    ------
+    RecordError
+        If the run names no excitation or no input, or has no samples.
+    RecordingError, SignalError
+        If a recording or a channel is missing, or all stretches are too short.
+    UsageError, ConfigError
+        If the loop is not described, or its rates differ from that of the samples.
+    """
+    run = RunRecord.open(directory)
+    words = recorded_configuration(run.summary)
+    if section is None:
+        section = LoopSection.model_validate(words.get("loop", {}))
+    section.build(run.lines.rate_hz)
+    given = {role: name for role, name in (channels or {}).items() if name}
+    roles = {role: {**words.get("signals", {}), **given}.get(role) for role in _WORDS}
+    for role, name in roles.items():
+        if name is None:
+            raise RecordError(
+                "not-tracked",
+                f"the run does not name {_WORDS[role]}, which a check of its loop needs",
+                f"run again with signals.{role}, or name the channel here",
+                path=str(directory),
+                role=role,
+            )
+    names = list(dict.fromkeys(str(name) for name in roles.values()))
+    if len(names) < len(roles):
+        raise SignalError(
+            "role-shared",
+            f"excitation, input and output of a loop are three channels, and these are {', '.join(names)}",
+            "name three channels",
+            channels=names,
+        )
+    block = _longest_stretch(run, words, names)
+    if abs(block.rate_hz / run.lines.rate_hz - 1) > 1e-9:
+        raise SignalError(
+            "rate-differs",
+            f"the samples have {block.rate_hz:g} Hz, and the lines of the run belong to {run.lines.rate_hz:g} Hz",
+            "check the loop of a run that was tracked from samples at an even rate",
+            rate_hz=block.rate_hz,
+            expected_hz=run.lines.rate_hz,
+        )
+    signals = LoopSignals.of(block, run.lines, **{role: str(name) for role, name in roles.items()})
+    return check_loop(signals, section), section
+
+
+def store_loop_check(directory: Path, found: LoopCheck, section: LoopSection) -> Path:
+    """Write the result and the description that it belongs to into a directory."""
+    return write_loop_check(directory, {**found.plain(), "loop": section.model_dump(mode="json")})
+
+
+def checked_loop(directory: Path, section: LoopSection) -> CheckedLoop:
+    """What is known of this description of a run's loop: the newest check, if it was of the same description."""
+    stored = read_loop_check(directory)
+    if stored is None:
+        return NOT_CHECKED
+    try:
+        of = LoopSection.model_validate(without_null(stored["loop"]))
+    except (ValidationError, AttributeError):
+        return CHANGED
+    return CheckedLoop(str(stored.get("verdict")), str(stored["sentence"])) if of == section else CHANGED
+
+
+def _longest_stretch(run: RunRecord, words: dict[str, Any], names: list[str]) -> Block:
+    source = words.get("source", {})
+    if not source.get("log"):
+        return _recorded(run, names)
+    axis = Axis.of({key: words[key] for key in ("source", "signals", "monitoring") if key in words}, str(run.path))
+    given, ready = axis.source, axis.ready
+    found = []
+    for log in given.logs:
+        opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=names)
+        found.append(clean_stretch(opened, names, ready if ready and opened.has(ready.channel) else None)[0])
+    return max(found, key=len)
+
+
+def _recorded(run: RunRecord, names: list[str]) -> Block:
+    """The longest stretch of the samples that a run recorded."""
+    parts = list(_tables(run, names))
+    if not parts:
+        raise RecordError(
+            "no-samples",
+            f"the run in {str(run.path)!r} has no recorded samples of {', '.join(names)}",
+            "record them with samples = true in [record]",
+            path=str(run.path),
+        )
+    number, data = (np.concatenate(part, axis=-1) for part in zip(*parts))
+    clean = np.isfinite(data).all(axis=0)
+    follows = np.concatenate([[False], np.diff(number) == 1]) & clean
+    starts = np.flatnonzero(~follows)
+    lengths = np.diff(np.append(starts, number.size))
+    at = int(np.argmax(lengths))
+    first = int(starts[at]) + (0 if clean[starts[at]] else 1)
+    stretch = data[:, first : int(starts[at] + lengths[at])]
+    return Block(stretch, tuple(Channel(name) for name in names), float(run.found["rate_hz"]))
+
+
+def _tables(run: RunRecord, names: list[str]) -> Iterator[tuple[Any, Any]]:
+    count = 0
+    for table in run.tables("samples"):
+        columns = [channel.name for channel in channels_of(table.schema)]
+        if not set(names) <= set(columns) or count > _SAMPLES_MAX:
+            return
+        count += table.num_rows
+        yield (
+            table["sample"].to_numpy(),
+            np.stack([table.column(2 + columns.index(name)).to_numpy() for name in names]),
+        )

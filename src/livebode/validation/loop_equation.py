@@ -1,0 +1,177 @@
+"""The equation of a loop, u = E·w − F·y, tested on the recorded signals at the lines, without a model of the plant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import Block, Lines, Loop, SignalError
+from livebode.core.installing import needing
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+WINDOWS_MIN = 8
+_OVERLAP = 1 / 6  # correlation of white noise in two Hann windows that overlap by half
+_ROUNDING = 1e-6  # of the parts of the equation: samples as float32, the position as an integral of the velocity
+_WEAK = 3.0  # an output below this many sigma gives no controller at that line
+
+
+@dataclass(frozen=True, eq=False)
+class LoopSignals:
+    """Spectra of input, excitation and output at lines, over the excitation: means with their covariance.
+
+    Windows are Hann windows of two periods, a period apart: the end of one window is not the start of the next, so that
+    a controller with memory answers in each window also what was before it. The Hann window removes this almost wholly.
+
+    Attributes
+    ----------
+    lines
+        Where.
+    mean
+        U, W and Y times conj(W)/rms(W), shape (lines, 3): the unit of the signals.
+    covariance
+        Of the mean, shape (lines, 3, 3), Hermitian.
+    dof
+        Complex degrees of freedom of the covariance.
+    step
+        Standard deviation of the mean of U by the steps in which u is recorded; averaging does not reduce it.
+    """
+
+    lines: Lines
+    mean: Complex
+    covariance: Complex
+    dof: float
+    step: float
+
+    @classmethod
+    def of(cls, block: Block, lines: Lines, *, input: str, excitation: str, output: str) -> LoopSignals:
+        """The spectra of consecutive samples that are all finite.
+
+        Raises
+        ------
+        SignalError
+            If there are fewer than 9 periods, or the excitation is zero at all lines.
+        """
+        period = lines.window
+        count = len(block) // period - 1
+        if count < WINDOWS_MIN:
+            raise SignalError(
+                "too-short",
+                f"{len(block)} samples in a row without a gap are fewer than {WINDOWS_MIN + 1} periods of {period}",
+                "record longer",
+                samples=len(block),
+                limit=(WINDOWS_MIN + 1) * period,
+            )
+        hann = 1 - np.cos(np.pi * np.arange(2 * period) / period)
+        angle = np.pi / period * np.outer(np.arange(2 * period), 2 * np.array(lines.bins))
+        kernel = hann[:, np.newaxis] * np.exp(-1j * angle) / hann.sum()
+        signals = np.stack([block[name] for name in (input, excitation, output)])
+        signals = signals - signals.mean(axis=1, keepdims=True)
+        spectra = np.stack(
+            [signals[:, k * period : (k + 2) * period] @ kernel for k in range(count)]
+        )  # (windows, 3, lines)
+        power = np.mean(np.abs(spectra[:, 1]) ** 2, axis=0)
+        if not power.any():
+            raise SignalError(
+                "no-excitation",
+                f"the excitation {excitation!r} is zero at all lines",
+                "record while the excitation is played",
+                channel=excitation,
+            )
+        excited = power > 1e-12 * power.max()
+        lines, spectra = lines.take(np.flatnonzero(excited)), spectra[..., excited]
+        about = np.moveaxis(spectra * np.conj(spectra[:, 1:2]) / np.sqrt(power[excited]), 2, 0)  # (lines, windows, 3)
+        mean = about.mean(axis=1)
+        away = about - mean[:, np.newaxis]
+        scatter = np.einsum("lki,lkj->lij", away, np.conj(away)) / (count - 1)
+        covariance = scatter * (1 + 2 * _OVERLAP * (count - 1) / count) / (count - 2 * _OVERLAP)
+        dof = (count - 1) / (1 + 2 * _OVERLAP**2)
+        return cls(lines, mean, covariance, dof, _step(signals[0]) / np.sqrt(12 * period))
+
+    def judge(self, loop: Loop) -> LoopResidual:
+        """The equation of this loop; UsageError if its feedback is missing."""
+        f = self.lines.frequency_hz
+        tick = np.exp(2j * np.pi * f / self.lines.rate_hz)
+        advanced = [tick ** loop.advance_ticks(role) for role in ("input", "excitation", "output")]
+        weights = np.stack([np.ones(f.shape), -loop.entry_at(f), loop.feedback_at(f)], axis=1)
+        weights = weights * np.stack(advanced, axis=1)
+        parts = weights * self.mean
+        variance = np.einsum("li,lij,lj->l", weights, self.covariance, np.conj(weights)).real
+        variance = np.maximum(variance, 0) + self.step**2 + _ROUNDING**2 * np.sum(np.abs(parts) ** 2, axis=1)
+        output_variance = self.covariance[:, 2, 2].real * np.abs(weights[:, 2]) ** 2
+        known = np.abs(parts[:, 2]) > _WEAK * np.sqrt(output_variance)
+        return LoopResidual(f, parts.sum(axis=1), variance, self.dof, parts[:, 2], np.abs(parts).max(axis=1), known)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopResidual:
+    """What remains of u − E·w + F·y, and its variance.
+
+    Attributes
+    ----------
+    frequency_hz
+        The lines, (lines,).
+    value, variance
+        Of the remainder, (lines,).
+    dof
+        Complex degrees of freedom of the variance.
+    feedback
+        F·y of the description, (lines,).
+    largest
+        The largest of |u|, |E·w| and |F·y|, (lines,).
+    known
+        Where y is large enough to give the controller, (lines,).
+    """
+
+    frequency_hz: Floats
+    value: Complex
+    variance: Floats
+    dof: float
+    feedback: Complex
+    largest: Floats
+    known: NDArray[np.bool_]
+
+    @property
+    def ratio(self) -> Complex:
+        """The controller as measured over the controller as described, (E·w − u)/(F·y), (lines,); NaN if not known."""
+        with np.errstate(all="ignore"):
+            return np.where(self.known, 1 - self.value / self.feedback, complex(np.nan, np.nan))
+
+    @property
+    def ratio_sigma(self) -> Floats:
+        """Standard deviation of `ratio`, (lines,)."""
+        with np.errstate(all="ignore"):
+            return np.where(self.known, np.sqrt(self.variance) / np.abs(self.feedback), np.nan)
+
+    @property
+    def misfit(self) -> float:
+        """Twice the negative logarithm of the product of the lines' p values.
+
+        |value|²/variance follows F(2, 2d), whose p value is (1 + x/d)^−d. By Fisher's method the sum follows χ² with
+        two degrees of freedom for each line.
+        """
+        away = np.abs(self.value) ** 2 / self.variance
+        return float(2 * self.dof * np.sum(np.log1p(away / self.dof)))
+
+    @property
+    def share(self) -> float:
+        """Rms over the lines of what noise does not explain of the remainder, over that of the largest signal."""
+        more = np.sum(np.abs(self.value) ** 2 - self.variance)
+        return float(np.sqrt(max(more, 0.0) / np.sum(self.largest**2)))
+
+    def p(self, fitted: int = 0) -> float:
+        """Probability of a misfit as large as this one, of a true description of which `fitted` numbers were fitted."""
+        with needing("SciPy", "analysis", "a check of the loop's description"):
+            from scipy.special import gammaincc
+        return float(gammaincc(self.value.size - fitted / 2, self.misfit / 2))
+
+
+def _step(samples: Floats) -> float:
+    """The step in which a signal is recorded; 0 of one that does not have few values."""
+    values = np.unique(samples)
+    if values.size < 2 or values.size > samples.size / 2:
+        return 0.0
+    return float(np.diff(values).min())
