@@ -25,6 +25,7 @@ from livebode.core.errors import (
     SimulationError,
     SourceError,
     StateError,
+    TuneError,
     UsageError,
 )
 from livebode.on_first_use import on_first_use
@@ -166,6 +167,7 @@ __all__ = [
     "SpectraLayout",
     "Stage",
     "StateError",
+    "TuneError",
     "Stateful",
     "StatefulBase",
     "UnitReading",
