@@ -12,6 +12,8 @@ from livebode.tuning.specification import LoopSpecification
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+_HALF_WIDTH = 0.04  # of segment and arc, so that the curve cannot pass them between two points unseen
+
 
 @dataclass(frozen=True)
 class ForbiddenRegion:
@@ -68,11 +70,11 @@ class ForbiddenRegion:
         found = [_from_disk(loop, -1.0, self.sensitivity_radius)]
         if self.disk is not None:
             found.append(_from_disk(loop, *self.disk))
-        on_segment = np.clip(loop.real, -1.0, -1 / self.gain)
-        found.append(_from_disk(loop, on_segment, 0.0))
-        turn = np.angle(-loop)
-        on_arc = -np.exp(1j * np.clip(turn, -self.phase_rad, self.phase_rad))
-        found.append(_from_disk(loop, on_arc, 0.0))
+        on_segment = np.clip(loop.real, -1.0, max(-1 / self.gain - _HALF_WIDTH, -1.0))
+        found.append(_from_disk(loop, on_segment, _HALF_WIDTH))
+        half = max(self.phase_rad - _HALF_WIDTH, 0.0)
+        on_arc = -np.exp(1j * np.clip(np.angle(-loop), -half, half))
+        found.append(_from_disk(loop, on_arc, _HALF_WIDTH))
         return found
 
 

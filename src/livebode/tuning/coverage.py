@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import TuneError
+from livebode.core import TuneError, counted
 from livebode.tuning.plant_band import PlantBand
 
 Floats = NDArray[np.float64]
@@ -48,6 +48,14 @@ def _check_gaps(plant: PlantBand, size: Floats, step_hz: float) -> None:
     if not wrong.any():
         return
     at = float(plant.frequency_hz[int(np.argmax(np.where(wrong, plant.spread.max(axis=0), 0)))])
+    if lacking := [f for f in plant.dropped_hz.tolist() if _in_gap(plant, wrong, f)]:
+        raise TuneError(
+            "coherence-low",
+            f"{counted(len(lacking), 'line')} from {lacking[0]:g} to {lacking[-1]:g} Hz, where the loop is close to −1, "
+            "cannot be used: invalid, or too little coherence",
+            "excite these lines with more amplitude, or measure longer",
+            dropped_hz=lacking,
+        )
     spans = _spans(plant, wrong, step_hz)
     raise TuneError(
         "lines-missing",
@@ -56,6 +64,12 @@ def _check_gaps(plant: PlantBand, size: Floats, step_hz: float) -> None:
         frequency_hz=at,
         lines=spans,
     )
+
+
+def _in_gap(plant: PlantBand, wrong: NDArray[np.bool_], frequency_hz: float) -> bool:
+    """Whether a dropped line is between the same lines as a point where the interpolation is unsure."""
+    gaps = np.searchsorted(plant.lines_hz, plant.frequency_hz[wrong])
+    return int(np.searchsorted(plant.lines_hz, frequency_hz)) in gaps
 
 
 def _spans(plant: PlantBand, wrong: NDArray[np.bool_], step_hz: float) -> list[str]:

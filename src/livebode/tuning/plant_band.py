@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +46,8 @@ class PlantBand:
         Share of the radius that is due to interpolation, shape (places, frequencies).
     sigma
         Standard deviation without confidence, shape (places, frequencies).
-    lines_hz
-        The used lines.
+    lines_hz, dropped_hz
+        The used lines, and those that were measured but are not valid or have too little coherence.
     """
 
     frequency_hz: Floats
@@ -58,6 +58,7 @@ class PlantBand:
     spread: Floats
     sigma: Floats
     lines_hz: Floats
+    dropped_hz: Floats
 
     @classmethod
     def of(cls, responses: Responses, rate_hz: float, *, coherence: float = 0.5, confidence: float = 0.95) -> PlantBand:
@@ -72,19 +73,19 @@ class PlantBand:
         use = np.all(responses.valid & known & np.isfinite(responses.sigma), axis=0)
         lines = responses.lines.frequency_hz[use]
         if lines.size < _LINES_MIN:
-            dropped = responses.lines.frequency_hz[~use]
             raise TuneError(
                 "coherence-low",
                 f"{lines.size} of {use.size} lines are valid with a coherence of {coherence:g} or more; "
                 f"{_LINES_MIN} are needed",
                 "excite with more amplitude, or measure longer",
                 lines=int(lines.size),
-                dropped_hz=dropped.tolist(),
+                dropped_hz=responses.lines.frequency_hz[~use].tolist(),
             )
         value, sigma = responses.value[:, use], responses.sigma[:, use]
         c = float(np.sqrt(np.log(value.size / (1 - confidence))))
         radius = responses.bound(c)[:, use]
-        return cls.at_lines(lines, value, radius, sigma, rate_hz)
+        dropped = responses.lines.frequency_hz[~use]
+        return replace(cls.at_lines(lines, value, radius, sigma, rate_hz), dropped_hz=dropped)
 
     @classmethod
     def at_lines(cls, lines_hz: Floats, value: Complex, radius: Floats, sigma: Floats, rate_hz: float) -> PlantBand:
@@ -117,6 +118,7 @@ class PlantBand:
             spread=joined(zero, gap, zero).astype(np.float64),
             sigma=joined(sigma[:, :1] * rise, deviation, zero).astype(np.float64),
             lines_hz=lines_hz,
+            dropped_hz=np.empty(0),
         )
 
 

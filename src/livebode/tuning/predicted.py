@@ -57,8 +57,8 @@ def predicted(frequency_hz: Floats, loop: Complex, radius: Floats) -> PredictedM
     sensitivity = float(np.max(1 / np.maximum(nearest, 1e-12)))
     closed = np.abs(loop / (1 + loop)) if not size.any() else _closed_least(loop, radius)
     return PredictedMargins(
-        gain_margin_db=min(_gain_margin_db(row, r) for row, r in zip(loop, radius)),
-        phase_margin_deg=min(_phase_margin_deg(row, r) for row, r in zip(loop, radius)),
+        gain_margin_db=min(gain_margin_db(row, r) for row, r in zip(loop, radius)),
+        phase_margin_deg=min(phase_margin_deg(row, r) for row, r in zip(loop, radius)),
         max_sensitivity=sensitivity,
         disk_margin=disk_margin(edge),
         bandwidth_hz=min(_bandwidth_hz(frequency_hz, row) for row in closed),
@@ -73,8 +73,8 @@ def _closed_least(loop: Complex, radius: Floats) -> Floats:
     return np.asarray(np.where(inside, 0.0, 1 / most))
 
 
-def _gain_margin_db(loop: Complex, radius: Floats) -> float:
-    """From the crossing of the negative real axis nearest to −1 on the side of 0; every disc counts where it reaches it."""
+def gain_margin_db(loop: Complex, radius: Floats) -> float:
+    """From the point of the negative real axis nearest to −1, on the side of 0, that a disc or the curve reaches."""
     reach = radius**2 - loop.imag**2
     touching = (reach >= 0) & (loop.real < 0)
     left = loop.real[touching] - np.sqrt(reach[touching])
@@ -88,7 +88,7 @@ def _gain_margin_db(loop: Complex, radius: Floats) -> float:
     return float(-20 * np.log10(-nearer.min())) if nearer.size else float("inf")
 
 
-def _phase_margin_deg(loop: Complex, radius: Floats) -> float:
+def phase_margin_deg(loop: Complex, radius: Floats) -> float:
     """From the points of the unit circle that a disc or the curve reaches."""
     size = np.abs(loop)
     reaching = (np.abs(size - 1) <= radius) & (size > 0)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from livebode.margins.stability import stable
 from livebode.tuning.clearance import ForbiddenRegion
 from livebode.tuning.plant_band import PlantBand
+from livebode.tuning.predicted import gain_margin_db, phase_margin_deg
 from livebode.tuning.specification import LoopSpecification
 from livebode.tuning.structure import FeedbackStructure
 
@@ -18,6 +19,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _HALF_POWER = 0.708  # −3 dB
+_ROUNDING = 1e-3  # dB and degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +106,20 @@ class TuningProblem:
         f, _ = self.structure.response(x)
         return bool(stable(self.plant.value * f, self.plant.frequency_hz).all())
 
+    def _between_points(self, x: Floats) -> bool:
+        """Whether gain and phase margin are kept where the curve crosses axis and unit circle between two points."""
+        at = ~self.plant.above
+        f = self.structure.response(x)[0][at]
+        radius = self.plant.radius[:, at] * np.abs(f)
+        return all(
+            gain_margin_db(row, r) >= self.specification.gain_margin_db - _ROUNDING
+            and phase_margin_deg(row, r) >= self.specification.phase_margin_deg - _ROUNDING
+            for row, r in zip(self.plant.value[:, at] * f, radius)
+        )
+
     def feasible(self, x: Floats, tolerance: float = 1e-6) -> bool:
         """Whether every limit is kept, and the loop is stable, for every plant within the band."""
-        if float(np.min(self.clearances(x)[0])) < -tolerance or not self.stable(x):
+        if float(np.min(self.clearances(x)[0])) < -tolerance or not self.stable(x) or not self._between_points(x):
             return False
         limit = self.specification.noise_gain
         return limit is None or self.noise_gain(x)[0] <= limit * (1 + tolerance)
