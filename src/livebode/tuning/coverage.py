@@ -51,7 +51,7 @@ def _check_gaps(plant: PlantBand, size: Floats, step_hz: float) -> None:
     if lacking := [f for f in plant.dropped_hz.tolist() if _in_gap(plant, wrong, f)]:
         raise TuneError(
             "coherence-low",
-            f"{counted(len(lacking), 'line')} from {lacking[0]:g} to {lacking[-1]:g} Hz, where the loop is close to −1, "
+            f"{counted(len(lacking), 'line')} from {lacking[0]:g} to {lacking[-1]:g} Hz, where the loop is near −1, "
             "cannot be used: invalid, or too little coherence",
             "excite these lines with more amplitude, or measure longer",
             dropped_hz=lacking,
