@@ -136,8 +136,7 @@ def _steps(reference: Axes, disturbance: Axes, look: Style, found: ControllerPro
     f = plant.frequency_hz[at]
     until = 3 / found.promised.bandwidth_hz
     time_s = np.linspace(0, until, _TIMES)
-    noise = np.random.default_rng(0).standard_normal((2, _DRAWS, int(at.sum()))) / np.sqrt(2)
-    plants = plant.value[:1, at] + plant.sigma[:1, at] * (noise[0] + 1j * noise[1])
+    plants = plant.value[:1, at] + plant.sigma[:1, at] * _noise(f, plant.lines_hz)
     for feedback, proposed in _curves(found):
         if not proposed and found.before is None:
             continue
@@ -157,6 +156,13 @@ def _steps(reference: Axes, disturbance: Axes, look: Style, found: ControllerPro
     disturbance.set_xlabel(tr("time in ms"))
     for axes in (reference, disturbance):
         plain(axes)
+
+
+def _noise(frequency_hz: Floats, lines_hz: Floats) -> Complex:
+    """Circular noise of the lines, interpolated between them, shape (draws, frequencies)."""
+    drawn = np.random.default_rng(0).standard_normal((2 * _DRAWS, lines_hz.size)) / np.sqrt(2)
+    between = np.stack([np.interp(frequency_hz, lines_hz, row) for row in drawn])
+    return np.asarray(between[:_DRAWS] + 1j * between[_DRAWS:])
 
 
 def _facts(found: ControllerProposal) -> str:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
-from scipy.signal import find_peaks
 
 from livebode.core import Model
 from livebode.tuning.plant_band import PlantBand
@@ -56,6 +54,8 @@ def search(controller: Model | None, plant: PlantBand, specification: LoopSpecif
 
 def resonances(plant: PlantBand, count: int) -> list[float]:
     """Frequencies of the highest resonances over all places, the highest first; Hz."""
+    from scipy.signal import find_peaks
+
     found: list[tuple[float, float]] = []
     at = ~plant.above & (plant.frequency_hz >= plant.lines_hz[0])
     f = plant.frequency_hz[at]
@@ -158,6 +158,8 @@ def _extended(problem: TuningProblem, simpler: SearchResult) -> Floats | None:
 
 def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
     """One run of SLSQP within a box around x; with a required bandwidth, the last variable is the least clearance."""
+    from scipy.optimize import minimize
+
     structure = problem.structure
     at = _nearest(problem, x)
     direction = _direction(structure)
