@@ -42,7 +42,7 @@ Names by subject:
 - Examples: example_axis, example_responses, example_run
 - Errors: LivebodeError (a ValueError) and its kinds ArchiveError, BaselineError, ConfigError, DesignError, ExtraError,
   FitError, FleetError, GridError, LocationError, MeasurementError, OutputError, PublishError, RecordError,
-  RecordingError, ServerError, SignalError, SimulationError, SourceError, StateError, UsageError
+  RecordingError, ServerError, SignalError, SimulationError, SourceError, StateError, TuneError, UsageError
 
 Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the true value with probability
 1 − exp(−c²). Every public name loads its part of livebode when it is first used. These names are the public interface,
@@ -88,6 +88,7 @@ if TYPE_CHECKING:
         SimulationError,
         SourceError,
         StateError,
+        TuneError,
         UsageError,
     )
     from livebode.estimation import NonPeriodicTracker, Settings, Tracker, welch
@@ -136,6 +137,7 @@ _HOME = {
     "core": (
         "UsageError",
         "StateError",
+        "TuneError",
         "SourceError",
         "SimulationError",
         "SignalError",
@@ -225,6 +227,7 @@ __all__ = [
     "StateError",
     "Strokes",
     "Tracker",
+    "TuneError",
     "UsageError",
     "chirp",
     "design",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis.fits import fit_run
+from livebode.analysis.places import by_place
 from livebode.analysis.run_loop_check import NOT_CHECKED, CheckedLoop, checked_loop
 from livebode.configuration.axis import Axis
 from livebode.configuration.fit_section import FitSection
@@ -28,8 +29,6 @@ from livebode.margins import (
 )
 from livebode.margins.margins import CONTRADICTED
 from livebode.records import RunRecord
-
-_PLACES = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +143,7 @@ def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sen
     fits, mean = fit.parameters, mean_response(responses)
     fitted_to = fit.measured if fit.measured is not None else mean
     measured = fitted_to
-    if len(places := _by_place(responses)) > 1:
+    if len(places := by_place(responses)) > 1:
         free = [name for name in fit.model.names if name not in fit.held]
         over = Fitter(fit.model, fixed=fit.held, free=free, band_hz=fit.band_hz, hold=fit.hold).process(places)
         # The fit may belong to one time, and is not better than the worst of them.
@@ -172,15 +171,3 @@ def _tuned(
         return Tuning("refused", sentence, read)
     rate_hz = getattr(getattr(loop.loop.feedback, "velocity", loop.loop.feedback), "rate_hz", None)
     return tuning(fits, loop, band_hz, controller_rate_hz=rate_hz, peak_sensitivity=peak_sensitivity)
-
-
-def _by_place(responses: Responses) -> Responses:
-    """The mean response at each of twelve places of the schedule; one row without a schedule."""
-    use = np.flatnonzero(responses.valid.all(axis=1) & np.isfinite(responses.schedule))
-    if not use.size:
-        return mean_response(responses)
-    at = responses.schedule[use]
-    edges = np.linspace(at.min(), at.max(), _PLACES + 1)
-    place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, _PLACES - 1)
-    groups = [use[place == i] for i in range(_PLACES)]
-    return Responses.join([mean_response(responses[group]) for group in groups if group.size])

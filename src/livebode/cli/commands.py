@@ -28,6 +28,7 @@ SUMMARIES: Mapping[str, str] = {
     "explains them.",
     "margins": "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter "
     "if needed.",
+    "tune": "Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.",
     "validate": "Simulate the fitted model with another recording and test whether the residual correlates with the "
     "signals.",
     "learn": "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",

@@ -25,6 +25,7 @@ from livebode.core.errors import (
     SimulationError,
     SourceError,
     StateError,
+    TuneError,
     UsageError,
 )
 from livebode.on_first_use import on_first_use
@@ -168,6 +169,7 @@ __all__ = [
     "StateError",
     "Stateful",
     "StatefulBase",
+    "TuneError",
     "UnitReading",
     "UsageError",
     "as_model",

@@ -9,6 +9,7 @@ from livebode.report.loop import loop_figure, save_loop_picture
 from livebode.report.pictures import save_pictures
 from livebode.report.terminal import terminal_bode
 from livebode.report.tracking import tracking_figure
+from livebode.report.tuning import save_tuning_picture, tuning_figure
 from livebode.report.validation import save_validation_picture, validation_figure
 
 __all__ = [
@@ -18,8 +19,10 @@ __all__ = [
     "save_excitation_picture",
     "save_loop_picture",
     "save_pictures",
+    "save_tuning_picture",
     "save_validation_picture",
     "terminal_bode",
     "tracking_figure",
+    "tuning_figure",
     "validation_figure",
 ]

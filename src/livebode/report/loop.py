@@ -137,10 +137,10 @@ def _bode(
     phase.set_ylim(max(bottom, _LOWEST_DEG), top)
     phase.set_yticks(np.arange(np.ceil(max(bottom, _LOWEST_DEG) / 90) * 90, top, 90))
     for axes in (magnitude, phase):
-        frequency_axis(axes, _round_numbers(f[0], f[-1]), labels=axes is phase)
+        frequency_axis(axes, round_numbers(f[0], f[-1]), labels=axes is phase)
 
 
-def _round_numbers(low_hz: float, high_hz: float) -> Floats:
+def round_numbers(low_hz: float, high_hz: float) -> Floats:
     """Both ends, and 1, 2 and 5 of each decade between them."""
     decades = np.arange(np.floor(np.log10(low_hz)), np.ceil(np.log10(high_hz)) + 1)
     round_ones = np.outer(10.0**decades, [1, 2, 5]).ravel()

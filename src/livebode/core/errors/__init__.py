@@ -24,6 +24,7 @@ from livebode.core.errors.signal import SignalError
 from livebode.core.errors.simulation import SimulationError
 from livebode.core.errors.source import SourceError
 from livebode.core.errors.state import StateError
+from livebode.core.errors.tune import TuneError
 from livebode.core.errors.usage import UsageError
 
 __all__ = [
@@ -48,5 +49,6 @@ __all__ = [
     "SimulationError",
     "SourceError",
     "StateError",
+    "TuneError",
     "UsageError",
 ]

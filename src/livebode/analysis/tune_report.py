@@ -1,0 +1,58 @@
+"""A proposed controller for the loop of a finished run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from livebode.analysis.places import by_place
+from livebode.analysis.run_loop_check import checked_loop
+from livebode.configuration.axis import Axis
+from livebode.configuration.loop_section import LoopSection
+from livebode.configuration.recorded import recorded_configuration
+from livebode.core import Responses, TuneError
+from livebode.records import RunRecord
+from livebode.tuning import ControllerProposal, LoopSpecification, tune
+
+_CONTRADICTED = ("one change", "not explained")
+
+
+def tune_run(
+    directory: Path, specification: LoopSpecification, axis: Axis | None = None, *, loop_checked: bool = False
+) -> ControllerProposal:
+    """The proposal for a run; the loop is from `axis`, else from its configuration.
+
+    The responses are the mean of the run, or with a schedule the means at twelve places.
+
+    Parameters
+    ----------
+    directory
+        Run directory.
+    specification
+        Limits.
+    axis
+        Another description of the loop.
+    loop_checked
+        The description was verified otherwise, where no `livebode check-loop` of the run confirms it.
+
+    Raises
+    ------
+    TuneError
+        If nothing can be proposed.
+    UsageError
+        If the loop's feedback is missing.
+    """
+    run = RunRecord.open(directory)
+    section = axis.loop if axis is not None else None
+    if section is None:
+        section = LoopSection.model_validate(recorded_configuration(run.summary).get("loop", {}))
+    responses = Responses.join(list(run.steady_batches()))
+    checked = _confirmed(directory, section) or loop_checked
+    return tune(by_place(responses), section.build(responses.lines.rate_hz), specification, loop_checked=checked)
+
+
+def _confirmed(directory: Path, section: LoopSection) -> bool:
+    """Whether the recording confirms this description of the loop; TuneError if it contradicts it."""
+    found = checked_loop(directory, section)
+    if found.verdict in _CONTRADICTED:
+        raise TuneError("loop-contradicted", found.sentence, "correct [loop], and check it again", key="loop")
+    return found.verdict == "as described"

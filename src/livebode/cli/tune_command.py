@@ -1,0 +1,149 @@
+"""`livebode tune`: a controller for the loop of a finished run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from livebode.cli.options import Json
+from livebode.cli.remote import results_directory
+from livebode.core import RecordError, TuneError
+from livebode.core.writing import writing
+from livebode.locations import location
+
+if TYPE_CHECKING:
+    from livebode.tuning import ControllerProposal
+
+
+def tune_command(
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
+    axis: Annotated[
+        Path | None, typer.Option(metavar="AXIS.toml", help="Read \\[loop] from this file instead of the run.")
+    ] = None,
+    bandwidth_hz: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Required bandwidth. \\[default: as high as possible]")
+    ] = None,
+    gain_margin_db: Annotated[float, typer.Option(metavar="DB", help="Smallest gain margin.")] = 6.0,
+    phase_margin_deg: Annotated[float, typer.Option(metavar="DEG", help="Smallest phase margin.")] = 30.0,
+    max_sensitivity: Annotated[float, typer.Option(help="Largest peak sensitivity Ms.")] = 2.0,
+    disk_margin: Annotated[float, typer.Option(help="Smallest disk margin; 0: no limit.")] = 0.0,
+    noise_gain: Annotated[
+        float | None, typer.Option(help="Largest rms of the input for white noise of 1 at the output.")
+    ] = None,
+    notches: Annotated[int, typer.Option(help="Most notches, 0 … 4.")] = 2,
+    low_pass: Annotated[bool, typer.Option(help="Permit a low-pass of second order.")] = True,
+    coherence: Annotated[float, typer.Option(help="Do not use lines with a lower coherence.")] = 0.5,
+    loop_checked: Annotated[
+        bool, typer.Option("--loop-checked", help="The description of the loop was compared with the machine.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
+
+    Writes tune.png, and the filters as filters.h and filters.st, to the run directory; nothing to a machine. The exit
+    code is 2 if no controller meets the specification.
+    """
+    from livebode.analysis.tune_report import tune_run
+    from livebode.cli.picture_support import can_draw, tell_how_to_draw
+    from livebode.configuration import Axis
+    from livebode.records import to_json
+    from livebode.tuning import LoopSpecification
+    from livebode.tuning.code_text import c_header, structured_text
+
+    specification = LoopSpecification(
+        bandwidth_hz=bandwidth_hz,
+        gain_margin_db=gain_margin_db,
+        phase_margin_deg=phase_margin_deg,
+        max_sensitivity=max_sensitivity,
+        disk_margin=disk_margin,
+        noise_gain=noise_gain,
+        notches=notches,
+        low_pass=low_pass,
+        coherence=coherence,
+    )
+    other = None if axis is None else Axis.read(axis)
+    found = tune_run(directory, specification, other, loop_checked=loop_checked)
+    into = results_directory(directory)
+    with writing(into, RecordError):
+        if can_draw():
+            from livebode.report import save_tuning_picture
+
+            save_tuning_picture(found, into, title=directory.name)
+        (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
+        (into / "filters.st").write_text(structured_text(found.feedback.biquads), encoding="utf-8")
+    if as_json:
+        print(to_json(found.plain()))
+    else:
+        show_proposal(found)
+        written = ["filters.h", "filters.st", *(["tune.png"] if can_draw() else [])]
+        print(f"\n{into}: {', '.join(written)}")
+        tell_how_to_draw()
+    if not found.met:
+        raise TuneError(
+            "specification-unmet",
+            found.sentence,
+            "require less, or remove what limits it",
+            bandwidth_hz=found.promised.bandwidth_hz,
+            limited_by=list(found.limited_by),
+        )
+
+
+def show_proposal(found: ControllerProposal) -> None:
+    """Print controller, filters and margins before and after."""
+    print("proposal (nothing is written to a machine)")
+    _show_parameters(found)
+    for frequency_hz, depth_db, damping in found.feedback.notches:
+        print(f"  notch at {frequency_hz:.4g} Hz, {depth_db:.3g} dB deep, damping {damping:.3g}")
+    for corner_hz in found.feedback.low_passes:
+        print(f"  low-pass of second order at {corner_hz:.4g} Hz")
+    for biquad in found.feedback.biquads:
+        b, a = (", ".join(f"{x:.12g}" for x in part) for part in (biquad.b, biquad.a))
+        print(f"    at {biquad.rate_hz:g} Hz: b = {b}   a = 1, {a}")
+    _show_margins(found)
+    print(found.sentence)
+
+
+def _show_parameters(found: ControllerProposal) -> None:
+    from dataclasses import asdict
+
+    old, new = asdict(found.loop.feedback), asdict(found.feedback.controller)  # type: ignore[call-overload]
+    for name, value in _numbers(new).items():
+        before = _numbers(old)[name]
+        if before != value:
+            print(f"  {name:32}{before:>12.5g}  →  {value:.5g}")
+
+
+def _numbers(values: dict[str, object], prefix: str = "") -> dict[str, float]:
+    found: dict[str, float] = {}
+    for name, value in values.items():
+        if isinstance(value, dict):
+            found |= _numbers(value, f"{prefix}{name}.")
+        elif isinstance(value, float):
+            found[f"{prefix}{name}"] = value
+    return found
+
+
+def _show_margins(found: ControllerProposal) -> None:
+    """Before and after, each as measured and, in brackets, for the worst plant within the bounds."""
+    words = {
+        "gain_margin_db": "gain margin, dB",
+        "phase_margin_deg": "phase margin, °",
+        "max_sensitivity": "Ms",
+        "disk_margin": "disk margin",
+        "bandwidth_hz": "bandwidth, Hz",
+    }
+    rows = len(found.plant.value)
+    print(f"  {'':18}{'before (worst plant)':>24}{'after (promised)':>24}")
+    for name, word in words.items():
+        cells = [
+            "unstable" if one is None or two is None else f"{getattr(one, name):.4g} ({getattr(two, name):.4g})"
+            for one, two in ((found.before, found.before_worst), (found.after, found.promised))
+        ]
+        print(f"  {word:18}{cells[0]:>24}{cells[1]:>24}")
+    places = f"{rows} places, " if rows > 1 else ""
+    print(
+        f"  {places}{found.plant.lines_hz.size} lines, {found.plant.lines_hz[0]:g} … {found.plant.lines_hz[-1]:g} Hz; "
+        f"the true plant is within the bounds with {100 * found.specification.confidence:g} %, all lines together"
+    )

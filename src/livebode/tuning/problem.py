@@ -1,0 +1,125 @@
+"""The limits of a loop as functions of the parameters of its controller, with derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.margins.stability import stable
+from livebode.tuning.clearance import ForbiddenRegion
+from livebode.tuning.plant_band import PlantBand
+from livebode.tuning.predicted import gain_margin_db, phase_margin_deg
+from livebode.tuning.specification import LoopSpecification
+from livebode.tuning.structure import FeedbackStructure
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_HALF_POWER = 0.708  # −3 dB
+_ROUNDING = 1e-3  # dB and degrees
+
+
+@dataclass(frozen=True, eq=False)
+class TuningProblem:
+    """The constraints of a structure around a plant. A limit is kept where its value is not negative.
+
+    The disc of L at a frequency has the radius |F|·radius; it keeps clear of the forbidden region if its centre is
+    farther away than that. The curve of the measured plant stays with its discs on one side of −1, so the number of
+    encirclements is that of every plant within the discs (the homotopy of Karimi and Kammer, Automatica 85, 2017).
+    """
+
+    structure: FeedbackStructure
+    plant: PlantBand
+    specification: LoopSpecification
+
+    @cached_property
+    def region(self) -> ForbiddenRegion:
+        return ForbiddenRegion.of(self.specification)
+
+    @cached_property
+    def _limit_above(self) -> float:
+        """Largest |L| above the highest line: below it, no phase violates a limit."""
+        near = 1.0 if self.region.disk is None else -(self.region.disk[0] + self.region.disk[1])
+        return min(1 - self.region.sensitivity_radius, 1 / self.region.gain, near)
+
+    def clearances(self, x: Floats, at: NDArray[np.bool_] | None = None) -> tuple[Floats, Floats | None]:
+        """Clearance less radius, shape (places, frequencies), and with `at`, its derivatives there, (at, parameters).
+
+        It is divided by the size 1 + |L|, so that points far from −1 do not dominate.
+        """
+        f, slopes = self.structure.response(x)
+        loop = self.plant.value * f
+        size = np.abs(f)
+        distance, away = self.region.clearance(loop)
+        above = self.plant.above
+        radius = size * self.plant.radius
+        value = np.where(above, self._limit_above - np.abs(loop), distance - radius)
+        scale = 1 + np.abs(loop)
+        if at is None:
+            return value / scale, None
+        place, column = np.nonzero(at)
+        part, turn, weight = slopes[:, column], loop[place, column], scale[place, column]
+        along = np.real(np.conj(away[place, column]) * turn * part) - radius[place, column] * part.real
+        falling = -np.abs(turn) * part.real
+        derivative = np.where(above[column], falling, along) / weight
+        derivative -= value[place, column] / weight**2 * np.abs(turn) * part.real
+        return value[place, column] / weight, derivative.T
+
+    def noise_gain(self, x: Floats) -> tuple[float, Floats]:
+        """Rms of the plant input for unit white noise at the output, worst place, and its logarithmic derivative."""
+        f, slopes = self.structure.response(x)
+        sensitivity = 1 / (1 + self.plant.value * f)
+        power = np.abs(f * sensitivity) ** 2 * self._share
+        total = power.sum(axis=1)
+        worst = int(np.argmax(total))
+        slope = (slopes * sensitivity[worst]).real @ power[worst] / total[worst]
+        return float(np.sqrt(total[worst])), slope
+
+    @cached_property
+    def _share(self) -> Floats:
+        """Share of the frequencies that each point of the grid stands for."""
+        f = self.plant.frequency_hz
+        return np.asarray(np.gradient(f) / f[-1])
+
+    def tracking(self, x: Floats) -> tuple[Floats, Floats]:
+        """How far |T| of the worst plant is from −3 dB up to the required bandwidth, positive above; with derivatives.
+
+        |T| of the worst plant within a disc is at least (|L| − r)/(|1 + L| + r).
+        """
+        bandwidth = self.specification.bandwidth_hz
+        assert bandwidth is not None
+        f, slopes = self.structure.response(x)
+        at = (self.plant.frequency_hz <= bandwidth) & (self.plant.frequency_hz > bandwidth / 4)
+        loop, slope = self.plant.value[:, at] * f[at], slopes.T[at]
+        radius = self.plant.radius[:, at] * np.abs(f[at])
+        away = np.abs(1 + loop)
+        value = np.abs(loop) - radius - _HALF_POWER * (away + radius)
+        derivative = (np.abs(loop) - (1 + _HALF_POWER) * radius)[..., np.newaxis] * slope.real
+        derivative -= _HALF_POWER * (np.conj((1 + loop) / away)[..., np.newaxis] * loop[..., np.newaxis] * slope).real
+        return value.ravel(), derivative.reshape(-1, len(x))
+
+    def stable(self, x: Floats) -> bool:
+        """Whether the loop of the measured plant is stable at every place, by Nyquist's criterion."""
+        f, _ = self.structure.response(x)
+        return bool(stable(self.plant.value * f, self.plant.frequency_hz).all())
+
+    def _between_points(self, x: Floats) -> bool:
+        """Whether gain and phase margin are kept where the curve crosses axis and unit circle between two points."""
+        at = ~self.plant.above
+        f = self.structure.response(x)[0][at]
+        radius = self.plant.radius[:, at] * np.abs(f)
+        return all(
+            gain_margin_db(row, r) >= self.specification.gain_margin_db - _ROUNDING
+            and phase_margin_deg(row, r) >= self.specification.phase_margin_deg - _ROUNDING
+            for row, r in zip(self.plant.value[:, at] * f, radius)
+        )
+
+    def feasible(self, x: Floats, tolerance: float = 1e-6) -> bool:
+        """Whether every limit is kept, and the loop is stable, for every plant within the band."""
+        if float(np.min(self.clearances(x)[0])) < -tolerance or not self.stable(x) or not self._between_points(x):
+            return False
+        limit = self.specification.noise_gain
+        return limit is None or self.noise_gain(x)[0] <= limit * (1 + tolerance)

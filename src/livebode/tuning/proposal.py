@@ -1,0 +1,268 @@
+"""tune: a controller for the measured plant, with what it promises and what limits it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import Loop, Model, Responses, TuneError
+from livebode.tuning.coverage import check_coverage, missing_resonances
+from livebode.tuning.plant_band import PlantBand
+from livebode.tuning.predicted import PredictedMargins, predicted
+from livebode.tuning.search import SearchResult, search
+from livebode.tuning.specification import LoopSpecification
+from livebode.tuning.structure import TunedFeedback
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_ACTIVE = 0.02  # clearance, of 1 + |L|, up to which a point limits the loop
+_REACHED = 1 - 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerProposal:
+    """A proposed controller. It is only a proposal: livebode writes nothing to a machine.
+
+    Attributes
+    ----------
+    feedback
+        The proposed controller and its filters.
+    before, after
+        Margins of the measured plant with the described and with the proposed controller, worst place; `before` is
+        None where the described loop would be unstable.
+    before_worst, promised
+        The same for the worst plant within the band.
+    specification
+        What was asked.
+    met
+        Whether the promise has the required bandwidth.
+    limited_by
+        What prevents a higher bandwidth, the nearest first; sentences.
+    plant
+        The plant with its band.
+    loop
+        The described loop.
+    """
+
+    feedback: TunedFeedback
+    before: PredictedMargins | None
+    before_worst: PredictedMargins | None
+    after: PredictedMargins
+    promised: PredictedMargins
+    specification: LoopSpecification
+    met: bool
+    limited_by: tuple[str, ...]
+    plant: PlantBand
+    loop: Loop
+
+    @property
+    def sentence(self) -> str:
+        """The result for people."""
+        limits = "; ".join(self.limited_by)
+        limits = f"; limited by {limits}" if limits else ""
+        if self.met:
+            return f"a bandwidth of {self.promised.bandwidth_hz:.4g} Hz is promised{limits}"
+        return (
+            f"no controller of this structure promises a bandwidth of {self.specification.bandwidth_hz:g} Hz: the best "
+            f"promises {self.promised.bandwidth_hz:.4g} Hz{limits}"
+        )
+
+    def open_loop(self, feedback: Model) -> Complex:
+        """L with a feedback on the grid of `plant`, shape (places, frequencies)."""
+        return np.asarray(self.plant.value * feedback.response(self.plant.frequency_hz))
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON; infinite margins are null."""
+        return {
+            "met": self.met,
+            "sentence": self.sentence,
+            "limited_by": list(self.limited_by),
+            "specification": asdict(self.specification),
+            "controller": _plain(asdict(self.feedback.controller)),
+            "notches": [
+                {"frequency_hz": f, "depth_db": depth, "damping": damping}
+                for f, depth, damping in self.feedback.notches
+            ],
+            "low_passes_hz": list(self.feedback.low_passes),
+            "biquads": [
+                {"rate_hz": one.rate_hz, "b": list(one.b), "a": [1.0, *one.a]} for one in self.feedback.biquads
+            ],
+            "before": _margins(self.before),
+            "before_worst": _margins(self.before_worst),
+            "after": _margins(self.after),
+            "promised": _margins(self.promised),
+        }
+
+
+def tune(
+    responses: Responses,
+    loop: Loop,
+    specification: LoopSpecification | None = None,
+    *,
+    loop_checked: bool,
+    rate_hz: float | None = None,
+) -> ControllerProposal:
+    """Propose gains and filters for the described cascade, robust for every plant within the bounds and every place.
+
+    No model of the plant is fitted: limits are kept at the measured lines and between them (`PlantBand`). Gains, times
+    and filters are optimised by SLSQP on the frequency responses, as Karimi and Kammer (A data-driven approach to
+    robust control of multivariable systems by convex optimization, Automatica 85, 2017) and Hast, Åström, Bernhardsson
+    and Boyd (PID design by convex-concave optimization, ECC 2013) do by convex programs; Boyd, Hast and Åström (MIMO
+    PID tuning via iterated LMI restriction, Int. J. Robust Nonlinear Control 26, 2016). Without a required bandwidth,
+    the weighted logarithms of the gains are maximised.
+
+    Bias: a resonance between two lines that neither shows, or above the highest line, is not seen.
+
+    Parameters
+    ----------
+    responses
+        Of the plant, a row for each place.
+    loop
+        The loop with its controllers, a PID, Cascade or PositionPD.
+    specification
+        Limits; the defaults of LoopSpecification if None.
+    loop_checked
+        Whether the description of the loop was compared with the machine.
+    rate_hz
+        Of the loop; that of the responses by default.
+
+    Raises
+    ------
+    TuneError
+        If the loop was not checked, the lines have too little coherence or do not cover crossover and resonances, or
+        no controller keeps the limits.
+
+    Examples
+    --------
+    >>> from livebode import PID, Lines
+    >>> from livebode.fitting import EvaluationGrid, TwoMass
+    >>> lines = Lines.parse("2:400:2", rate_hz=4000, window=2000)
+    >>> belt = TwoMass(radius_m=0.019)
+    >>> values = [{"Js": 0.0028, "mL": 6.7, "Keff": 5e5, "bs": 130.0}.get(name, 0.0) for name in belt.names]
+    >>> plant = np.atleast_2d(belt.at(values, EvaluationGrid.of(lines)))
+    >>> ones, row = np.ones(plant.shape), np.zeros(1, dtype=int)
+    >>> exact = Responses(lines, plant, 0 * ones, row + np.inf, ones, ones > 0, row, row, row + 0.0, row + 0.0)
+    >>> found = tune(exact, Loop(PID(gain=0.2, integral_time_s=0.2, rate_hz=4000, delay_ticks=4)), loop_checked=True)
+    >>> found.met, found.promised.max_sensitivity <= 2.001
+    (True, True)
+    """
+    if not loop_checked:
+        raise TuneError(
+            "loop-unchecked",
+            "it was not checked that the described controllers are those of the machine",
+            "compare them with the recording: livebode check-loop",
+            argument="loop_checked",
+        )
+    asked = specification or LoopSpecification()
+    rate = rate_hz or responses.lines.rate_hz
+    plant = PlantBand.of(responses, rate, coherence=asked.coherence, confidence=asked.confidence)
+    step_hz = responses.lines.resolution_hz
+    best = _best(loop.feedback, plant, asked)
+    if best is None:
+        raise _no_start(plant, step_hz)
+    structure = best.problem.structure
+    feedback = structure.feedback(best.x)
+    check_coverage(plant, plant.value * structure.response(best.x)[0], step_hz)
+    promised = _margins_of(plant, feedback.model, 1.0)
+    required = asked.bandwidth_hz
+    return ControllerProposal(
+        feedback=feedback,
+        before=_stable_margins(plant, loop, 0.0),
+        before_worst=_stable_margins(plant, loop, 1.0),
+        after=_margins_of(plant, feedback.model, 0.0),
+        promised=promised,
+        specification=asked,
+        met=required is None or promised.bandwidth_hz >= _REACHED * required,
+        limited_by=_limits(best),
+        plant=plant,
+        loop=loop,
+    )
+
+
+def _best(controller: Model | None, plant: PlantBand, asked: LoopSpecification) -> SearchResult | None:
+    """The most robust controller with the required bandwidth; where there is none, the fastest."""
+    found = search(controller, plant, asked)
+    if asked.bandwidth_hz is None:
+        return found
+    if found is not None and _promises(found, plant, asked.bandwidth_hz):
+        return found
+    return search(controller, plant, replace(asked, bandwidth_hz=None))
+
+
+def _promises(found: SearchResult, plant: PlantBand, bandwidth_hz: float) -> bool:
+    feedback = found.problem.structure.feedback(found.x)
+    return _margins_of(plant, feedback.model, 1.0).bandwidth_hz >= _REACHED * bandwidth_hz
+
+
+def _margins_of(plant: PlantBand, feedback: Model, share: float) -> PredictedMargins:
+    """Margins with this share of the band's radius, over the lines and between them."""
+    at = ~plant.above
+    behind = feedback.response(plant.frequency_hz[at])
+    return predicted(plant.frequency_hz[at], plant.value[:, at] * behind, share * plant.radius[:, at] * np.abs(behind))
+
+
+def _stable_margins(plant: PlantBand, loop: Loop, share: float) -> PredictedMargins | None:
+    """Margins of the described loop; None where the measured plant makes it unstable."""
+    from livebode.margins.stability import stable
+
+    feedback = loop.feedback
+    assert feedback is not None
+    around = plant.value * loop.feedback_at(plant.frequency_hz)
+    return _margins_of(plant, feedback, share) if stable(around, plant.frequency_hz).all() else None
+
+
+def _limits(best: SearchResult) -> tuple[str, ...]:
+    """The points of the curve that touch a limit, one for each limit."""
+    problem, x = best.problem, best.x
+    value, _ = problem.clearances(x)
+    behind = problem.structure.response(x)[0]
+    loop = problem.plant.value * behind
+    found: dict[str, tuple[float, str]] = {}
+    for place, column in zip(*np.nonzero(value < _ACTIVE)):
+        f, distance = problem.plant.frequency_hz[column], float(value[place, column])
+        if problem.plant.above[column]:
+            name, words = "above", f"the highest line, {problem.plant.lines_hz[-1]:g} Hz: above it the plant is unknown"
+        else:
+            name = problem.region.nearest(loop[place, column])
+            share = problem.plant.radius[place, column] / np.abs(problem.plant.value[place, column])
+            words = f"the {name} at {f:.4g} Hz (bound there ± {100 * share:.2g} %)"
+        if name not in found or distance < found[name][0]:
+            found[name] = distance, words
+    limit = problem.specification.noise_gain
+    if limit is not None and problem.noise_gain(x)[0] > 0.99 * limit:
+        found["noise"] = 0.0, f"the noise gain of {limit:g}"
+    return tuple(words for _, words in sorted(found.values()))
+
+
+def _no_start(plant: PlantBand, step_hz: float) -> TuneError:
+    """Why no setting keeps the limits: lines that do not resolve the plant, or wide bounds."""
+    if spans := missing_resonances(plant, step_hz):
+        return TuneError(
+            "lines-missing",
+            "the lines do not resolve the response, and no controller is safe for all that it may be between them",
+            f"add lines: {', '.join(spans)} Hz",
+            lines=spans,
+        )
+    share = plant.radius / np.abs(plant.value)
+    at = np.unravel_index(int(np.argmax(np.where(plant.above, 0, share))), share.shape)
+    return TuneError(
+        "no-stable-start",
+        "no controller of the described structure keeps the limits for every plant within the bounds, which are up to "
+        f"± {100 * share[at]:.2g} % (at {plant.frequency_hz[at[1]]:.4g} Hz)",
+        "measure longer or with more amplitude, or ask for smaller margins",
+        bound=float(share[at]),
+        frequency_hz=float(plant.frequency_hz[at[1]]),
+    )
+
+
+def _margins(of: PredictedMargins | None) -> dict[str, float | None] | None:
+    return None if of is None else _plain(asdict(of))
+
+
+def _plain(values: dict[str, Any]) -> dict[str, Any]:
+    return {k: _plain(v) if isinstance(v, dict) else (None if v == inf else v) for k, v in values.items()}

@@ -1,0 +1,75 @@
+"""LoopSpecification: what a proposed controller has to keep for every plant within the bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from livebode.core import UsageError
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopSpecification:
+    """Limits of the loop, promised for every plant within the bounds and every place.
+
+    Parameters
+    ----------
+    bandwidth_hz
+        Required bandwidth (|T| first falls 3 dB below one), Hz; the most robust controller with it is proposed.
+        None: as high as the other limits permit.
+    gain_margin_db
+        dB by which the loop gain may rise.
+    phase_margin_deg
+        Smallest rotation of L, deg, that makes it −1.
+    max_sensitivity
+        Largest peak sensitivity Ms.
+    disk_margin
+        Smallest balanced disk margin α (Seiler, Packard and Gahinet 2020, skew 0): gain and phase may change together;
+        0 for none.
+    noise_gain
+        Largest rms of the plant input for white noise with an rms of 1 at the output; None for no limit.
+    notches
+        Most notches in series with the controller, 0 … 4.
+    low_pass
+        Whether a low-pass of second order in series (a torque filter) may be added.
+    coherence
+        Lines with a lower coherence are not used.
+    confidence
+        Probability with which the true plant is within the bounds at all lines and places together.
+
+    Raises
+    ------
+    UsageError
+        If a limit is out of its range.
+    """
+
+    bandwidth_hz: float | None = None
+    gain_margin_db: float = 6.0
+    phase_margin_deg: float = 30.0
+    max_sensitivity: float = 2.0
+    disk_margin: float = 0.0
+    noise_gain: float | None = None
+    notches: int = 2
+    low_pass: bool = True
+    coherence: float = 0.5
+    confidence: float = 0.95
+
+    def __post_init__(self) -> None:
+        inf = float("inf")
+        self._check("bandwidth_hz", 0.0, inf, "a positive bandwidth")
+        self._check("gain_margin_db", 0.0, 60.0, "6 is usual")
+        self._check("phase_margin_deg", 0.0, 90.0, "30 … 60 is usual")
+        self._check("max_sensitivity", 1.0, inf, "1.4 … 2 is usual")
+        self._check("noise_gain", 0.0, inf, "a positive limit")
+        self._check("confidence", 0.0, 1.0, "0.95 is usual")
+        self._check("disk_margin", -1e-300, 2.0, "0.5 … 0.8 is usual")
+        self._check("coherence", -1e-300, 1.0, "0.5 is usual")
+        self._check("notches", -1, 5, "0 … 4")
+
+    def _check(self, name: str, low: float, high: float, usual: str) -> None:
+        """UsageError if the value is not between the two."""
+        value = getattr(self, name)
+        if value is not None and not (isfinite(value) and low < value < high):
+            raise UsageError(
+                "out-of-range", f"{name}={value} is out of range", f"choose {usual}", argument=name, value=value
+            )

@@ -1,0 +1,69 @@
+"""`livebode tune` on a run of the simulated loop: table, picture, filters, refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.core import Lines
+from livebode.excitation import multisine
+from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
+from tests.support.command import livebode, write_parquet
+from tests.support.loop_runs import AXIS
+
+FREQUENCIES = "4:100:2, 104:400:8"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("tune")
+    w = 0.1 * multisine(Lines.parse(FREQUENCIES, RATE_HZ, 2000))
+    u, y = TwoMassLoop().run(w, 10, sigma=0.02, seed=1)
+    write_parquet(folder / "log.parquet", {"w": np.resize(w, u.size), "u": u[0], "y": y[0]})
+    words = AXIS.format(gain=0.2308, delay=0).replace('"20:140:10"', f'"{FREQUENCIES}"')
+    words = words.replace("window = 400", "window = 2000").replace("hop = 200", "hop = 2000")
+    (folder / "axis.toml").write_text(words, encoding="utf-8")
+    done = livebode("run", folder / "axis.toml", "--out", folder / "run")
+    assert done.code == 0, done.err
+    return folder / "run"
+
+
+def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
+    refused = livebode("tune", run)
+    assert refused.code == 2
+    assert "livebode check-loop" in refused.err
+    assert livebode("check-loop", run).out.startswith("loop checked: as described")
+    done = livebode("tune", run)
+    assert done.code == 0, done.err
+    assert "velocity.gain" in done.out
+    assert "is promised" in done.out
+    assert (run / "tune.png").stat().st_size > 20_000
+    assert "LIVEBODE_FILTERS" in (run / "filters.h").read_text(encoding="utf-8")
+
+
+def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path) -> None:
+    done = livebode("tune", run, "--loop-checked", "--bandwidth-hz", 300, "--json")
+    assert done.code == 2
+    found = json.loads(done.out.splitlines()[0])
+    assert not found["met"]
+    assert found["limited_by"]
+    assert "the best promises" in done.out + done.err
+
+
+def test_a_description_that_the_check_contradicts_is_never_tuned(run: Path) -> None:
+    other = run.parent / "gain.toml"
+    words = (run.parent / "axis.toml").read_text(encoding="utf-8")
+    other.write_text(words.replace("0.2308", "0.3"), encoding="utf-8")
+    assert "livebode check-loop" in livebode("tune", run, "--axis", other).err
+    assert livebode("tune", run, "--axis", other, "--loop-checked").code == 0
+    assert "loop.velocity.gain" in livebode("check-loop", run, "--axis", other).out
+    for more in ((), ("--loop-checked",)):
+        done = livebode("tune", run, "--axis", other, *more)
+        assert done.code == 2
+        assert "loop.velocity.gain" in done.err
+    (run / "loop-check.json").write_text("[]", encoding="utf-8")
+    assert livebode("tune", run).code == 2
+    (run / "loop-check.json").unlink()
