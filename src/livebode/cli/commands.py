@@ -26,6 +26,7 @@ SUMMARIES: Mapping[str, str] = {
     "export": "Write the responses or the fitted parameters of a run in a format of other programs.",
     "margins": "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter "
     "if needed.",
+    "friction": "Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with bounds.",
     "validate": "Simulate the fitted model with another recording and test whether the residual correlates with the "
     "signals.",
     "learn": "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",

@@ -15,9 +15,10 @@ from livebode.motion.smooth_motion import OutputKind, SmoothMotion
 
 Floats = NDArray[np.float64]
 
-_STANDING = 0.25  # of a kernel: at standstill any smaller input gives the same motion, in a reversal none does
+_STANDING = 0.01  # of a kernel: at standstill any smaller input gives the same motion, in a reversal none does
 _EACH_WAY_MIN = 20  # samples a kernel apart, in each direction
 _STRIBECK = np.geomspace(0.02, 0.5, 15)  # of the highest speed: places of the search
+_SLIDING = 0.99  # of a kernel in one direction, for the measured friction that is shown
 _ROUNDS = 30
 _SETTLED = 1e-6
 _SEEN = 0.999  # probability that the Stribeck friction is not zero
@@ -52,7 +53,7 @@ class FrictionCurve:
     samples, excluded
         Numbers of smoothed samples used, and left out because the axis was at standstill.
     measured
-        Speed and friction of each used sample, shape (2, samples): the input without J·a and F0.
+        Speed and friction away from reversals, shape (2, some samples): the input without J·a and F0.
     """
 
     names: tuple[str, ...]
@@ -310,7 +311,7 @@ def _curve(
         residual=found.residual,
         samples=int(np.count_nonzero(used)),
         excluded=int(np.count_nonzero(~used)),
-        measured=np.stack([motion.velocity[used], u]),
+        measured=np.stack([motion.velocity[used], u])[:, np.abs(motion.sign[used]) > _SLIDING],
     )
 
 

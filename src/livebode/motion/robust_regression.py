@@ -42,8 +42,8 @@ def regress(columns: Floats, target: Floats, used: NDArray[np.bool_]) -> Regress
 
     The covariance is that of Lazarus, Lewis, Stock and Watson (J. Business & Economic Statistics 36(4), 2018): the
     long-run covariance of the gradient is the mean over the first B = 0.4·n^(2/3) cosines, and the error of a value
-    over its sigma has Student's t distribution of B degrees of freedom. Samples between that are not used count as
-    zeros, so that the lags remain true.
+    over its sigma has Student's t distribution. Its degrees of freedom are B less the parameters, whose values fit the
+    slowest part of the noise too. Samples between that are not used count as zeros, so that the lags remain true.
 
     Parameters
     ----------
@@ -71,10 +71,11 @@ def regress(columns: Floats, target: Floats, used: NDArray[np.bool_]) -> Regress
     gradient = np.zeros(columns.shape)
     gradient[used] = x / scale * rest[:, np.newaxis]
     n, many = y.size, columns.shape[1]
-    cosines = max(round(_COSINES * n ** (2 / 3)), _COSINES_MIN)
+    cosines = max(round(_COSINES * n ** (2 / 3)), _COSINES_MIN + many)
+    dof = cosines - many
     t = (np.arange(len(columns)) + 0.5) / len(columns)
     sums = np.cos(np.pi * np.arange(1, cosines + 1)[:, np.newaxis] * t) @ gradient
-    meat = 2 / cosines * sums.T @ sums * n / max(n - many, 1)
+    meat = 2 / dof * sums.T @ sums
     covariance = inverse @ meat @ inverse / np.outer(scale, scale)
     squares = float(rest @ rest)
-    return Regression(value / scale, covariance, cosines, squares, float(np.sqrt(squares / max(n - many, 1))))
+    return Regression(value / scale, covariance, dof, squares, float(np.sqrt(squares / max(n - many, 1))))

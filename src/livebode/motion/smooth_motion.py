@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 OutputKind = Literal["position", "velocity"]
 
 _HALF_POWER = np.sqrt(np.log(2)) / (2 * np.pi)  # σ of a Gaussian times the frequency at which its power is a half
-_REACH = 4.0  # σ on each side, beyond which a kernel is zero
+_REACH = 6.0  # σ on each side, beyond which a kernel is zero: at 4 its second moment lacks 0.5 %
 _SHARPER = 5.0  # times the band: the speed whose sign decides about dry friction
 _SLOWEST = 0.01  # of the highest speed
 _SAMPLES_MIN = 2.0  # σ in samples: below it the sampled derivative of the kernel is wrong
@@ -81,7 +81,7 @@ class SmoothMotion:
     sign
         Smoothed sign of the speed.
     standing
-        Share of the kernel in which the axis is slower than `slowest`.
+        Share of the kernel in which the axis is at standstill: slower than `slowest` for more than its width.
     kernel
         The filter.
     """
@@ -113,13 +113,13 @@ class SmoothMotion:
                 band_hz=band_hz,
                 rate_hz=block.rate_hz,
             )
-        if len(block) < 16 * kernel.reach:
+        if len(block) < 10 * kernel.reach:
             raise SignalError(
                 "too-short",
-                f"{len(block)} samples are less than {16 * kernel.reach}, which a band of {band_hz:g} Hz needs",
+                f"{len(block)} samples are less than {10 * kernel.reach}, which a band of {band_hz:g} Hz needs",
                 "record some strokes, or choose a higher band",
                 samples=len(block),
-                limit=16 * kernel.reach,
+                limit=10 * kernel.reach,
             )
         order = 0 if kind == "velocity" else 1
         y = block[output]
@@ -134,7 +134,7 @@ class SmoothMotion:
             velocity=kernel.smooth(y, order)[step],
             acceleration=kernel.smooth(y, order + 1)[step],
             sign=kernel.smooth(np.sign(speed))[step],
-            standing=kernel.smooth((np.abs(speed) <= least).astype(np.float64))[step],
+            standing=kernel.smooth(_held(np.abs(speed) <= least, 2 * kernel.sigma))[step],
             kernel=kernel,
         )
 
@@ -144,3 +144,13 @@ def _sharp_speed(y: Floats, kernel: SmoothKernel, order: int) -> Floats:
     sharp = SmoothKernel(kernel.band_hz * min(_SHARPER, kernel.sigma / _SAMPLES_MIN), kernel.rate_hz)
     return np.pad(sharp.smooth(y, order), sharp.reach, mode="edge")
 
+
+
+def _held(slow: NDArray[np.bool_], samples: float) -> Floats:
+    """1 where a stretch of slow samples is longer than that, else 0: a reversal is short, a standstill is not."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]])))
+    held = np.zeros(slow.size)
+    for first, stop in zip(edges[::2], edges[1::2]):
+        if stop - first > samples:
+            held[first:stop] = 1.0
+    return held
