@@ -18,7 +18,7 @@ from livebode.sources import open_log
 
 @dataclass(frozen=True, eq=False)
 class MotionSamples:
-    """Samples without gaps, and the channels of the input and of the motion.
+    """Samples without gaps, and the channels of the input, of the motion and, if named, of the motor's angle.
 
     `recorded` is the number of samples of the recording; `run` is the directory of a run, if it was named. `settings`
     are the sections of its configuration, or of the configuration.
@@ -31,6 +31,7 @@ class MotionSamples:
     recorded: int
     run: Path | None
     settings: dict[str, Any]
+    angle: str | None = None
 
 
 def read_strokes(
@@ -39,14 +40,13 @@ def read_strokes(
     input: str | None = None,
     position: str | None = None,
     velocity: str | None = None,
-    more: tuple[str, ...] = (),
+    angle: str | None = None,
     rate_hz: float | None = None,
     time: str | None = None,
 ) -> MotionSamples:
     """The longest stretch without gaps of a recording, or of that of a configuration or a run.
 
-    The channels and the reading are those of the configuration or the run, unless they are given here. `more` are
-    further channels.
+    The channels and the reading are those of the configuration or the run, unless they are given here.
 
     Raises
     ------
@@ -72,6 +72,7 @@ def read_strokes(
     output = position or velocity or signals.get("output")
     if output is None:
         raise _missing("position", "the position or the velocity of the axis")
+    turned = angle or settings.get("orders", {}).get("angle")
     source = settings.get("source", {})
     opened = open_log(
         log,
@@ -81,10 +82,10 @@ def read_strokes(
         dbc=source.get("dbc"),
         channels=[output],
     )
-    block, recorded = clean_stretch(opened, list(dict.fromkeys([torque, output, *more])))
+    block, recorded = clean_stretch(opened, [name for name in dict.fromkeys([torque, output, turned]) if name])
     given: Literal["position", "velocity"] | None = "position" if position else "velocity" if velocity else None
     kind = given or _kind(block, output)
-    return MotionSamples(block, torque, output, kind, recorded, run, settings)
+    return MotionSamples(block, torque, output, kind, recorded, run, settings, turned)
 
 
 def _configured(target: Location) -> tuple[Location, dict[str, Any], Path | None]:
@@ -109,7 +110,7 @@ def _configured(target: Location) -> tuple[Location, dict[str, Any], Path | None
 
 def _recorded_axis(run: Path) -> Axis:
     words = recorded_configuration(RunRecord.open(run, output_only=True).summary)
-    kept = {key: words[key] for key in ("source", "signals", "loop", "orders") if key in words}
+    kept = {key: words[key] for key in ("source", "signals", "lines", "orders") if key in words}
     if "signals" not in kept or "log" not in kept.get("source", {}):
         raise RecordError(
             "not-tracked",
