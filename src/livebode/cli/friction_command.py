@@ -17,6 +17,7 @@ from livebode.locations import location
 if TYPE_CHECKING:
     from livebode.analysis.friction import FrictionReport
 
+_WIDTH_MAX = 4096
 _WORDS = {
     "inertia": "inertia",
     "coulomb": "Coulomb",
@@ -80,6 +81,7 @@ def friction_command(
 
 def show_friction(found: FrictionReport) -> None:
     """Print the parameters with bounds, those of each direction, and those of each place."""
+    from rich.measure import Measurement
     from rich.table import Table
 
     curve, strokes = found.curve, found.strokes
@@ -93,7 +95,7 @@ def show_friction(found: FrictionReport) -> None:
     )
     table = Table(box=None, header_style="bold")
     for heading in ("", "both", "± 95 %", "forward", "± 95 %", "backward", "± 95 %", "unit"):
-        table.add_column(heading, justify="right" if heading not in ("", "unit") else "left")
+        table.add_column(heading, justify="right" if heading not in ("", "unit") else "left", no_wrap=True)
     bound, each = curve.bound(), found.each_way()
     for i, name in sorted(enumerate(curve.names), key=lambda one: list(_WORDS).index(one[1])):
         row = [_WORDS[name], f"{curve.value[i]:.4g}", f"{bound[i]:.2g}"]
@@ -101,6 +103,7 @@ def show_friction(found: FrictionReport) -> None:
             at = {"coulomb": 0, "viscous": 1}.get(name)
             row += ["", ""] if at is None else [f"{each[way][0][at]:.4g}", f"{each[way][1][at]:.2g}"]
         table.add_row(*row, curve.units[i])
+    console.width = max(console.width, Measurement.get(console, console.options.update(max_width=_WIDTH_MAX), table).maximum)
     console.print(table)
     if "stribeck" not in curve.names:
         console.print("no Stribeck friction is visible (99.9 %)")

@@ -112,20 +112,19 @@ def _quiet() -> pa.Table:
 
 
 def _strokes() -> pa.Table:
-    """A stiff axis with friction and cogging in strokes at four speeds."""
+    """A stiff axis with friction and cogging in strokes at three speeds."""
     axis = BeltAxis(
         mechanics=Mechanics(stiffness_n_per_m=5e7, damping_n_s_per_m=1000.0, frozen_position_m=0.8),
         motion=StrokeSequence(
-            turning_points_m=(0.3, 0.55, 0.3, 0.55, 0.3, 0.55, 0.3, 0.55, 0.3),
-            speeds_m_per_s=(0.05, 0.05, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2),
+            turning_points_m=(0.3, 0.7, 0.3, 0.7, 0.3, 0.7, 0.3), speeds_m_per_s=(0.06, 0.06, 0.12, 0.12, 0.2, 0.2)
         ),
         friction=Friction(
-            load_coulomb_n=15.0, load_viscous_n_s_per_m=40.0, load_stribeck_n=10.0, stribeck_speed_m_per_s=0.05,
+            load_coulomb_n=15.0, load_viscous_n_s_per_m=40.0, load_stribeck_n=10.0, stribeck_speed_m_per_s=0.04,
             smoothing_m_per_s=1e-4,
         ),
         drive=Drive(torque_ripple_n_m=0.05, torque_ripple_per_turn=24, torque_noise_n_m=0.05),
         sensor=Sensor(noise_rad_per_s=0.02),
-        seconds=24.0,
+        seconds=25.5,
         seed=9,
     )  # fmt: skip
     block, _ = SimulatedAxis(axis).run()
