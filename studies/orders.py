@@ -11,7 +11,7 @@ from livebode import Lines, multisine
 from livebode.analysis.orders import OrderReport, orders_of
 from livebode.analysis.strokes import MotionSamples
 from livebode.motion.angle_orders import Shaft
-from livebode.simulation import BeltAxis, Drive, Friction, Mechanics, Sensor, SimulatedAxis, StrokeSequence, Strokes
+from livebode.simulation import BeltAxis, Drive, Friction, Mechanics, Sensor, SimulatedAxis, Strokes, StrokeSequence
 
 RUNS = 60
 RATE_HZ = 4000.0

@@ -40,7 +40,9 @@ def friction_command(
     places: Annotated[
         int, typer.Option(metavar="N", help="Find the Coulomb friction at N positions along the travel. \\[default: 0]")
     ] = 0,
-    band: Annotated[float, typer.Option(metavar="HZ", help="Band of the filter; below excitation and resonances.")] = 5.0,
+    band: Annotated[
+        float, typer.Option(metavar="HZ", help="Band of the filter; below excitation and resonances.")
+    ] = 5.0,
     slowest: Annotated[
         float | None,
         typer.Option(metavar="SPEED", help="Speed of standstill. \\[default: 1 % of the highest speed]"),
@@ -103,7 +105,9 @@ def show_friction(found: FrictionReport) -> None:
             at = {"coulomb": 0, "viscous": 1}.get(name)
             row += ["", ""] if at is None else [f"{each[way][0][at]:.4g}", f"{each[way][1][at]:.2g}"]
         table.add_row(*row, curve.units[i])
-    console.width = max(console.width, Measurement.get(console, console.options.update(max_width=_WIDTH_MAX), table).maximum)
+    console.width = max(
+        console.width, Measurement.get(console, console.options.update(max_width=_WIDTH_MAX), table).maximum
+    )
     console.print(table)
     if "stribeck" not in curve.names:
         console.print("no Stribeck friction is visible (99.9 %)")

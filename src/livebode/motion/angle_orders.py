@@ -251,7 +251,13 @@ def _means(signal: Floats, when: Floats) -> Floats:
 
 
 def shaft_orders(
-    windows: AngleWindows, shaft: Shaft, value: Complex, extra: Floats, lines_hz: Floats, highest_hz: float, turns: int = 2
+    windows: AngleWindows,
+    shaft: Shaft,
+    value: Complex,
+    extra: Floats,
+    lines_hz: Floats,
+    highest_hz: float,
+    turns: int = 2,
 ) -> ShaftOrders:
     """Mean over all windows in which an order meets no line of the time, with the scatter between strokes.
 

@@ -263,9 +263,13 @@ def _with_stribeck(
     seen = amount > 0 and top * _STRIBECK[0] / 4 < speed < top
     # The speed must be known too: a flat Stribeck curve is a change of the Coulomb friction.
     limit = t_quantile(0.5 + _SEEN / 2, full.dof) * full.sigma[-2:]
-    return ([*names, "stribeck", "stribeck_speed"], full) if seen and amount > limit[0] and speed > limit[1] else (
-        names,
-        plain,
+    return (
+        ([*names, "stribeck", "stribeck_speed"], full)
+        if seen and amount > limit[0] and speed > limit[1]
+        else (
+            names,
+            plain,
+        )
     )
 
 

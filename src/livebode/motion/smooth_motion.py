@@ -44,7 +44,7 @@ class SmoothKernel:
     @property
     def sigma(self) -> float:
         """Standard deviation, in samples."""
-        return _HALF_POWER * self.rate_hz / self.band_hz
+        return float(_HALF_POWER * self.rate_hz / self.band_hz)
 
     @property
     def reach(self) -> int:
@@ -95,7 +95,9 @@ class SmoothMotion:
     kernel: SmoothKernel
 
     @classmethod
-    def of(cls, block: Block, input: str, output: str, kind: OutputKind, band_hz: float, slowest: float | None) -> SmoothMotion:
+    def of(
+        cls, block: Block, input: str, output: str, kind: OutputKind, band_hz: float, slowest: float | None
+    ) -> SmoothMotion:
         """From samples without gaps; `slowest` is by default 1 % of the highest speed.
 
         Raises
@@ -143,7 +145,6 @@ def _sharp_speed(y: Floats, kernel: SmoothKernel, order: int) -> Floats:
     """Speed with less smoothing, at every sample; at the ends that of the first and last one known."""
     sharp = SmoothKernel(kernel.band_hz * min(_SHARPER, kernel.sigma / _SAMPLES_MIN), kernel.rate_hz)
     return np.pad(sharp.smooth(y, order), sharp.reach, mode="edge")
-
 
 
 def _held(slow: NDArray[np.bool_], samples: float) -> Floats:

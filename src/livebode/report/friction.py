@@ -57,11 +57,16 @@ def friction_figure(found: FrictionCurves, *, title: str = "", dark: bool = Fals
         for sign in (-1, 1):
             v = sign * np.linspace(max(curve.speed[0], 1e-3 * curve.speed[1]), curve.speed[1], _POINTS)
             value, bound = curve.at(v)
-            label = {"label": "both directions, 95 %"} if sign > 0 else {}
             axes.fill_between(v, value - bound, value + bound, color=look.run, alpha=0.25, linewidth=0)
-            axes.plot(v, value, color=look.run, linewidth=1.8, **label)
-            label = {"label": "each direction"} if sign > 0 else {}
-            axes.plot(v, _with_offset(each, curve, v), "--", color=look.newest, linewidth=1.2, **label)
+            axes.plot(v, value, color=look.run, linewidth=1.8, label=_once("both directions, 95 %", sign))
+            axes.plot(
+                v,
+                _with_offset(each, curve, v),
+                "--",
+                color=look.newest,
+                linewidth=1.2,
+                label=_once("each direction", sign),
+            )
         axes.axhline(0.0, color=look.grid, linewidth=0.8, zorder=0)
         axes.axvline(0.0, color=look.grid, linewidth=0.8, zorder=0)
         axes.set_xlabel(_labelled("speed", _speed_unit(curve)))
@@ -77,6 +82,11 @@ def friction_figure(found: FrictionCurves, *, title: str = "", dark: bool = Fals
             places.set_xlabel("position")
             places.set_ylabel(_labelled("Coulomb friction", curve.units[curve.index("coulomb")]))
     return figure
+
+
+def _once(label: str, sign: int) -> str:
+    """The label for one of the two branches; Matplotlib omits one with an underscore from the legend."""
+    return label if sign > 0 else f"_{label}"
 
 
 def _with_offset(each: FrictionCurve, curve: FrictionCurve, v: NDArray[np.float64]) -> NDArray[np.float64]:
