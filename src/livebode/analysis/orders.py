@@ -116,7 +116,7 @@ def orders_of(
     inner = slice(kernel.reach, len(motion.block) - kernel.reach)
     turned = _angle(motion, angle)[inner] * scale
     signals = np.stack([rest, acceleration])
-    slowest = curve_slowest(speed)
+    slowest = _slowest(speed)
     strokes = strokes_of(turned, speed, signals, motion.block.rate_hz, slowest)
     limit = min(highest_hz, _most_hz(kernel))
     known = np.zeros(0) if lines_hz is None else lines_hz
@@ -133,7 +133,7 @@ def orders_of(
     return OrderReport(found, curve, len(strokes), (min(speeds), max(speeds)), known, motion, unit)
 
 
-def curve_slowest(speed: Floats) -> float:
+def _slowest(speed: Floats) -> float:
     """Speed from which on an axis counts as moving: 5 % of the highest."""
     return 0.05 * float(np.max(np.abs(speed)))
 

@@ -26,7 +26,8 @@ SUMMARIES: Mapping[str, str] = {
     "export": "Write the responses or the fitted parameters of a run in a format of other programs.",
     "margins": "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter "
     "if needed.",
-    "friction": "Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with bounds.",
+    "friction": "Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with "
+    "bounds.",
     "orders": "Find torque that repeats with the angle: cogging, eccentricity, gears; write a feedforward table.",
     "validate": "Simulate the fitted model with another recording and test whether the residual correlates with the "
     "signals.",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,7 @@ class Shaft:
 
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """Samples of steady direction: angle of the motor in rad, and the torque, of shape (samples,) or (many, samples)."""
+    """Samples in one direction: angle of the motor in rad, (samples,), and some signals, (signals, samples)."""
 
     angle: Floats
     torque: Floats
@@ -170,12 +171,12 @@ class ShaftOrders:
 
 
 def strokes_of(angle: Floats, speed: Floats, torque: Floats, rate_hz: float, slowest: float) -> list[Stroke]:
-    """Stretches in which the axis is faster than `slowest` (rad/s) in one direction; shapes (samples,)."""
+    """Stretches in which the axis is faster than `slowest` in one direction; `torque` is (many, samples)."""
     way = np.where(np.abs(speed) > slowest, np.sign(speed), 0.0)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(way)) + 1, [way.size]])
     return [
         Stroke(angle[first:stop], torque[:, first:stop], int(first), rate_hz)
-        for first, stop in zip(edges[:-1], edges[1:])
+        for first, stop in pairwise(edges)
         if way[first] != 0 and stop - first > 1
     ]
 
@@ -330,13 +331,3 @@ def _mean(value: Complex, stroke: NDArray[np.int64], by_strokes: bool) -> tuple[
     variance = float(np.sum(share**2 * np.abs(each - mean) ** 2)) / expected
     dof = float(1 / np.sum(share**2) - 1)
     return mean, variance, max(dof, 1.0)
-
-
-def without_unseen(found: ShaftOrders) -> ShaftOrders:
-    """Only the orders that are seen, for a table or a picture."""
-    at = np.flatnonzero(found.seen)
-    shaft = replace(found.shaft, orders=tuple(found.shaft.orders[i] for i in at)) if at.size else found.shaft
-    if not at.size:
-        return found
-    arrays = ("value", "sigma", "dof", "seen", "strokes", "windows", "meets_hz")
-    return replace(found, shaft=shaft, **{name: getattr(found, name)[at] for name in arrays})

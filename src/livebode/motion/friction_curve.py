@@ -97,7 +97,7 @@ class FrictionCurve:
         return self.names.index(name)
 
     def at(self, velocity: Floats, probability: float = 0.95) -> tuple[Floats, Floats]:
-        """Friction at these speeds with its bound, without the offset; the mean over the places, shape as `velocity`."""
+        """Friction at these speeds with its bound, without the offset, as the mean over the places; (speeds,) each."""
         slope = self._slopes(np.asarray(velocity, dtype=np.float64))
         linear = slope.copy()
         if "stribeck_speed" in self.names:

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from livebode.core import UsageError
 from livebode.core.files import whole_file
+from livebode.structured_text.text import comment, real
 
 Floats = NDArray[np.float64]
 
 _PER_ROW = 4
+_LOADED_AT_ONCE = 32  # points per cycle, so that the first cycle is as short as the others
 
 
 def write_angle_table(path: str | PathLike[str], torque: Floats, note: list[str], unit: str = "") -> None:
@@ -61,10 +63,10 @@ def _csv(torque: Floats, note: list[str], unit: str) -> str:
 
 
 def _c_header(torque: Floats, note: list[str], unit: str) -> str:
-    comment = "\n".join(f" * {line}".replace("*/", "* /") for line in [f"Feedforward over one turn, {unit}.", *note])
+    about = "\n".join(f" * {line}".replace("*/", "* /") for line in [f"Feedforward over one turn, {unit}.", *note])
     rows = _rows([float(value).hex() for value in torque])
     return f"""/*
-{comment}
+{about}
  */
 #ifndef RIPPLE_FEEDFORWARD_H
 #define RIPPLE_FEEDFORWARD_H
@@ -80,39 +82,64 @@ static const double ripple_feedforward[RIPPLE_FEEDFORWARD_POINTS] = {{
 
 
 def _structured_text(torque: Floats, note: list[str], unit: str) -> str:
-    comment = "\n".join(line.replace("*)", "* )") for line in [f"Feedforward over one turn, {unit}.", *note])
-    last = torque.size - 1
-    return f"""(*
-{comment}
-*)
-FUNCTION F_RippleFeedforward : LREAL
+    """A function block without conversions from LREAL and initial values, in which controllers differ.
+
+    Its table is loaded in its first cycles; the torque is 0 until then.
+    """
+    text = comment("\n".join([f"Feedforward over one turn, {unit}.", *note]))
+    points, last = torque.size, torque.size - 1
+    halvings = int(np.ceil(np.log2(points)))
+    return f"""{text}FUNCTION_BLOCK FB_RippleFeedforward
 VAR_INPUT
-    angle : LREAL; (* of the shaft, rad, any number of turns *)
+    angle : LREAL; // of the shaft, rad, from 0 to 2 pi; outside, the torque is 0
+END_VAR
+VAR_OUTPUT
+    torque : LREAL;
 END_VAR
 VAR
     place : LREAL;
     below : DINT;
-    share : LREAL;
+    above : DINT;
+    half : DINT;
+    i : DINT;
+    loaded : UDINT;
+    table : ARRAY [0..{last}] OF LREAL;
 END_VAR
-VAR CONSTANT
-    turn : LREAL := 6.283185307179586;
-    torque : ARRAY [0..{last}] OF LREAL := [
-{_rows([repr(float(value)) for value in torque])}
-    ];
-END_VAR
-
-place := angle / turn;
-place := (place - LREAL_TO_DINT(place)) * {torque.size}.0;
-IF place < 0.0 THEN
-    place := place + {torque.size}.0;
+IF loaded < {-(-points // _LOADED_AT_ONCE)} THEN
+    CASE loaded OF
+{_loading(torque)}
+    END_CASE
+    loaded := loaded + 1;
 END_IF
-below := LREAL_TO_DINT(place - 0.5);
-share := place - DINT_TO_LREAL(below);
-below := (below + {torque.size}) MOD {torque.size};
-F_RippleFeedforward := torque[below] + share * (torque[(below + 1) MOD {torque.size}] - torque[below]);
-
-END_FUNCTION
+torque := 0.0;
+place := angle * {real(points / (2 * np.pi))};
+IF (loaded = {-(-points // _LOADED_AT_ONCE)}) AND (place >= 0.0) AND (place < {points}.0) THEN
+    below := 0;
+    half := {1 << (halvings - 1)};
+    FOR i := 1 TO {halvings} DO
+        IF (below + half <= {last}) AND (place >= DINT_TO_LREAL(below + half)) THEN
+            below := below + half;
+        END_IF
+        half := half / 2;
+    END_FOR
+    above := below + 1;
+    IF above = {points} THEN
+        above := 0;
+    END_IF
+    torque := table[below] + (place - DINT_TO_LREAL(below)) * (table[above] - table[below]);
+END_IF
+END_FUNCTION_BLOCK
 """
+
+
+def _loading(torque: Floats) -> str:
+    """The cases of a table's parts."""
+    lines = []
+    for i, value in enumerate(torque.tolist()):
+        if i % _LOADED_AT_ONCE == 0:
+            lines.append(f"    {i // _LOADED_AT_ONCE}:")
+        lines.append(f"        table[{i}] := {real(value)};")
+    return "\n".join(lines)
 
 
 _WRITERS: Mapping[str, Callable[[Floats, list[str], str], str]] = {
