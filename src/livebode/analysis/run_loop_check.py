@@ -55,7 +55,7 @@ def check_loop_of_run(
 ) -> tuple[LoopCheck, LoopSection]:
     """Check a run's loop, and the description that was checked: `section`, else that of the run.
 
-    The samples are those of its recordings, else those that the run recorded; the longest stretch without a gap.
+    The samples are those that the run recorded, else those of its recordings; the longest stretch without a gap.
 
     Parameters
     ----------
@@ -130,10 +130,21 @@ def checked_loop(directory: Path, section: LoopSection) -> CheckedLoop:
 
 
 def _longest_stretch(run: RunRecord, words: dict[str, Any], names: list[str]) -> Block:
-    source = words.get("source", {})
-    if not source.get("log"):
-        return _recorded(run, names)
-    axis = Axis.of({key: words[key] for key in ("source", "signals", "monitoring") if key in words}, str(run.path))
+    recorded = _recorded(run, names)
+    if recorded is not None:
+        return recorded
+    if words.get("source", {}).get("log"):
+        return _of_logs(words, names, str(run.path))
+    raise RecordError(
+        "no-samples",
+        f"the run in {str(run.path)!r} has no recorded samples of {', '.join(names)}",
+        "record them with samples = true in [record]",
+        path=str(run.path),
+    )
+
+
+def _of_logs(words: dict[str, Any], names: list[str], where: str) -> Block:
+    axis = Axis.of({key: words[key] for key in ("source", "signals", "monitoring") if key in words}, where)
     given, ready = axis.source, axis.ready
     found = []
     for log in given.logs:
@@ -142,16 +153,11 @@ def _longest_stretch(run: RunRecord, words: dict[str, Any], names: list[str]) ->
     return max(found, key=len)
 
 
-def _recorded(run: RunRecord, names: list[str]) -> Block:
-    """The longest stretch of the samples that a run recorded."""
+def _recorded(run: RunRecord, names: list[str]) -> Block | None:
+    """The longest stretch of the samples that a run recorded, if it recorded these channels."""
     parts = list(_tables(run, names))
     if not parts:
-        raise RecordError(
-            "no-samples",
-            f"the run in {str(run.path)!r} has no recorded samples of {', '.join(names)}",
-            "record them with samples = true in [record]",
-            path=str(run.path),
-        )
+        return None
     number, data = (np.concatenate(part, axis=-1) for part in zip(*parts))
     clean = np.isfinite(data).all(axis=0)
     follows = np.concatenate([[False], np.diff(number) == 1]) & clean
@@ -166,11 +172,8 @@ def _recorded(run: RunRecord, names: list[str]) -> Block:
 def _tables(run: RunRecord, names: list[str]) -> Iterator[tuple[Any, Any]]:
     count = 0
     for table in run.tables("samples"):
-        columns = [channel.name for channel in channels_of(table.schema)]
+        columns = dict(zip([channel.name for channel in channels_of(table.schema)], table.column_names[2:]))
         if not set(names) <= set(columns) or count > _SAMPLES_MAX:
             return
         count += table.num_rows
-        yield (
-            table["sample"].to_numpy(),
-            np.stack([table.column(2 + columns.index(name)).to_numpy() for name in names]),
-        )
+        yield table["sample"], np.stack([table[columns[name]] for name in names])

@@ -29,6 +29,9 @@ SUMMARIES: Mapping[str, str] = {
     "margins": "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter "
     "if needed.",
     "tune": "Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.",
+    "friction": "Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with "
+    "bounds.",
+    "orders": "Find torque that repeats with the angle: cogging, eccentricity, gears; write a feedforward table.",
     "validate": "Simulate the fitted model with another recording and test whether the residual correlates with the "
     "signals.",
     "learn": "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",

@@ -13,6 +13,7 @@ from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.monitoring_section import MonitoringSection
 from livebode.configuration.motion_section import MotionSection
+from livebode.configuration.orders_section import OrdersSection
 from livebode.configuration.output_only import check_output_only
 from livebode.configuration.output_only_section import OutputOnlySection
 from livebode.configuration.publish_section import PublishSection, check_publish
@@ -61,6 +62,8 @@ class Axis(ConfigurationSection):
         A model is fitted to every response.
     output_only
         The modes are tracked from the output alone.
+    orders
+        Shafts, and the torque that repeats with their angle.
     monitoring
         Comparison with a baseline.
     serve
@@ -82,6 +85,7 @@ class Axis(ConfigurationSection):
     motion: MotionSection | None = None
     fit: FitSection | None = None
     output_only: OutputOnlySection | None = None
+    orders: OrdersSection = OrdersSection()
     monitoring: MonitoringSection = MonitoringSection()
     serve: ServeSection = ServeSection()
     report: ReportSection | None = None

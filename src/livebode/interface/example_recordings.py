@@ -21,7 +21,18 @@ from livebode.core.writing import writing
 from livebode.excitation import chirp, multisine
 from livebode.export.delimited import write_columns, write_header
 from livebode.interface._example_hall import write_hall
-from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Standstill, Strokes, TensionLoss
+from livebode.simulation import (
+    BeltAxis,
+    Drive,
+    Friction,
+    Mechanics,
+    Sensor,
+    SimulatedAxis,
+    Standstill,
+    Strokes,
+    StrokeSequence,
+    TensionLoss,
+)
 from livebode.tables import Table
 from livebode.tables.parquet_writer import write_parquet
 
@@ -100,6 +111,26 @@ def _quiet() -> Table:
     return Table.of(dict(zip(table.column_names, table.columns)) | {table.column_names[1]: block["u"] + hum})
 
 
+def _strokes() -> Table:
+    """A stiff axis with friction and cogging in strokes at three speeds."""
+    axis = BeltAxis(
+        mechanics=Mechanics(stiffness_n_per_m=5e7, damping_n_s_per_m=1000.0, frozen_position_m=0.8),
+        motion=StrokeSequence(
+            turning_points_m=(0.3, 0.7, 0.3, 0.7, 0.3, 0.7, 0.3), speeds_m_per_s=(0.06, 0.06, 0.12, 0.12, 0.2, 0.2)
+        ),
+        friction=Friction(
+            load_coulomb_n=15.0, load_viscous_n_s_per_m=40.0, load_stribeck_n=10.0, stribeck_speed_m_per_s=0.04,
+            smoothing_m_per_s=1e-4,
+        ),
+        drive=Drive(torque_ripple_n_m=0.05, torque_ripple_per_turn=24, torque_noise_n_m=0.05),
+        sensor=Sensor(noise_rad_per_s=0.02),
+        seconds=25.5,
+        seed=9,
+    )  # fmt: skip
+    block, _ = SimulatedAxis(axis).run()
+    return _table(block, ("u", "velocity", "position"))
+
+
 EXAMPLES = {
     "standstill": Example(
         "an axis at standstill, recorded twice",
@@ -173,6 +204,12 @@ EXAMPLES = {
         },
         ("ambient.toml",),
         ("livebode run ambient.toml",),
+    ),
+    "strokes": Example(
+        "an axis with friction and cogging, in strokes without excitation",
+        {"strokes.parquet": _strokes},
+        ("strokes.toml",),
+        ("livebode friction strokes.toml", "livebode orders strokes.toml"),
     ),
     "hall": Example(
         "a year of a hall with eight axes, as the lake of an archive",

@@ -5,7 +5,9 @@ The import is cheap: Matplotlib is loaded when the first picture is drawn.
 
 from livebode.report.bode import bode_figure
 from livebode.report.excitation import excitation_figure, save_excitation_picture
+from livebode.report.friction import friction_figure, save_friction_picture
 from livebode.report.loop import loop_figure, save_loop_picture
+from livebode.report.orders import orders_figure, save_orders_picture
 from livebode.report.pictures import save_pictures
 from livebode.report.terminal import terminal_bode
 from livebode.report.tracking import tracking_figure
@@ -15,9 +17,13 @@ from livebode.report.validation import save_validation_picture, validation_figur
 __all__ = [
     "bode_figure",
     "excitation_figure",
+    "friction_figure",
     "loop_figure",
+    "orders_figure",
     "save_excitation_picture",
+    "save_friction_picture",
     "save_loop_picture",
+    "save_orders_picture",
     "save_pictures",
     "save_tuning_picture",
     "save_validation_picture",

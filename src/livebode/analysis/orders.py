@@ -1,0 +1,180 @@
+"""The orders of an axis in a recording: torque that repeats with the angle of its shafts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.analysis.strokes import MotionSamples
+from livebode.core import SignalError, UsageError
+from livebode.motion.angle_orders import Shaft, ShaftOrders, angle_windows, shaft_orders, strokes_of
+from livebode.motion.friction_curve import FrictionCurve, friction_curve
+from livebode.motion.smooth_motion import SmoothKernel
+
+Floats = NDArray[np.float64]
+
+_SHARPEST = 2.01  # samples: σ of the kernel
+_KEPT = 0.2  # of an amplitude, that the kernel must leave
+
+
+@dataclass(frozen=True, eq=False)
+class OrderReport:
+    """Orders of an axis.
+
+    Attributes
+    ----------
+    shafts
+        The orders of each shaft.
+    friction
+        The friction and the inertia with which the torque was computed.
+    strokes
+        Number of strokes.
+    speed_hz
+        Slowest and fastest turns of the motor in a window, per second.
+    lines_hz
+        Lines of the time that were left out.
+    motion
+        The samples.
+    unit
+        Of the torque.
+    """
+
+    shafts: list[ShaftOrders]
+    friction: FrictionCurve
+    strokes: int
+    speed_hz: tuple[float, float]
+    lines_hz: Floats
+    motion: MotionSamples
+    unit: str
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data, for JSON."""
+        return {
+            "shafts": [one.plain() for one in self.shafts],
+            "unit": self.unit,
+            "strokes": self.strokes,
+            "turns_per_s": list(self.speed_hz),
+            "lines_hz": self.lines_hz.tolist(),
+            "inertia": self.friction["inertia"],
+            "inertia_bound": float(self.friction.bound()[self.friction.index("inertia")]),
+            "input": self.motion.input,
+            "output": self.motion.output,
+        }
+
+
+def orders_of(
+    motion: MotionSamples,
+    shafts: Sequence[Shaft],
+    *,
+    angle: str | None = None,
+    turn: float | None = None,
+    lines_hz: Floats | None = None,
+    highest_hz: float = np.inf,
+) -> OrderReport:
+    """Torque that acts on the axis beside its input, over the angle of its shafts.
+
+    The torque is J·a + Fv·v + friction − u, with inertia and friction from the same samples (`friction_curve`). It is
+    that of one mass: use `highest_hz` below the antiresonance of an axis with a belt or a coupling.
+
+    Parameters
+    ----------
+    motion
+        Samples, whose output is the motor's angle or speed.
+    shafts
+        The shafts and their orders.
+    angle
+        Channel of the motor's angle. Default: the output, or its integral if it is a velocity; the phase then counts
+        from the first sample.
+    turn
+        Units of the angle in one turn of the motor. Default: 2π.
+    lines_hz
+        Lines of the time, such as those of an excitation that runs at the same time.
+    highest_hz
+        Highest frequency of an order.
+
+    Raises
+    ------
+    SignalError
+        If the strokes are too short, or do not show friction and inertia.
+    UsageError
+        If an argument is out of its range.
+    """
+    per_turn = 2 * np.pi if turn is None else turn
+    if not (np.isfinite(per_turn) and per_turn > 0):
+        raise UsageError(
+            "out-of-range", f"{turn=} is not a positive number", "give the units of the angle in one turn",
+            argument="turn", value=turn,
+        )  # fmt: skip
+    curve = friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind)
+    kernel = SmoothKernel(_band(motion.block.rate_hz), motion.block.rate_hz)
+    rest, acceleration, speed = _torque(motion, curve, kernel)
+    scale = 2 * np.pi / per_turn
+    inner = slice(kernel.reach, len(motion.block) - kernel.reach)
+    turned = _angle(motion, angle)[inner] * scale
+    signals = np.stack([rest, acceleration])
+    slowest = _slowest(speed)
+    strokes = strokes_of(turned, speed, signals, motion.block.rate_hz, slowest)
+    limit = min(highest_hz, _most_hz(kernel))
+    known = np.zeros(0) if lines_hz is None else lines_hz
+    sigma_j = float(curve.sigma[curve.index("inertia")])
+    found, speeds = [], list[float]()
+    for shaft in shafts:
+        windows = angle_windows(strokes, shaft)
+        speeds += [float(windows.slowest.min()) / shaft.turns, float(windows.fastest.max()) / shaft.turns]
+        middle = (windows.slowest + windows.fastest)[:, np.newaxis] / 2 * np.array(shaft.orders)
+        value = windows.value / _left(kernel, middle)
+        extra = sigma_j * np.abs(np.nanmean(value[1], axis=0))
+        found.append(shaft_orders(windows, shaft, value[0], extra, known, limit))
+    unit = motion.block.channels[motion.block.index(motion.input)].unit
+    return OrderReport(found, curve, len(strokes), (min(speeds), max(speeds)), known, motion, unit)
+
+
+def _slowest(speed: Floats) -> float:
+    """Speed from which on an axis counts as moving: 5 % of the highest."""
+    return 0.05 * float(np.max(np.abs(speed)))
+
+
+def _band(rate_hz: float) -> float:
+    """Highest band of a kernel at this rate."""
+    return SmoothKernel(1.0, rate_hz).sigma / _SHARPEST
+
+
+def _left(kernel: SmoothKernel, frequency_hz: Floats) -> Floats:
+    """What the kernel leaves of an amplitude."""
+    return np.asarray(np.exp(-0.5 * (2 * np.pi * frequency_hz * kernel.sigma / kernel.rate_hz) ** 2))
+
+
+def _most_hz(kernel: SmoothKernel) -> float:
+    """Frequency at which the kernel leaves a fifth."""
+    return float(np.sqrt(-2 * np.log(_KEPT)) * kernel.rate_hz / (2 * np.pi * kernel.sigma))
+
+
+def _torque(motion: MotionSamples, curve: FrictionCurve, kernel: SmoothKernel) -> tuple[Floats, Floats, Floats]:
+    """Torque beside the input, acceleration and speed, at the inner samples."""
+    u, y = motion.block[motion.input], motion.block[motion.output]
+    # The logged input acts from its sample to the next one.
+    held = (u + np.concatenate([u[:1], u[:-1]])) / 2
+    order = 0 if motion.kind == "velocity" else 1
+    speed, acceleration = kernel.smooth(y, order), kernel.smooth(y, order + 1)
+    friction, _ = curve.at(speed)
+    rest = curve["inertia"] * acceleration + friction + curve["offset"] - kernel.smooth(held)
+    return np.asarray(rest), acceleration, speed
+
+
+def _angle(motion: MotionSamples, angle: str | None) -> Floats:
+    if angle is None:
+        y = motion.block[motion.output]
+        if motion.kind == "position":
+            return y
+        return np.asarray((np.cumsum(y) - y / 2) / motion.block.rate_hz)
+    found = motion.block[angle]
+    if not np.ptp(found) > 0:
+        raise SignalError(
+            "channel-constant", f"the angle {angle!r} is constant", "name the channel of the motor's angle",
+            channel=angle,
+        )  # fmt: skip
+    return found

@@ -1,0 +1,224 @@
+"""`livebode orders`: torque that repeats with the angle of an axis's shafts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from livebode.cli import terminal
+from livebode.cli.options import Json, Rate, Time
+from livebode.cli.remote import results_directory
+from livebode.core import OutputError, UsageError
+from livebode.core.writing import writing
+from livebode.locations import location
+
+if TYPE_CHECKING:
+    from livebode.analysis.orders import OrderReport
+    from livebode.analysis.strokes import MotionSamples
+    from livebode.motion.angle_orders import Shaft, ShaftOrders
+
+_POINTS = 512
+_HIGHEST = 48
+
+
+def orders_command(
+    target: Annotated[str, typer.Argument(metavar="RUN|LOG|AXIS.toml", help="A run, recording or configuration.")],
+    input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Torque of the motor, or an expression.")] = None,
+    position: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Position of the motor.")] = None,
+    velocity: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Velocity of the motor.")] = None,
+    angle: Annotated[
+        str | None, typer.Option(metavar="CHANNEL", help="Angle of the motor, if the velocity is used.")
+    ] = None,
+    turn: Annotated[
+        float | None, typer.Option(metavar="UNITS", help="Units of the angle in a turn. \\[default: 2π]")
+    ] = None,
+    shaft: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=TURNS:ORDERS",
+            help="A shaft, its turns in one turn of the motor, and its orders: gear=0.2:1,2,14; repeat for several.",
+        ),
+    ] = None,
+    highest: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Highest frequency of an order; below the antiresonance.")
+    ] = None,
+    time_lines: Annotated[
+        str | None,
+        typer.Option(metavar="HZ", help="Lines of an excitation or the mains, which are not orders: 20,40,50."),
+    ] = None,
+    rate: Rate = None,
+    time: Time = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a feedforward table of the motor: .csv, .h (C) or .st (TwinCAT)."),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="Picture to write. \\[default: orders.png in RUN]")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Find torque that repeats with the angle: cogging, eccentricity, gears; write a feedforward table.
+
+    Shafts and channels default to those of the run or configuration, and the orders to 1 … 48 of the motor. A window
+    in which an order meets a line of the time is left out: record strokes at several speeds.
+    """
+    from livebode.analysis.orders import orders_of
+    from livebode.analysis.strokes import read_strokes
+    from livebode.cli.picture_support import can_draw, tell_how_to_draw
+    from livebode.configuration.orders_section import OrdersSection
+    from livebode.records import to_json
+
+    motion = read_strokes(
+        location(target), input=input, position=position, velocity=velocity, angle=angle, rate_hz=rate, time=time
+    )
+    section = OrdersSection.model_validate(motion.settings.get("orders", {}))
+    found = orders_of(
+        motion,
+        [_shaft(text) for text in shaft] if shaft else _shafts(section),
+        angle=motion.angle,
+        turn=turn or section.turn,
+        lines_hz=_lines(time_lines, motion),
+        highest_hz=highest or section.highest_hz or float("inf"),
+    )
+    into = picture or (None if motion.run is None else results_directory(motion.run) / "orders.png")
+    if into is not None and can_draw():
+        from livebode.report import save_orders_picture
+
+        with writing(into, OutputError):
+            save_orders_picture(found, into, title=Path(target).name)
+    if table is not None:
+        _write_table(found, table, target)
+    if as_json:
+        print(to_json(found.plain()))
+        return
+    show_orders(found)
+    if table is not None:
+        print(f"feedforward of the motor, to be added to the torque: {table}")
+    if into is not None:
+        print(f"\n{into}" if can_draw() else "")
+        tell_how_to_draw()
+
+
+def _shaft(text: str) -> Shaft:
+    from livebode.motion.angle_orders import Shaft
+
+    name, _, rest = text.partition("=")
+    turns, _, orders = rest.partition(":")
+    try:
+        return Shaft(name.strip(), float(turns), tuple(int(order) for order in orders.split(",")))
+    except ValueError:
+        raise UsageError(
+            "unreadable",
+            f"the shaft {text!r} cannot be read",
+            "write for example gear=0.2:1,2,14",
+            argument="shaft",
+            value=text,
+        ) from None
+
+
+def _shafts(section: Any) -> list[Shaft]:
+    """The shafts of a configuration; the motor alone without."""
+    from livebode.motion.angle_orders import Shaft
+
+    turns = {"motor": 1.0} | section.shafts
+    if unknown := [name for name in section.orders if name not in turns]:
+        raise UsageError(
+            "unknown-name",
+            f"orders.orders names the shaft {unknown[0]!r}, which orders.shafts does not have",
+            f"choose one of {', '.join(turns)}",
+            value=unknown[0],
+            allowed=list(turns),
+        )
+    orders = section.orders or {"motor": list(range(1, _HIGHEST + 1))}
+    return [Shaft(name, turns[name], tuple(each)) for name, each in orders.items()]
+
+
+def _lines(text: str | None, motion: MotionSamples) -> Any:
+    """Lines of the time: those that are given, else those of the configuration."""
+    import numpy as np
+
+    from livebode.core import Lines
+
+    if text is not None:
+        try:
+            return np.array([float(one) for one in text.split(",")])
+        except ValueError:
+            raise UsageError(
+                "unreadable",
+                f"the lines {text!r} cannot be read",
+                "write frequencies in Hz: 20,40,50",
+                argument="time_lines",
+                value=text,
+            ) from None
+    section = motion.settings.get("lines", {})
+    if section.get("frequencies", "auto") == "auto" or section.get("window", "auto") == "auto":
+        return None
+    return Lines.parse(section["frequencies"], motion.block.rate_hz, section["window"]).frequency_hz
+
+
+def _write_table(found: OrderReport, path: Path, target: str) -> None:
+    import numpy as np
+
+    from livebode.experiment_design.files.angle_table import write_angle_table
+
+    motor = next((one for one in found.shafts if one.shaft.turns == 1), None)
+    if motor is None or not motor.seen.any():
+        raise UsageError(
+            "conflict",
+            "no order of the motor is seen, so that there is nothing to feed forward",
+            "name its orders, or record more strokes",
+            argument="table",
+        )
+    at = np.arange(_POINTS) * 2 * np.pi / _POINTS
+    note = [f"livebode orders {Path(target).name}"] + [
+        f"order {order}: {amplitude:.6g} +- {bound:.2g}, phase {phase:.4g} deg"
+        for order, amplitude, bound, phase, seen in zip(
+            motor.shaft.orders, motor.amplitude, motor.bound(), motor.phase_deg, motor.seen
+        )
+        if seen
+    ]
+    with writing(path, OutputError):
+        write_angle_table(path, -motor.torque(at), note, found.unit)
+
+
+def show_orders(found: OrderReport) -> None:
+    """Print the orders of each shaft that are seen, or that cannot be separated from a line."""
+    console = terminal.console(markup=False)
+    low, high = found.speed_hz
+    lines = f"; lines of the time: {', '.join(f'{f:g}' for f in found.lines_hz)} Hz" if len(found.lines_hz) else ""
+    console.print(f"{found.strokes} strokes at {low:.3g} … {high:.3g} turns/s of the motor{lines}", soft_wrap=True)
+    for one in found.shafts:
+        _show_shaft(one, found.unit)
+    if not all(one.by_strokes for one in found.shafts):
+        console.print(
+            "fewer than four strokes: a line of the time at constant speed is not told from an order", soft_wrap=True
+        )
+
+
+def _show_shaft(one: ShaftOrders, unit: str) -> None:
+    from rich.table import Table
+
+    console = terminal.console(markup=False)
+    turns = "" if one.shaft.turns == 1 else f", {one.shaft.turns:.4g} turns in one of the motor"
+    console.print(f"{one.shaft.name}{turns}:", soft_wrap=True)
+    table = Table(box=None, header_style="bold")
+    for heading in ("order", f"amplitude {unit}".strip(), "± 95 %", "phase deg", "strokes", ""):
+        table.add_column(heading, justify="left" if not heading else "right")
+    bound = one.bound()
+    for i, order in enumerate(one.shaft.orders):
+        if one.meets_hz[i] == one.meets_hz[i]:
+            table.add_row(str(order), "", "", "", "", f"meets the line at {one.meets_hz[i]:g} Hz at every speed")
+        elif one.seen[i]:
+            numbers = (one.amplitude[i], bound[i], one.phase_deg[i])
+            table.add_row(str(order), *(f"{value:.3g}" for value in numbers), str(one.strokes[i]), "")
+    if table.row_count:
+        console.print(table)
+    known = [i for i in range(len(one.shaft.orders)) if not one.seen[i] and one.strokes[i] and bound[i] == bound[i]]
+    if known:
+        most = max(float(bound[i]) for i in known)
+        console.print(f"  not seen: {len(known)} orders, each known to ± {most:.2g} {unit}".rstrip(), soft_wrap=True)
+    lost = sum(1 for i in range(len(bound)) if bound[i] != bound[i] and one.meets_hz[i] != one.meets_hz[i])
+    if lost:
+        console.print(f"  not known: {lost} orders, too fast or in too few strokes", soft_wrap=True)

@@ -1,0 +1,80 @@
+"""Known friction of the simulated axis, and how often its bounds contain it: `python -m studies.friction [runs]`."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.motion import FrictionCurve, friction_curve
+from livebode.simulation import BeltAxis, Drive, Friction, Mechanics, Sensor, SimulatedAxis, StrokeSequence
+
+PROBABILITIES = (0.632, 0.982)
+RUNS = 100
+RADIUS_M = Mechanics().radius_m
+STROKES = StrokeSequence(
+    turning_points_m=(0.3, 0.55, 0.3, 0.55, 0.3, 0.55, 0.3, 0.55, 0.3),
+    speeds_m_per_s=(0.05, 0.05, 0.1, 0.1, 0.2, 0.2, 0.4, 0.4),
+)
+SLIDING = Friction(load_coulomb_n=15.0, load_viscous_n_s_per_m=40.0, smoothing_m_per_s=1e-4)
+STRIBECK = Friction(
+    load_coulomb_n=15.0, load_viscous_n_s_per_m=40.0, load_stribeck_n=10.0, stribeck_speed_m_per_s=0.1,
+    smoothing_m_per_s=1e-4,
+)  # fmt: skip
+CASES = {"Coulomb and viscous": SLIDING, "with Stribeck": STRIBECK}
+
+
+def measured(friction: Friction, seed: int) -> FrictionCurve:
+    """The curve of a recording of 22 s with noise of the torque and a 14-bit encoder."""
+    axis = BeltAxis(
+        motion=STROKES,
+        friction=friction,
+        drive=Drive(torque_noise_n_m=0.1),
+        sensor=Sensor(noise_rad_per_s=0.1, encoder_counts_per_turn=1 << 14),
+        seconds=22.0,
+        seed=seed,
+    )
+    block, _ = SimulatedAxis(axis).run()
+    return friction_curve(block, input="u", output="velocity", kind="velocity")
+
+
+def truth(friction: Friction) -> dict[str, float]:
+    """The parameters at the motor."""
+    mechanics = Mechanics()
+    return {
+        "inertia": mechanics.inertia_kg_m2 + mechanics.load_kg * RADIUS_M**2,
+        "viscous": friction.load_viscous_n_s_per_m * RADIUS_M**2,
+        "offset": 0.0,
+        "coulomb": friction.load_coulomb_n * RADIUS_M,
+        "stribeck": friction.load_stribeck_n * RADIUS_M,
+        "stribeck_speed": friction.stribeck_speed_m_per_s / RADIUS_M,
+    }
+
+
+def within(found: FrictionCurve, true: dict[str, float]) -> NDArray[np.bool_]:
+    """Whether each parameter is within its bound of each probability, (probabilities, parameters)."""
+    error = np.abs(found.value - np.array([true[name] for name in found.names]))
+    return np.array([error <= found.bound(p) for p in PROBABILITIES])
+
+
+def main(runs: int) -> int:
+    for name, friction in CASES.items():
+        curves = [measured(friction, seed) for seed in range(runs)]
+        names = max((curve.names for curve in curves), key=len)
+        whole = [curve for curve in curves if curve.names == names]
+        true = truth(friction)
+        share = np.mean([within(curve, true) for curve in whole], axis=0)
+        print(f"{name}: {len(whole)} of {runs} runs found all of {', '.join(names)}")
+        print(f"{'':16}{'true':>10}{'mean':>10}{'± 95 %':>10}{'in 63.2 %':>11}{'in 98.2 %':>11}")
+        for i, parameter in enumerate(names):
+            mean, bound = (np.mean([values[i] for values in each]) for each in (
+                [curve.value for curve in whole], [curve.bound() for curve in whole],
+            ))  # fmt: skip
+            shares = "".join(f"{100 * value:>9.0f} %" for value in share[:, i])
+            print(f"{parameter:16}{true[parameter]:>10.4g}{mean:>10.4g}{bound:>10.2g}{shares}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]) if sys.argv[1:] else RUNS))

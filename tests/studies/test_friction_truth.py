@@ -1,0 +1,95 @@
+"""Friction found from strokes: known friction within its bounds, and the benchmark of a real axis."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from livebode.core import Block, Channel, SignalError, UsageError
+from livebode.motion import FrictionCurve, friction_curve
+from studies.friction import STRIBECK, measured, truth
+from tests.support.command import livebode
+from tests.support.real_recordings import recording
+
+RATE_HZ = 1000.0
+MASS, COULOMB, VISCOUS, OFFSET = 95.0, 20.0, 200.0, -3.0
+SPEEDS = (0.02, 0.05, 0.1, 0.2)
+
+
+def _speed() -> NDArray[np.float64]:
+    """Strokes there and back with rounded ramps, after standstill."""
+    once = np.concatenate([np.repeat([v, -v], 1500) for v in SPEEDS] + [np.zeros(1000)])
+    ramp = np.hanning(300)
+    return np.convolve(np.tile(once, 2), ramp / ramp.sum(), mode="same")
+
+
+def _block(seed: int, slope: float = 0.0) -> Block:
+    """A rigid axis under a force that has noise with a memory of 50 ms; `slope` of the Coulomb friction, N/m."""
+    v = _speed()
+    x = np.concatenate([[0.0], np.cumsum((v[1:] + v[:-1]) / 2)]) / RATE_HZ
+    noise = np.random.default_rng(seed).normal(size=v.size)
+    memory = np.exp(-np.arange(400) / 50)
+    disturbance = np.convolve(noise, memory / np.linalg.norm(memory))[: v.size]
+    force = MASS * np.gradient(v) * RATE_HZ + VISCOUS * v + (COULOMB + slope * x) * np.sign(v) + OFFSET + disturbance
+    steps = np.round(x / 1e-6) * 1e-6
+    return Block([force, steps], (Channel("F", "N"), Channel("x", "m")), RATE_HZ)
+
+
+def _curve(block: Block, **options: int) -> FrictionCurve:
+    return friction_curve(block, input="F", output="x", kind="position", **options)
+
+
+def test_friction_bounds_cover_the_truth_although_residuals_are_correlated() -> None:
+    true = {"inertia": MASS, "viscous": VISCOUS, "coulomb": COULOMB, "offset": OFFSET}
+    curves = [_curve(_block(seed)) for seed in range(40)]
+    assert {curve.names for curve in curves} == {("inertia", "viscous", "offset", "coulomb")}
+    error = np.array([np.abs(curve.value - [true[name] for name in curve.names]) for curve in curves])
+    for probability, low, high in ((0.632, 0.52, 0.74), (0.982, 0.95, 1.0)):
+        share = np.mean(error <= [curve.bound(probability) for curve in curves])
+        print(f"{100 * share:.1f} % within the bound of {100 * probability:.1f} %")
+        assert low <= share <= high
+
+
+def test_friction_over_the_position_is_found() -> None:
+    curve = _curve(_block(1, slope=40.0), places=3)
+    names = [f"coulomb_{j + 1}" for j in range(3)]
+    error = [curve[name] - (COULOMB + 40.0 * at) for name, at in zip(names, curve.places)]
+    assert np.all(np.abs(error) <= [1.5 * curve.bound(0.99)[curve.index(name)] for name in names])
+    assert curve["coulomb_3"] - curve["coulomb_1"] > 5
+    assert curve.units[curve.index("coulomb_1")] == "N"
+    assert curve.units[curve.index("viscous")] == "N/(m/s)"
+
+
+def test_stribeck_friction_of_the_simulated_axis_is_found() -> None:
+    curve, true = measured(STRIBECK, seed=1), truth(STRIBECK)
+    for name in curve.names:
+        assert abs(curve[name] - true[name]) <= 1.3 * curve.bound(0.99)[curve.index(name)]
+    assert curve["stribeck"] == pytest.approx(true["stribeck"], rel=0.2)
+
+
+def test_friction_of_one_direction_or_one_speed_is_refused() -> None:
+    block = _block(0)
+    with pytest.raises(SignalError, match="forward for 0 smoothed samples"):
+        _curve(Block([block["F"], -np.abs(np.cumsum(np.abs(_speed())))], block.channels, RATE_HZ))
+    with pytest.raises(UsageError, match="places=1 is out of its range"):
+        _curve(block, places=1)
+
+
+def test_friction_of_emps_is_that_of_the_benchmark() -> None:
+    path = str(recording("emps/DATA_EMPS.mat"))
+    done = livebode("friction", path, "--input", "35.15065188248547*vir", "--position", "qm", "--json")
+    found = json.loads(done.out)["parameters"]
+    print({name: (one["value"], one["bound"]) for name, one in found.items()})
+    assert found["coulomb"]["value"] == pytest.approx(20.39, rel=0.03)
+    assert found["viscous"]["value"] == pytest.approx(203.5, rel=0.03)
+    assert found["inertia"]["value"] == pytest.approx(95.11, rel=0.01)
+    assert abs(found["offset"]["value"] + 3.165) <= found["offset"]["bound"]
+
+
+def test_friction_that_is_not_described_ends_in_a_sentence() -> None:
+    done = livebode("friction", str(recording("emps/DATA_EMPS.mat")), "--input", "vir", "--json")
+    assert done.code == 2
+    assert json.loads(done.err)["error"]["facts"]["argument"] == "position"

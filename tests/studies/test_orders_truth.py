@@ -1,0 +1,142 @@
+"""Orders over the angle: a known ripple within its bounds, told from lines of the time, and played back by a drive."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.analysis.orders import OrderReport, orders_of
+from livebode.analysis.strokes import MotionSamples
+from livebode.core import Block, Channel, SignalError, UsageError
+from livebode.experiment_design.files.angle_table import write_angle_table
+from livebode.interface.example_recordings import write_examples
+from livebode.motion import Shaft
+from studies.orders import CASES, SHAFT, measured, truth
+from tests.support.command import livebode
+from tools.structured_text import Machine
+
+RATE_HZ = 1000.0
+INERTIA, RIPPLE = 0.005, 0.05
+SHAFTS = (Shaft("motor", 1.0, (1, 6, 7)), Shaft("pinion", 1.5, (1, 3)))
+
+
+@cache
+def _speed(turns_per_s: tuple[float, ...]) -> np.ndarray:
+    once = np.concatenate([np.repeat([v, -v], round(4000 / v)) for v in turns_per_s] + [np.zeros(500)])
+    ramp = np.hanning(200)
+    return 2 * np.pi * np.convolve(once, ramp / ramp.sum(), mode="same")
+
+
+def _report(seed: int, turns_per_s: tuple[float, ...], tone_hz: float = 0.0, **options: object) -> OrderReport:
+    """A rigid axis that follows its speed exactly, with order 6 of the motor, order 1 of a pinion, and a tone."""
+    speed = _speed(turns_per_s)
+    angle = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2)]) / RATE_HZ
+    time_s = np.arange(speed.size) / RATE_HZ
+    ripple = RIPPLE * np.cos(6 * angle + 0.5) + RIPPLE / 2 * np.sin(1.5 * angle)
+    noise = np.random.default_rng(seed).normal(scale=0.02, size=speed.size)
+    other = np.sin(2 * np.pi * tone_hz * time_s) * 0.1 if tone_hz else 0.0
+    # The input of a sample acts until the next one.
+    late = np.concatenate([np.diff(angle) / 2, [0.0]])
+    rigid = INERTIA * np.gradient(speed) * RATE_HZ + 0.2 * np.sign(speed) + 0.01 * speed
+    acting = rigid - RIPPLE * np.cos(6 * (angle + late) + 0.5) - RIPPLE / 2 * np.sin(1.5 * (angle + late)) - other
+    assert ripple.shape == acting.shape
+    block = Block([acting + noise, angle], (Channel("u", "N m"), Channel("x", "rad")), RATE_HZ)
+    samples = MotionSamples(block, "u", "x", "position", len(block), None, {})
+    return orders_of(samples, SHAFTS, **options)  # type: ignore[arg-type]
+
+
+def test_orders_of_two_shafts_are_within_their_bounds() -> None:
+    true = {"motor": [0, RIPPLE * np.exp(0.5j), 0], "pinion": [-0.5j * RIPPLE, 0]}
+    errors, bounds = [], []
+    for seed in range(20):
+        for one in _report(seed, (1.0, 1.4, 2.0)).shafts:
+            errors.append(np.abs(one.value - true[one.shaft.name]))
+            bounds.append([one.bound(1), one.bound(2)])
+            assert one.seen.tolist() == [abs(value) > 0 for value in true[one.shaft.name]]
+    error = np.concatenate(errors)
+    for c, low in ((0, 0.53), (1, 0.94)):
+        share = np.mean(error <= np.concatenate([both[c] for both in bounds]))
+        print(f"{100 * share:.1f} % within bound({c + 1})")
+        assert share >= low
+
+
+def test_a_line_of_the_time_is_not_an_order_at_any_speed() -> None:
+    tone_hz = 7.0  # order 7 at one turn a second
+    slow = _report(0, (1.0, 1.0, 1.0), tone_hz, lines_hz=np.array([tone_hz]), highest_hz=9.0).shafts[0]
+    assert slow.meets_hz[2] == tone_hz
+    assert not slow.seen[2]
+    both = _report(0, (1.0, 1.4, 2.0), tone_hz, lines_hz=np.array([tone_hz])).shafts[0]
+    assert np.isnan(both.meets_hz[2])
+    assert both.seen.tolist() == [False, True, False]
+    assert not _report(0, (1.0, 1.4, 2.0), tone_hz).shafts[0].seen[2]
+
+
+def test_ripple_of_the_simulated_axis_is_found_at_three_speeds() -> None:
+    found = measured(CASES["three speeds"], seed=3).shafts[0]
+    assert np.all(np.abs(found.value - truth()) <= found.bound(2.5))
+    assert [order for order, seen in zip(SHAFT.orders, found.seen) if seen] == [24]
+
+
+def test_strokes_shorter_than_a_window_and_wrong_shafts_are_refused() -> None:
+    with pytest.raises(UsageError, match="not different whole numbers"):
+        Shaft("motor", 1.0, (1, 1))
+    with pytest.raises(UsageError, match="turn=-1 is not a positive number"):
+        _report(0, (1.0,), turn=-1)
+    with pytest.raises(SignalError, match="less than the 2 turns of a window"):
+        _report(0, (1.0,), turn=100.0)
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("strokes")
+    write_examples(["strokes"], folder)
+    return folder
+
+
+def _table(example: Path, name: str) -> str:
+    done = livebode("orders", example / "strokes.toml", "--table", example / name, "--json")
+    assert done.code == 0, done.err
+    assert [o["order"] for o in json.loads(done.out)["shafts"][0]["orders"] if o["seen"]] == [24]
+    return (example / name).read_text(encoding="utf-8")
+
+
+def test_feedforward_tables_cancel_the_ripple_and_agree(example: Path) -> None:
+    rows = [row.split(",") for row in _table(example, "ff.csv").splitlines() if row[0].isdigit()]
+    angle, torque = np.array(rows, dtype=np.float64).T
+    assert np.max(np.abs(torque + 0.05 * np.sin(24 * angle))) < 0.003
+    _table(example, "ff.h")
+    program = '#include <stdio.h>\n#include "ff.h"\nint main(void){for(int i=0;i<RIPPLE_FEEDFORWARD_POINTS;++i)'
+    (example / "main.c").write_text(program + 'printf("%.17g\\n",ripple_feedforward[i]);return 0;}\n')
+    subprocess.run(["cc", "-o", example / "played", example / "main.c"], check=True, timeout=60)
+    played = subprocess.run([example / "played"], capture_output=True, text=True, check=True, timeout=60)
+    assert [float(line) for line in played.stdout.split()] == torque.tolist()
+
+
+def test_the_function_block_of_a_feedforward_interpolates_over_the_turn(tmp_path: Path) -> None:
+    torque = np.random.default_rng(1).normal(size=11) * np.logspace(-9, 1, 11)
+    write_angle_table(tmp_path / "ff.st", torque, ["order 1"], "N m")
+    block = Machine((tmp_path / "ff.st").read_text("utf-8")).instance("FB_RippleFeedforward")
+    block()
+    for at in (*np.random.default_rng(2).uniform(0, 2 * np.pi, 20), 0.0, -0.1, 6.3):
+        block["angle"] = float(at)
+        block()
+        expected = np.interp(at / (2 * np.pi) * 11, np.arange(12), np.append(torque, torque[0]), left=0, right=0)
+        assert block["torque"] == pytest.approx(expected, abs=1e-12)
+
+
+def test_wrong_options_of_orders_end_in_a_sentence(example: Path) -> None:
+    for arguments, sentence in (
+        (("--shaft", "gear"), "the shaft 'gear' cannot be read"),
+        (("--time-lines", "a"), "the lines 'a' cannot be read"),
+        (("--table", example / "ff.txt"), "does not end in a supported suffix"),
+        (("--shaft", "pinion=1.5:1", "--table", example / "ff.csv"), "no order of the motor is seen"),
+    ):
+        done = livebode("orders", example / "strokes.toml", *arguments)
+        assert done.code == 2
+        assert sentence in done.err
+        assert "Traceback" not in done.err
