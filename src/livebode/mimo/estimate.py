@@ -151,8 +151,9 @@ def _solution(d: Complex, r: Complex, kept: Complex, reason: NDArray[np.int8]) -
     part = ~whole & (reason != 1).all(axis=2)
     if part.any():
         seen = kept[part] @ d[part]
-        length = np.sqrt(np.sum(np.abs(seen) ** 2, axis=2))
-        unit = 1 / np.where(length > 0, length, 1.0)
+        # Of all lines: a row that is zero but for rounding at one line must not become as large as the others.
+        size = np.sqrt(np.mean(np.abs(d) ** 2, axis=(1, 3)))
+        unit = np.broadcast_to((1 / np.where(size > 0, size, 1.0))[:, np.newaxis], reason.shape)[part]
         inverse = np.linalg.pinv((unit[..., None] * seen) @ _star(r[part]), rcond=_RANK)
         columns = _star(r[part]) @ inverse * unit[:, None, :]
         found[part] = np.where((reason[part] == 0)[:, None, :], columns, np.nan)

@@ -126,7 +126,7 @@ def within_limits(
     >>> plant = lambda f: np.tile([[2.0, 1.0], [0.0, 3.0]], (len(f), 1, 1))
     >>> limited = within_limits(MatrixExcitation.orthogonal(lines, 2), plant, input_max=1.5, output_max=[5.0, 3.0])
     >>> predict(limited, plant, 0.1).output_peak.round(3)
-    array([2.98, 3.  ])
+    array([3., 3.])
     """
     found = predict(excitation, plant, 1.0, loop)
     factors = []
@@ -138,7 +138,7 @@ def within_limits(
         if not (most > 0).all():
             raise UsageError(
                 "out-of-range",
-                f"{name}={limit} is not above 0",
+                f"{name}={limit!r} is not above 0",
                 "leave it out for no limit",
                 argument=name,
                 value=str(limit),

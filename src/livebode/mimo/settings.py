@@ -236,7 +236,7 @@ class MatrixSettings:
         assert self.dwell is not None
         assert self.settle is not None
         limits = (
-            ("experiments", self.count, len(self.columns), 64),
+            ("experiments", self.count, 1, 64),
             ("dwell", self.dwell, self.settle + 1, 1000),
             ("settle", self.settle, 0, 999),
             ("memory", self.memory, 2, 1000),
@@ -328,5 +328,5 @@ class MatrixSettings:
     def identity(self) -> str:
         """All settings that a tracker's state depends on."""
         names = ("lines", "output", "input", "excitation", "estimator", "experiments", "dwell", "settle", "start")
-        timing = [self.loop.timing.advance_ticks(role) for role in ("input", "excitation", "output")]  # type: ignore[arg-type]
+        timing = [self.loop.timing.advance_ticks(role) for role in ("input", "excitation", "output")]
         return repr((*(getattr(self, name) for name in names), self.hop, self.memory, timing))
