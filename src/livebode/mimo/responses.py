@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import GridError, Lines, Responses, UsageError
-from livebode.core._conversion import imported
-from livebode.core._response import widened
+from livebode.core import GridError, Lines, Responses, UsageError, widened
+from livebode.core.installing import not_installed
 from livebode.core.rows import RowArrays
 
 if TYPE_CHECKING:
@@ -235,7 +235,7 @@ class MatrixResponses(RowArrays):
             "output": list(self.outputs),
             "input": list(self.inputs),
         }
-        found: Dataset = imported("xarray", "xarray").Dataset(variables, coords)
+        found: Dataset = _optional("xarray", "xarray").Dataset(variables, coords)
         return found
 
     def to_frd(self, row: int = -1) -> Any:
@@ -246,7 +246,7 @@ class MatrixResponses(RowArrays):
         ExtraError
             If python-control is not installed (extra `control`).
         """
-        control = imported("control", "control", "python-control")
+        control = _optional("control", "python-control")
         whole = self.valid[row].all(axis=1)
         return control.frd(
             np.moveaxis(self.value[row, whole], 0, 2),
@@ -276,6 +276,14 @@ _SENTENCES = {
     "not separated": "column {name} is invalid at {where}: the input moves together with others in all experiments; "
     "use as many different experiments as inputs",
 }
+
+
+def _optional(package: str, shown: str) -> Any:
+    """The package of the extra with its name; ExtraError where it is not installed."""
+    try:
+        return import_module(package)
+    except ImportError:
+        raise not_installed(f"{shown} is not installed", package=package, extra=package) from None
 
 
 def _at(which: str | int, names: tuple[str, ...], kind: str) -> int:
