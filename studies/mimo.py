@@ -25,7 +25,7 @@ LOOP = GantryLoop(gantry=Gantry(motor_viscous_n_m_s=0.05), rate_hz=1000.0)
 LINES = Lines.parse("10:80:10", rate_hz=1000, window=400)
 AMPLITUDE_N_M, NOISE_RAD_PER_S, POLE = 0.3, 0.05, 0.8
 MEMORY = 6
-RINGING = "noise that the yaw mode at 7.6 Hz stores rings on from one window into the next"
+RINGING = "at 10 Hz; probably noise that the yaw mode at 7.6 Hz carries from one window into the next"
 PERIODS = {"dwell": 2, "settle": 1}
 EXCITATION = MatrixExcitation.orthogonal(LINES, 2, AMPLITUDE_N_M, **PERIODS)
 CONTROLLER = PID(gain=LOOP.gain_n_m_s, integral_time_s=LOOP.integral_time_s, rate_hz=LOOP.rate_hz)
