@@ -5,6 +5,7 @@ from livebode.simulation.configuration import BeltAxis
 from livebode.simulation.extremes import extremes
 from livebode.simulation.faults import Backlash, DampingGrowth, Fault, FrictionChange, LoadChange, SoftSpot, TensionLoss
 from livebode.simulation.fmu import FmuAxis
+from livebode.simulation.gantry import Gantry, GantryLoop
 from livebode.simulation.linear import BeltResponse, Sampled, StateSpace, linear
 from livebode.simulation.mechanics import Mechanics, Spans
 from livebode.simulation.motion import Motion, Standstill, Strokes, StrokeSequence
@@ -24,6 +25,8 @@ __all__ = [
     "FmuAxis",
     "Friction",
     "FrictionChange",
+    "Gantry",
+    "GantryLoop",
     "Limits",
     "LoadChange",
     "Mechanics",
