@@ -21,6 +21,7 @@ from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.fitting.drift import DriftTest
 from livebode.fleet.axis_stream import AxisStream
 from livebode.fleet.message import write_message
+from livebode.mimo import MatrixExcitation, MatrixSettings, MatrixTracker
 from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_table, places, signals_of
 from livebode.motion import MotionCorrection
 from livebode.preparation.checks import ChannelCheck
@@ -148,6 +149,26 @@ def uneven_tracker() -> Case:
         lambda: UnevenTracker(settings, LAYOUT),
         processed(list(spectra())),
         [lambda: UnevenTracker(other, LAYOUT)],
+    )
+
+
+def matrix_tracker() -> Case:
+    """Two inputs and two outputs, with a sample that is missing."""
+    u = np.tile(MatrixExcitation.orthogonal(LINES, 2).samples, 4)
+    data = np.vstack([u, [[2.0, 1.0], [0.5, 3.0]] @ u])
+    data[:, 2 * WINDOW + 7] = np.nan
+    names = ("u1", "u2", "y1", "y2")
+    settings = MatrixSettings(lines=LINES, output=names[2:], input=names[:2], estimator="direct", hop=10, memory=2)
+    parts = cut(Block(data, names, RATE_HZ), WINDOW + 3, 3 * WINDOW)
+
+    def step(stage: MatrixTracker, part: Block) -> object:
+        found = stage.process(part)
+        return found.value, found.sample, stage.counts
+
+    return Case(
+        lambda: MatrixTracker(settings),
+        [lambda stage, part=part: step(stage, part) for part in parts],
+        [lambda: MatrixTracker(replace(settings, memory=3))],
     )
 
 
@@ -356,7 +377,7 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, direct_tracker, successive_trackers, local_polynomial, welch_average, spectra_tracker,
+        tracker, direct_tracker, successive_trackers, matrix_tracker, local_polynomial, welch_average, spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
         run_counts, readiness, sequencer, axis_stream, stream_position,
     )

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from livebode.analysis.checked_loop import NOT_CHECKED, CheckedLoop, checked_loop
 from livebode.analysis.fits import fit_run
 from livebode.analysis.places import by_place
-from livebode.analysis.run_loop_check import NOT_CHECKED, CheckedLoop, checked_loop
 from livebode.configuration.axis import Axis
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection

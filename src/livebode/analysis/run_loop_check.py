@@ -1,23 +1,21 @@
-"""The loop of a run checked on its samples, and the result of the newest check."""
+"""The loop of a run checked on its samples."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from livebode.analysis.loop_check import LoopCheck, check_loop
 from livebode.analysis.validation import clean_stretch
 from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.recorded import recorded_configuration, without_null
+from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Block, Channel, RecordError, SignalError
 from livebode.records import RunRecord
-from livebode.records.loop_check_file import read_loop_check, write_loop_check
+from livebode.records.loop_check_file import write_loop_check
 from livebode.records.sample_table import channels_of
 from livebode.sources import open_log
 from livebode.validation import LoopSignals
@@ -28,26 +26,6 @@ _WORDS = {
     "input": "the plant input u (signals.input)",
     "output": "the output y (signals.output)",
 }
-
-
-@dataclass(frozen=True)
-class CheckedLoop:
-    """Whether the description of a loop was checked, in short.
-
-    Attributes
-    ----------
-    verdict
-        "as described", "one change", "not explained", or "not checked".
-    sentence
-        The result, or why there is none.
-    """
-
-    verdict: str
-    sentence: str
-
-
-NOT_CHECKED = CheckedLoop("not checked", "loop not checked: its description was not compared with the signals")
-CHANGED = CheckedLoop("not checked", "loop not checked: another description was compared with the signals")
 
 
 def check_loop_of_run(
@@ -115,18 +93,6 @@ def check_loop_of_run(
 def store_loop_check(directory: Path, found: LoopCheck, section: LoopSection) -> Path:
     """Write the result and the description that it belongs to into a directory."""
     return write_loop_check(directory, {**found.plain(), "loop": section.model_dump(mode="json")})
-
-
-def checked_loop(directory: Path, section: LoopSection) -> CheckedLoop:
-    """What is known of this description of a run's loop: the newest check, if it was of the same description."""
-    stored = read_loop_check(directory)
-    if stored is None:
-        return NOT_CHECKED
-    try:
-        of = LoopSection.model_validate(without_null(stored["loop"]))
-    except (ValidationError, AttributeError):
-        return CHANGED
-    return CheckedLoop(str(stored.get("verdict")), str(stored["sentence"])) if of == section else CHANGED
 
 
 def _longest_stretch(run: RunRecord, words: dict[str, Any], names: list[str]) -> Block:

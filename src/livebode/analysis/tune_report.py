@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from livebode.analysis.checked_loop import checked_loop
 from livebode.analysis.places import by_place
-from livebode.analysis.run_loop_check import checked_loop
 from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration

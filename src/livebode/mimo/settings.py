@@ -207,7 +207,7 @@ class MatrixSettings:
         for name in needed.get(self.estimator, ("output", "excitation")):
             if not 1 <= len(getattr(self, name)) <= CHANNELS_MAX:
                 raise UsageError(
-                    "missing" if not getattr(self, name) else "out-of-range",
+                    "out-of-range",
                     f"the {self.estimator} estimator has {len(getattr(self, name))} {name} signals",
                     f"name 1 to {CHANNELS_MAX} channels",
                     argument=name,

@@ -85,13 +85,13 @@ class MatrixTracker(StatefulBase):
             If the rate is not that of the lines, a channel is missing, or samples come twice.
         """
         s = self.settings
-        if abs(block.rate_hz / s.lines.rate_hz - 1) > 1e-9 or not len(block):
+        if not len(block):
+            raise SignalError("empty", "the block is empty", "leave it out")
+        if abs(block.rate_hz / s.lines.rate_hz - 1) > 1e-9:
             raise SignalError(
-                "rate-differs" if len(block) else "empty",
-                f"the block has {block.rate_hz:g} samples per second, but the lines are for {s.lines.rate_hz:g}"
-                if len(block)
-                else "the block is empty",
-                "make the lines for the block's rate" if len(block) else "leave it out",
+                "rate-differs",
+                f"the block has {block.rate_hz:g} samples per second, but the lines are for {s.lines.rate_hz:g}",
+                "make the lines for the block's rate",
                 rate_hz=block.rate_hz,
                 lines_rate_hz=s.lines.rate_hz,
             )

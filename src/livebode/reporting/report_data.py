@@ -11,10 +11,10 @@ import numpy as np
 
 from livebode.analysis.acceptance import Accepted, LimitEvidence, accepted
 from livebode.analysis.averaged import Averaged, averaged
+from livebode.analysis.checked_loop import checked_loop
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import LoopReport, loop_report
 from livebode.analysis.parameter_track import MARGINS, Track, tracks
-from livebode.analysis.run_loop_check import checked_loop
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration, recorded_report
