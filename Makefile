@@ -75,6 +75,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench --job
 	$(BIN)/python -m bench.tracking
 	$(BIN)/python -m bench.fits
+	$(BIN)/python -m bench.mimo
 	$(BIN)/python -m bench.motion
 	$(BIN)/python -m bench.bandwidth
 	$(BIN)/python -m bench.repeating
