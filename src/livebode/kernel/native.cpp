@@ -13,6 +13,7 @@
 
 #include "livebode/sdft.h"
 #include "native_belt.h"
+#include "native_claim.h"
 #include "native_fit.h"
 #include "native_lines.h"
 #include "native_repeating.h"
@@ -85,20 +86,22 @@ class Engine {
         size_t bytes = 0;
         expect(is_double ? lb_sdft64_size(&config, &bytes) : lb_sdft32_size(&config, &bytes));
         memory_.reset(new unsigned char[bytes]);
+        lb_status status = LB_OK;
         {
             nb::gil_scoped_release release;
-            status_ = is_double ? lb_sdft64_init(memory_.get(), bytes, &config, &dft64_)
-                                : lb_sdft32_init(memory_.get(), bytes, &config, &dft32_);
+            status = is_double ? lb_sdft64_init(memory_.get(), bytes, &config, &dft64_)
+                               : lb_sdft32_init(memory_.get(), bytes, &config, &dft32_);
         }
-        expect(status_);
+        expect(status);
         arguments_ = nb::module_::import_("livebode.kernel._arguments");
     }
 
     uint32_t window() const { return window_; }
     uint32_t channels() const { return channels_; }
 
-    uint64_t count() const
+    uint64_t count()
     {
+        const native::Claim mine(used_, refusal);
         uint64_t count = 0;
         expect(is_double_ ? lb_sdft64_count(dft64_, &count) : lb_sdft32_count(dft32_, &count));
         return count;
@@ -113,7 +116,8 @@ class Engine {
 
     void push(nb::handle x)
     {
-        if (PyFloat_CheckExact(x.ptr()) && channels_ == 1 && !busy_) {
+        if (PyFloat_CheckExact(x.ptr()) && channels_ == 1) {
+            const native::Claim mine(used_, refusal);
             const double value = PyFloat_AsDouble(x.ptr());
             if (is_double_) {
                 lb_sdft64_queue(dft64_, &value);
@@ -136,20 +140,21 @@ class Engine {
 
     nb::object spectrum(nb::handle phase)
     {
-        not_busy();
         nb::object result = arguments_.attr("empty_spectrum")(bins_, channels_, is_double_);
+        const lb_phase reference = phase_of(phase);
         View view;
         if (!view.open(result.ptr(), PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS)) throw nb::python_error();
+        const native::Claim mine(used_, refusal);
         if (is_double_)
-            expect(lb_sdft64_read(dft64_, phase_of(phase), static_cast<double *>(view.buffer.buf)));
+            expect(lb_sdft64_read(dft64_, reference, static_cast<double *>(view.buffer.buf)));
         else
-            expect(lb_sdft32_read(dft32_, phase_of(phase), static_cast<float *>(view.buffer.buf)));
+            expect(lb_sdft32_read(dft32_, reference, static_cast<float *>(view.buffer.buf)));
         return result;
     }
 
     nb::bytes snapshot()
     {
-        not_busy();
+        const native::Claim mine(used_, refusal);
         size_t bytes = 0;
         expect(is_double_ ? lb_sdft64_snapshot_size(dft64_, &bytes) : lb_sdft32_snapshot_size(dft32_, &bytes));
         PyObject *result = PyBytes_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(bytes));
@@ -162,26 +167,27 @@ class Engine {
 
     void restore(nb::bytes snapshot)
     {
-        not_busy();
+        const native::Claim mine(used_, refusal);
         expect(is_double_ ? lb_sdft64_restore(dft64_, snapshot.data(), snapshot.size())
                           : lb_sdft32_restore(dft32_, snapshot.data(), snapshot.size()));
     }
 
     void reset()
     {
-        not_busy();
+        const native::Claim mine(used_, refusal);
         expect(is_double_ ? lb_sdft64_reset(dft64_) : lb_sdft32_reset(dft32_));
     }
 
   private:
     // Bins × samples from which other threads may run meanwhile.
     static constexpr size_t long_work = 50'000;
+    static constexpr const char *refusal =
+        "this SlidingDFT is processing a block in another thread; give each thread its own";
 
     uint32_t window_, channels_;
     size_t bins_;
     bool is_double_;
-    bool busy_ = false; // in a long block of another thread, with the interpreter lock released
-    lb_status status_ = LB_OK;
+    native::Flag used_;
     std::unique_ptr<unsigned char[]> memory_;
     lb_sdft64 *dft64_ = nullptr;
     lb_sdft32 *dft32_ = nullptr;
@@ -191,20 +197,13 @@ class Engine {
     const char *real_format() const { return is_double_ ? "d" : "f"; }
     const char *complex_format() const { return is_double_ ? "Zd" : "Zf"; }
 
-    void not_busy() const
-    {
-        if (busy_)
-            throw std::runtime_error(
-                "this SlidingDFT is processing a block in another thread; give each thread its own");
-    }
-
     void push_any(nb::handle x)
     {
-        not_busy();
         if (push_floats(x)) return;
         nb::object array = arguments_.attr("as_sample")(x, channels_, is_double_);
         View view;
         if (!view.open(array.ptr(), PyBUF_C_CONTIGUOUS)) throw nb::python_error();
+        const native::Claim mine(used_, refusal);
         if (is_double_)
             expect(lb_sdft64_queue(dft64_, static_cast<const double *>(view.buffer.buf)));
         else
@@ -217,6 +216,9 @@ class Engine {
         constexpr Py_ssize_t most = 16;
         const bool is_list = PyList_CheckExact(x.ptr());
         if (!is_list && !PyTuple_CheckExact(x.ptr())) return false;
+#ifdef Py_GIL_DISABLED
+        if (is_list) return false; // another thread could remove an item meanwhile
+#endif
         const Py_ssize_t length = is_list ? PyList_Size(x.ptr()) : PyTuple_Size(x.ptr());
         if (length != static_cast<Py_ssize_t>(channels_) || length > most) return false;
         double values[most];
@@ -227,6 +229,7 @@ class Engine {
             values[i] = PyFloat_AsDouble(item);
             narrow[i] = static_cast<float>(values[i]);
         }
+        const native::Claim mine(used_, refusal);
         expect(is_double_ ? lb_sdft64_queue(dft64_, values) : lb_sdft32_queue(dft32_, narrow));
         return true;
     }
@@ -272,7 +275,6 @@ class Engine {
 
     nb::object run(nb::handle x, size_t hop, nb::handle out, lb_phase phase)
     {
-        not_busy();
         nb::object converted; // outlives its view
         View direct, indirect;
         const bool usual = direct.open(x.ptr(), PyBUF_STRIDES | PyBUF_FORMAT) && fits(direct);
@@ -283,6 +285,7 @@ class Engine {
         }
         const View &input = usual ? direct : indirect;
         const Samples samples = samples_of(input);
+        const native::Claim mine(used_, refusal);
         if (hop == 0) {
             compute(samples, 0, phase, nullptr, 0);
             return nb::none();
@@ -326,17 +329,14 @@ class Engine {
 
     void compute(const Samples &in, size_t hop, lb_phase phase, void *out, size_t rows)
     {
+        lb_status status = LB_OK;
         if (in.length * channels_ * (bins_ + 8) < long_work) {
-            status_ = call(in, hop, phase, out, rows);
+            status = call(in, hop, phase, out, rows);
         } else {
-            busy_ = true;
-            {
-                nb::gil_scoped_release release;
-                status_ = call(in, hop, phase, out, rows);
-            }
-            busy_ = false;
+            nb::gil_scoped_release release;
+            status = call(in, hop, phase, out, rows);
         }
-        expect(status_);
+        expect(status);
     }
 
     lb_status call(const Samples &in, size_t hop, lb_phase phase, void *out, size_t rows)

@@ -8,6 +8,7 @@
 #include <initializer_list>
 
 #include "livebode/lines.h"
+#include "native_claim.h"
 
 namespace native {
 
@@ -15,7 +16,8 @@ namespace nb = nanobind;
 
 enum Access { READ = 0, WRITE = PyBUF_WRITABLE };
 
-// A contiguous array of a type and shape, or None where that is permitted.
+// A contiguous array of a type and shape, or None where that is permitted. One that is written is this thread's until
+// the end of the scope.
 class Array {
   public:
     Array(nb::handle object, const char *formats, std::initializer_list<size_t> shape, Access access = READ,
@@ -34,9 +36,18 @@ class Array {
             held_ = false;
             throw nb::value_error("an array has another type or shape");
         }
+        if (access == WRITE && buffer_.len > 0) {
+            claimed_ = Changing::take(buffer_.buf);
+            if (!claimed_) {
+                PyBuffer_Release(&buffer_);
+                held_ = false;
+                throw std::runtime_error("another thread changes this state; give each thread its own");
+            }
+        }
     }
     ~Array()
     {
+        if (claimed_) Changing::give(buffer_.buf);
         if (held_) PyBuffer_Release(&buffer_);
     }
     Array(const Array &) = delete;
@@ -49,7 +60,7 @@ class Array {
 
   private:
     Py_buffer buffer_{};
-    bool held_ = false;
+    bool held_ = false, claimed_ = false;
 
     // `formats` are separated by spaces.
     static bool is_one_of(const char *formats, const char *format)

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "../kernel/native_claim.h"
+
 extern "C" {
 #include "axis.h"
 #include "late.h"
@@ -89,11 +91,16 @@ class Engine {
         const auto rows = static_cast<size_t>(LB_AXIS_SIGNALS + config_.states);
         if (output.shape(0) != rows || output.shape(1) != ticks)
             throw nb::value_error("the output needs 3 rows and one for each state, as long as the input");
+        const native::Claim mine(used_, refusal);
         nb::gil_scoped_release release;
         return lb_axis_advance(&config_, &state_, ticks, input.data(), output.data());
     }
 
-    std::vector<double> plant() const { return {state_.plant, state_.plant + config_.states}; }
+    std::vector<double> plant()
+    {
+        const native::Claim mine(used_, refusal);
+        return {state_.plant, state_.plant + config_.states};
+    }
 
     std::vector<double> derivative(const std::vector<double> &now, double torque, const std::vector<double> &state)
     {
@@ -105,6 +112,9 @@ class Engine {
     }
 
   private:
+    static constexpr const char *refusal = "another thread advances this simulated axis; give each thread its own";
+
+    native::Flag used_;
     lb_axis_config config_;
     lb_axis_state state_{};
 };
