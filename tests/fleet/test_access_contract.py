@@ -49,6 +49,15 @@ def _as(settings: LogSection, action: Callable[[FleetLog], Awaitable[object]]) -
     asyncio.run(run())
 
 
+async def _until(happened: Callable[[], bool], jobs: list[asyncio.Task[None]]) -> None:
+    """Wait; a job that has ended raises why."""
+    while not happened():
+        for job in jobs:
+            if job.done():
+                job.result()
+        await asyncio.sleep(0.05)
+
+
 def _stored(fleet: SecureFleet) -> dict[str, int]:
     """Messages of the log by their subject, without the partition."""
     found: dict[str, int] = {}
@@ -196,23 +205,23 @@ def test_a_viewer_reads_acknowledgements_and_writes_none(fleet: SecureFleet) -> 
         writer, view = fleet.log("fleet"), fleet.log("view", "view")
         operator = NatsFeed(writer.url, "fleet", **security(writer))
         viewer = NatsFeed(view.url, "fleet", may_act=False, **security(view))
-        jobs = [asyncio.create_task(feed.run(shown.append, heard.append)) for feed in (operator, viewer)]
         own = FleetAct.of(stored)
         assert own is not None
+        for feed in (operator, viewer):
+            await feed.connect()
+        jobs = [asyncio.create_task(feed.run(shown.append, heard.append)) for feed in (operator, viewer)]
         while not heard:  # from the operator's own subscription, when the stream is there
-            with contextlib.suppress(FleetError, AttributeError):
+            with contextlib.suppress(FleetError):
                 await operator.publish(own)
             await asyncio.sleep(0.05)
-        while heard.count(stored) < 2:
-            await asyncio.sleep(0.05)
+        await _until(lambda: heard.count(stored) >= 2, jobs)
         with pytest.raises(FleetError, match="key of a viewer"):
             await viewer.publish(own)
         for subject in (f"{VIEW}.0", f"{ACTS}.acknowledge.x"):  # to other viewers, and to the log
             await viewer._connection.publish(subject, b"forged")
         await viewer._connection.flush()
         await operator.publish(FleetAct("acknowledge", path, 2, 0, by="Ada"))
-        while heard.count(later) < 2:
-            await asyncio.sleep(0.05)
+        await _until(lambda: heard.count(later) >= 2, jobs)
         for job in jobs:
             job.cancel()
         await asyncio.gather(*jobs, return_exceptions=True)

@@ -13,7 +13,7 @@ from livebode.dashboard.fleet_alarms import FleetAct
 from livebode.fleet.page_status import NAMES, VIEW
 from livebode.fleet.subjects import ACTS, ACTS_STREAM, VIEW_API, axis_token
 
-_CONNECT_S = 3.0
+_CONNECT_S = 5.0
 _POLL_S = 1.0
 """Between two requests of a viewer for new acts."""
 Hear = Callable[[bytes], None]
@@ -135,15 +135,21 @@ class NatsFeed:
         async def act(message: Any) -> None:
             hear_act(message.data)
 
-        js = self._connection.jetstream()
-        with contextlib.suppress(self._errors):  # it exists
-            await js.add_stream(
-                name=ACTS_STREAM, subjects=[f"{ACTS}.>"], max_msgs_per_subject=1, storage=api.StorageType.FILE
-            )
-        try:
-            await js.subscribe(f"{ACTS}.>", cb=act, ordered_consumer=True)
-        except self._errors as error:
-            self.trouble = f"acknowledgements cannot be read: {error}"
+        js, reported = self._connection.jetstream(), ""
+        while True:
+            with contextlib.suppress(self._errors):  # it exists
+                await js.add_stream(
+                    name=ACTS_STREAM, subjects=[f"{ACTS}.>"], max_msgs_per_subject=1, storage=api.StorageType.FILE
+                )
+            try:
+                await js.subscribe(f"{ACTS}.>", cb=act, ordered_consumer=True)
+            except self._errors as error:
+                reported = f"acknowledgements cannot be read: {error or type(error).__name__}"
+                self.trouble = self.trouble or reported
+                await asyncio.sleep(_POLL_S)
+            else:
+                break
+        self.trouble = "" if self.trouble == reported else self.trouble
         await asyncio.Event().wait()
 
     async def _ask_for_acts(self, hear_act: Hear) -> None:
