@@ -18,6 +18,7 @@ from livebode.export import FORMATS, at
 from livebode.fitting import mean_response
 from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_parquet
+from tests.support.exact_csv import read_exactly
 from tests.support.runs import describe
 
 PARAMETERS = {
@@ -68,7 +69,7 @@ def test_one_response_or_the_mean_of_a_run_is_exported(run: Path, tmp_path: Path
     ):
         path = tmp_path / "below" / f"{len(options)}{options[0]}.csv"
         assert livebode("export", run, "--to", "csv", *options, "--out", path).code == 0
-        frame = pd.read_csv(path)
+        frame = read_exactly(path)
         np.testing.assert_array_equal(frame["frequency [Hz]"], [50, 100, 200])
         np.testing.assert_array_equal(frame["re"] + 1j * frame["im"], expected.value)
         np.testing.assert_array_equal(frame["sigma"], expected.sigma)
@@ -91,7 +92,7 @@ def test_parameters_of_a_run_are_exported_and_a_run_without_fits_is_refused(run:
         done = livebode("export", fitted, "--to", to, "--parameters")
         assert (done.code, done.err) == (0, "")
         assert done.out == f"{tmp_path / 'fitted-parameters'}.{to}: 4 parameter values\n"
-    frame = pd.read_csv(tmp_path / "fitted-parameters.csv")
+    frame = read_exactly(tmp_path / "fitted-parameters.csv")
     pd.testing.assert_frame_equal(frame, pd.DataFrame(PARAMETERS), check_dtype=False)
     struct = scipy.io.loadmat(tmp_path / "fitted-parameters.mat", simplify_cells=True)["livebode"]
     assert list(struct) == list(PARAMETERS)

@@ -40,7 +40,8 @@ def batches(draw: st.DrawFn, kind: type[RowArrays], least: int = 0) -> RowArrays
         if field.name in kind._SHARED:
             values[field.name] = SHARED[hint] if hint in SHARED else get_args(hint)[0]
         else:
-            (scalar,) = get_args(get_args(hint)[1])
+            parts = get_args(hint)  # NDArray[type] since NumPy 2.5, before that ndarray[shape, dtype[type]]
+            scalar = parts[0] if len(parts) == 1 else get_args(parts[1])[0]
             shape = (rows, *(2, 3)[: rng.integers(3)])
             values[field.name] = rng.choice(np.array(VALUES.get(scalar, VALUES[np.str_])), shape)
     return kind(**values)

@@ -127,7 +127,7 @@ def test_a_design_from_a_run_adopts_the_description_of_the_run(runs):
         assert max(predicted[name]["high"], -predicted[name]["low"]) == pytest.approx(belt[name].size, rel=0.05), name
     (runs / "log2.parquet").write_bytes((runs / "log.parquet").read_bytes())
     (runs / "again" / "axis.toml").write_text(
-        (runs / "again" / "axis.toml").read_text().replace("log.parquet", str(runs / "log2.parquet"))
+        (runs / "again" / "axis.toml").read_text().replace("log.csv", str(runs / "log2.parquet"))
     )
     assert livebode("run", runs / "again" / "axis.toml", "--out", runs / "tracked").code == 0
 
@@ -154,7 +154,7 @@ def test_a_design_from_an_indirect_run_needs_no_input(runs):
     (runs / "indirect.toml").write_text(text.replace("[tracking]\n", '[tracking]\nestimator = "indirect"\n'))
     assert livebode("run", runs / "indirect.toml", "--out", runs / "run-indirect").code == 0
     path = runs / "from-indirect.toml"
-    path.write_text(f'{EXCITATION}[measured]\nrun = "run-indirect"\nradius_m = 0.019\n')
+    path.write_text(f'log = "log.parquet"\n{EXCITATION}[measured]\nrun = "run-indirect"\nradius_m = 0.019\n')
     assert livebode("design", path, "--out", runs / "from-indirect").code == 0
     (runs / "from-indirect" / "log.parquet").write_bytes((runs / "log.parquet").read_bytes())
     done = livebode("run", runs / "from-indirect" / "axis.toml", "--out", runs / "tracked-indirect")

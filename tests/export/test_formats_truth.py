@@ -8,7 +8,6 @@ from pathlib import Path
 
 import control
 import numpy as np
-import pandas as pd
 import pyarrow.csv
 import pytest
 import pyuff
@@ -20,6 +19,7 @@ from livebode.core import Lines, Responses, SignalError
 from livebode.export import at, write_csv, write_mat, write_netcdf, write_uff
 from livebode.sources import open_log
 from tests.support.errors import refused
+from tests.support.exact_csv import read_exactly
 from tests.support.responses import any_responses, cut, made
 
 ABOUT = {"configuration": {"signals": {"output": "ω", "input": "iq"}}, "found": {"unit": "µm"}}
@@ -40,7 +40,7 @@ def test_csv_is_read_exactly_by_pandas_and_arrow(
     assert write_csv(path, cut(responses, 1, 1), ABOUT).rows == len(responses)
     rows, lines = responses.value.shape
     unit = f" [{responses.unit}]" if responses.unit else ""
-    frame = pd.read_csv(path)
+    frame = read_exactly(path)
     table = pyarrow.csv.read_csv(path)
     assert table.column_names == list(frame.columns)
     for column in (frame.__getitem__, lambda name: table[name].to_numpy()):

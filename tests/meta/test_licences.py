@@ -8,14 +8,15 @@ from importlib.metadata import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = {
-    re.split(r"[<>=,[]", need)[0]: extra
+    requirement.name: extra
     for extra, needs in PROJECT["optional-dependencies"].items()
-    for need in needs
-    if not need.startswith("livebode")
+    for requirement in map(Requirement, needs)
+    if requirement.name != "livebode" and (requirement.marker is None or requirement.marker.evaluate())
 }
 CORE = [re.split(r"[<>=,]", need)[0] for need in PROJECT["dependencies"]]
 

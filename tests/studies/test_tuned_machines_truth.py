@@ -81,6 +81,7 @@ def test_the_slopes_of_the_limits_are_exact() -> None:
         np.testing.assert_allclose(problem.noise_gain(x)[1][i], rise, atol=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # python-control with NumPy 2.5
 @given(st.floats(0.2, 5.0), st.floats(0.05, 0.9), st.floats(0.2, 3.0))
 @settings(max_examples=30, deadline=None)
 def test_disk_margins_are_those_of_python_control(gain: float, damping: float, corner: float) -> None:

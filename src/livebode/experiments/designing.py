@@ -116,7 +116,7 @@ def _check_names(name: str, log: str) -> None:
         raise ConfigError(
             "value-invalid",
             f"log = {log!r} cannot be the file of a recording",
-            "specify one such as 'log.parquet'",
+            "specify one such as 'log.csv'",
             key="log",
             value=log,
         )

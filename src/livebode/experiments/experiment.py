@@ -69,7 +69,7 @@ class Experiment(BaseModel):
     limits: dict[str, Any] = {}
     loop: LoopSection | None = None
     signals: dict[str, str] = {}
-    log: str = "log.parquet"
+    log: str = "log.csv"
     source: SourceSettings | None = None
     measure: MeasureSection = MeasureSection()
 

@@ -19,7 +19,7 @@ _ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
 
 
 def delta_options(place: Location) -> dict[str, str]:
-    """What deltalake needs as ``storage_options`` besides the variables AWS_…, which it reads itself.
+    """What deltalake needs as ``storage_options`` besides the variables ``AWS_…``, which it reads itself.
 
     They are from the configuration of fsspec, so that one place describes a storage; none for a path. Plain http is
     allowed where the configured endpoint has it.

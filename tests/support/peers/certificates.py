@@ -30,6 +30,8 @@ class Authority:
         builder = begun(named(name), self._name, key).add_extension(
             x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address("127.0.0.1"))]), False
         )
+        authority = x509.AuthorityKeyIdentifier.from_issuer_public_key(self._key.public_key())
+        builder = builder.add_extension(authority, False)  # Python 3.13 refuses certificates without it
         certificate, secret = self._folder / f"{name}.crt", self._folder / f"{name}.key"
         certificate.write_bytes(signed(builder, self._key))
         secret.write_bytes(pem(key))
@@ -68,6 +70,7 @@ def begun(subject: x509.Name, issuer: x509.Name, key: rsa.RSAPrivateKey) -> x509
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - timedelta(days=1))
         .not_valid_after(now + timedelta(days=1))
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), False)
     )
 
 

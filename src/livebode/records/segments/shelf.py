@@ -218,7 +218,7 @@ class Shelf:
         for group in groups:
             writer.write(group)
         writer.close()
-        data = sink.getbuffer()
+        data = sink.getvalue()  # a view of it would be reported as an error where a failed write remains in a cycle
         write_whole(self._run / name, data, locked=True)
         first, last = groups[0], groups[-1]
         return Segment(
