@@ -2,21 +2,22 @@
 
 A tracker of n inputs and n outputs transforms w, u and y once. Beside it: the n · (1 + n) channels of n runs that
 excite one input each, through the same kernel one at a time, without an estimate; and n² ordinary trackers, one for
-each entry. Processor time of one thread, the least of several rounds, in microseconds for each second of samples.
+each entry. Processor time, the least of several rounds, in microseconds for each second of samples.
 """
 
 from __future__ import annotations
 
-import time
+from functools import partial
 
 import numpy as np
 
+from bench.work import side_by_side
 from livebode.core import Block, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.kernel import SlidingDFT
 from livebode.mimo import MatrixExcitation, MatrixSettings, MatrixTracker
 
-RATE_HZ, WINDOW, HOP, ROUNDS = 4000.0, 400, 20, 7
+RATE_HZ, WINDOW, HOP, SECONDS_EACH = 4000.0, 400, 20, 2.0
 LINES = Lines.parse("20:400:20", rate_hz=RATE_HZ, window=WINDOW)
 SIZES = 1, 2, 4, 8
 ESTIMATORS = "joint", "direct"
@@ -60,28 +61,19 @@ def of_pairs(blocks: list[Block], count: int) -> None:
                 tracker.process(block)
 
 
-def least(work: list[tuple[object, ...]]) -> np.ndarray:
-    """Seconds of each, in turn."""
-    found = []
-    for _ in range(ROUNDS):
-        row = []
-        for action, *arguments in work:
-            begun = time.thread_time()
-            action(*arguments)  # type: ignore[operator]
-            row.append(time.thread_time() - begun)
-        found.append(row)
-    return np.min(found, axis=0)
-
-
 def main() -> None:
     print(f"{len(LINES)} lines, window {WINDOW}, hop {HOP}, {RATE_HZ:g} Hz; µs for each second of samples")
     print("  n × n  channels  trackers     joint    direct   joint/channels  joint/trackers")
     for count in SIZES:
         blocks = recording(count)
         seconds = sum(map(len, blocks)) / RATE_HZ
-        compared = [(of_channels, blocks, count), (of_pairs, blocks, count)]
-        work = [*compared, *((of_matrices, blocks, count, name) for name in ESTIMATORS)]
-        channels, pairs, joint, direct = least(work) * 1e6 / seconds
+        tasks = {
+            "channels": partial(of_channels, blocks, count),
+            "trackers": partial(of_pairs, blocks, count),
+            **{name: partial(of_matrices, blocks, count, name) for name in ESTIMATORS},
+        }
+        found = side_by_side(tasks, SECONDS_EACH)
+        channels, pairs, joint, direct = (found[name] * 1e6 / seconds for name in tasks)
         print(
             f"  {count} × {count} {channels:9.0f} {pairs:9.0f} {joint:9.0f} {direct:9.0f}"
             f" {joint / channels:16.2f} {joint / pairs:15.2f}"

@@ -49,12 +49,16 @@ def _as(settings: LogSection, action: Callable[[FleetLog], Awaitable[object]]) -
     asyncio.run(run())
 
 
-async def _until(happened: Callable[[], bool], jobs: list[asyncio.Task[None]]) -> None:
-    """Wait; a job that has ended raises why."""
+async def _until(
+    happened: Callable[[], object], jobs: list[asyncio.Task[None]], doing: Callable[[], Awaitable[None]] | None = None
+) -> None:
+    """Wait, `doing` something repeatedly; a job that has ended raises why."""
     while not happened():
         for job in jobs:
             if job.done():
                 job.result()
+        if doing is not None:
+            await doing()
         await asyncio.sleep(0.05)
 
 
@@ -182,9 +186,7 @@ def test_a_viewer_reads_the_status_and_changes_nothing(fleet: SecureFleet) -> No
         feed = NatsFeed(view.url, "fleet", may_act=False, **security(view))
         running = asyncio.create_task(feed.run(heard.append, heard.append))
         async with FleetLog(fleet.log("fleet"), "test") as log:
-            while not heard:
-                await log._connection.publish(f"{VIEW}.0", b"page")
-                await asyncio.sleep(0.05)
+            await _until(lambda: heard, [running], lambda: log._connection.publish(f"{VIEW}.0", b"page"))
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
         return heard
@@ -210,10 +212,12 @@ def test_a_viewer_reads_acknowledgements_and_writes_none(fleet: SecureFleet) -> 
         for feed in (operator, viewer):
             await feed.connect()
         jobs = [asyncio.create_task(feed.run(shown.append, heard.append)) for feed in (operator, viewer)]
-        while not heard:  # from the operator's own subscription, when the stream is there
-            with contextlib.suppress(FleetError):
+
+        async def acknowledge() -> None:
+            with contextlib.suppress(FleetError):  # there is no stream yet
                 await operator.publish(own)
-            await asyncio.sleep(0.05)
+
+        await _until(lambda: heard, jobs, acknowledge)
         await _until(lambda: heard.count(stored) >= 2, jobs)
         with pytest.raises(FleetError, match="key of a viewer"):
             await viewer.publish(own)

@@ -18,7 +18,7 @@ EXTRAS = {
     for requirement in map(Requirement, needs)
     if requirement.name != "livebode" and (requirement.marker is None or requirement.marker.evaluate())
 }
-CORE = [re.split(r"[<>=,]", need)[0] for need in PROJECT["dependencies"]]
+CORE = [Requirement(need).name for need in PROJECT["dependencies"]]
 
 
 def copyleft(package: str) -> bool:

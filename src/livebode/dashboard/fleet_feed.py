@@ -144,12 +144,11 @@ class NatsFeed:
             try:
                 await js.subscribe(f"{ACTS}.>", cb=act, ordered_consumer=True)
             except self._errors as error:
-                reported = f"acknowledgements cannot be read: {error or type(error).__name__}"
-                self.trouble = self.trouble or reported
+                reported = self._acts_unread(error)
                 await asyncio.sleep(_POLL_S)
             else:
                 break
-        self.trouble = "" if self.trouble == reported else self.trouble
+        self._acts_read(reported)
         await asyncio.Event().wait()
 
     async def _ask_for_acts(self, hear_act: Hear) -> None:
@@ -171,11 +170,20 @@ class NatsFeed:
             except NotFoundError:  # none yet
                 pause_s = _POLL_S
             except (TimeoutError, self._errors) as error:
-                reported = f"acknowledgements cannot be read: {error or type(error).__name__}"
-                self.trouble, pause_s = self.trouble or reported, _POLL_S
+                reported, pause_s = self._acts_unread(error), _POLL_S
             else:
-                self.trouble = "" if self.trouble == reported else self.trouble
+                self._acts_read(reported)
             await asyncio.sleep(pause_s)
+
+    def _acts_unread(self, error: Exception) -> str:
+        """Report it where there is no other trouble; returns the sentence."""
+        reported = f"acknowledgements cannot be read: {error or type(error).__name__}"
+        self.trouble = self.trouble or reported
+        return reported
+
+    def _acts_read(self, reported: str) -> None:
+        """Take back what was reported; another trouble remains."""
+        self.trouble = "" if self.trouble == reported else self.trouble
 
     async def publish(self, act: FleetAct) -> None:
         """Store an act in the log."""

@@ -16,7 +16,7 @@ def axis_text(
     design: Design,
     *,
     signals: Mapping[str, str],
-    log: str = "log.csv",
+    log: str,
     loop: Mapping[str, Any] | None = None,
     motion: Mapping[str, Any] | None = None,
     tracking: Mapping[str, Any] | None = None,

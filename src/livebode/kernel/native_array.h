@@ -31,19 +31,12 @@ class Array {
                     buffer_.ndim == static_cast<int>(shape.size());
         const Py_ssize_t *length = buffer_.shape;
         for (const size_t wanted : shape) fits = fits && *length++ == static_cast<Py_ssize_t>(wanted);
-        if (!fits) {
-            PyBuffer_Release(&buffer_);
-            held_ = false;
-            throw nb::value_error("an array has another type or shape");
-        }
-        if (access == WRITE && buffer_.len > 0) {
-            claimed_ = Changing::take(buffer_.buf);
-            if (!claimed_) {
-                PyBuffer_Release(&buffer_);
-                held_ = false;
-                throw std::runtime_error("another thread changes this state; give each thread its own");
-            }
-        }
+        const bool changes = access == WRITE && buffer_.len > 0;
+        if (fits && changes) claimed_ = Changing::take(buffer_.buf);
+        if (fits && claimed_ == changes) return;
+        PyBuffer_Release(&buffer_); // a constructor that throws has no destructor
+        if (!fits) throw nb::value_error("an array has another type or shape");
+        throw std::runtime_error("another thread changes this state; give each thread its own");
     }
     ~Array()
     {
