@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +19,23 @@ from tests.support.loop_runs import AXIS
 FREQUENCIES = "4:100:2, 104:400:8"
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("tune")
-    w = 0.1 * multisine(Lines.parse(FREQUENCIES, RATE_HZ, 2000))
+def recorded(folder: Path, frequencies: str, window: int) -> Path:
+    """A run of the axis on these lines."""
+    folder.mkdir()
+    w = 0.1 * multisine(Lines.parse(frequencies, RATE_HZ, window))
     u, y = TwoMassLoop().run(w, 10, sigma=0.02, seed=1)
     write_parquet(folder / "log.parquet", {"w": np.resize(w, u.size), "u": u[0], "y": y[0]})
-    words = AXIS.format(gain=0.2308, delay=0).replace('"20:140:10"', f'"{FREQUENCIES}"')
-    words = words.replace("window = 400", "window = 2000").replace("hop = 200", "hop = 2000")
+    words = AXIS.format(gain=0.2308, delay=0).replace('"20:140:10"', f'"{frequencies}"')
+    words = words.replace("window = 400", f"window = {window}").replace("hop = 200", f"hop = {window}")
     (folder / "axis.toml").write_text(words, encoding="utf-8")
     done = livebode("run", folder / "axis.toml", "--out", folder / "run")
     assert done.code == 0, done.err
     return folder / "run"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return recorded(tmp_path_factory.mktemp("tune") / "axis", FREQUENCIES, 2000)
 
 
 def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
@@ -67,3 +74,23 @@ def test_a_description_that_the_check_contradicts_is_never_tuned(run: Path) -> N
     (run / "loop-check.json").write_text("[]", encoding="utf-8")
     assert livebode("tune", run).code == 2
     (run / "loop-check.json").unlink()
+
+
+def test_design_takes_the_missing_lines_and_with_them_the_axis_is_tuned(tmp_path: Path) -> None:
+    coarse = recorded(tmp_path / "coarse", "4:40:4, 120:400:8", 2000)
+    refused = livebode("tune", coarse, "--loop-checked", "--json")
+    assert refused.code == 2
+    wanted = re.search(r"--lines '([^']+)'", refused.err)
+    assert wanted is not None, refused.err
+    experiment = tmp_path / "experiment.toml"
+    experiment.write_text(
+        "[excitation]\nband_hz = [4, 400]\nresolution_hz = 4\namplitude_n_m = 0.1\n"
+        '[measured]\nrun = "coarse/run"\nnoise = 0.02\nradius_m = 0.019\n',
+        encoding="utf-8",
+    )
+    done = livebode("design", experiment, "--lines", wanted[1], "--out", tmp_path / "design", "--json")
+    assert done.code == 0, done.err
+    lines = tomllib.loads((tmp_path / "design" / "axis.toml").read_text(encoding="utf-8"))["lines"]
+    fine = recorded(tmp_path / "fine", lines["frequencies"], lines["window"])
+    tuned = livebode("tune", fine, "--loop-checked")
+    assert tuned.code == 0, tuned.err

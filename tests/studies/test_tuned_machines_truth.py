@@ -139,7 +139,7 @@ def test_it_refuses_an_unchecked_loop_low_coherence_and_missing_lines() -> None:
     with pytest.raises(TuneError, match="coherence") as refusal:
         tune(low, machine.loop, loop_checked=True)
     assert refusal.value.code == "tune.coherence-low"
-    with pytest.raises(TuneError, match="add lines") as refusal:
+    with pytest.raises(TuneError, match="add the lines") as refusal:
         tune(selected(responses, (f < 6) | (f > 150)), machine.loop, loop_checked=True)
     assert refusal.value.code == "tune.lines-missing"
     for span in refusal.value.lines:

@@ -37,6 +37,10 @@ def design_command(
         str | None, typer.Option(metavar="LOW:HIGH", help="Frequency band in Hz; replaces that of the file.")
     ] = None,
     resolution: Annotated[float | None, typer.Option(metavar="HZ", help="Distance between lines.")] = None,
+    lines: Annotated[
+        str | None, typer.Option(help="Lines in Hz, as 20:140:20, 150; replaces the band of the file.")
+    ] = None,
+    window: Annotated[int | None, typer.Option(metavar="SAMPLES", help="Period; needed for lines in bins.")] = None,
     amplitude: Annotated[
         float | None, typer.Option(metavar="N·m", help="Amplitude of each line. \\[default: chosen]")
     ] = None,
@@ -53,6 +57,7 @@ def design_command(
 
     over: dict[str, Any] = {
         "resolution_hz": resolution, "amplitude_n_m": amplitude, "accuracy": accuracy, "seed": seed,
+        "lines": lines, "window": window,
         "band_hz": None if band is None else parsed_band(band),
     }  # fmt: skip
     asked = Experiment.read(experiment, {key: value for key, value in over.items() if value is not None})

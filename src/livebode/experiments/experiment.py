@@ -85,9 +85,7 @@ class Experiment(BaseModel):
         data = read_table(path)
         required, above = data.get("excitation", {}), dict(over or {})
         if isinstance(required, dict):
-            # A band instead of lines, a resolution instead of a window: both at once would contradict each other.
-            gone = {"lines": "band_hz" in above, "window": "resolution_hz" in above, "order": "resolution_hz" in above}
-            data["excitation"] = {key: value for key, value in required.items() if not gone.get(key)} | above
+            data["excitation"] = {key: value for key, value in required.items() if key not in _replaced(above)} | above
         found = cls.of(data, str(path))
         if found.source is not None:
             found = found.model_copy(update={"source": found.source.beside(path.parent)})
@@ -284,3 +282,14 @@ def made_of(kind: type[T], given: Mapping[str, Any], section: str) -> T:
 def _finite(table: Mapping[str, Any]) -> dict[str, Any]:
     kept = {name: _finite(v) if isinstance(v, Mapping) else v for name, v in table.items() if v is not None}
     return {name: v for name, v in kept.items() if v != inf}
+
+
+def _replaced(above: Mapping[str, Any]) -> set[str]:
+    """Keys of [excitation] that would contradict those given instead."""
+    of_a_band = {"band_hz", "resolution_hz", "order", "rate_divider", "sweep", "window", "kind"}
+    gone: set[str] = of_a_band if "lines" in above else set()
+    if "band_hz" in above:
+        gone |= {"lines"}
+    if "resolution_hz" in above or "window" in above:
+        gone |= {"resolution_hz", "window", "order"}
+    return gone

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import TuneError, counted
+from livebode.core import Lines, TuneError, counted
+from livebode.tuning.missing_lines import MissingLines
 from livebode.tuning.plant_band import PlantBand
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+_Span = tuple[float, float, float]
 
 _GAP_MAX = 0.5  # of log G between two lines: more is a resonance that they do not resolve
 _GAP_GOOD = 0.05
@@ -17,32 +19,33 @@ _MATTERS = (0.15, 8.0)  # |L| where the way past −1 is decided
 _CROSSOVER_FROM_END = 2.0
 
 
-def check_coverage(plant: PlantBand, loop: Complex, step_hz: float) -> None:
+def check_coverage(plant: PlantBand, loop: Complex, lines: Lines) -> None:
     """TuneError with the missing lines if crossover or a resonance near −1 is not covered.
 
     Parameters
     ----------
     plant, loop
         The band and L of its values, shape (places, frequencies).
-    step_hz
-        Resolution of the lines, to whose multiples the missing ones are rounded.
+    lines
+        The measured lines, with which the missing ones are joined.
     """
-    _check_gaps(plant, np.abs(loop), step_hz)
+    _check_gaps(plant, np.abs(loop), lines)
     first = min(_crossover_hz(plant, row)[0] for row in loop)
     last = max(_crossover_hz(plant, row)[1] for row in loop)
     low, high = plant.lines_hz[[0, -1]]
     if first < _CROSSOVER_FROM_END * low:
-        raise _missing(first, f"the lowest line is {low:g} Hz", [_span(first / 8, low, first / 8, step_hz)])
+        raise _missing(first, f"the lowest line is {low:g} Hz", lines, (first / 8, low, first / 8))
     if last > high / _CROSSOVER_FROM_END:
-        raise _missing(last, f"the highest line is {high:g} Hz", [_span(high, 4 * last, last / 8, step_hz)])
+        raise _missing(last, f"the highest line is {high:g} Hz", lines, (high, 4 * last, last / 8))
 
 
-def missing_resonances(plant: PlantBand, step_hz: float) -> list[str]:
-    """Spans of lines that would resolve what the lines do not show, as `start:stop:step` in Hz."""
-    return _spans(plant, plant.spread.max(axis=0) > _GAP_MAX, step_hz)
+def missing_resonances(plant: PlantBand, lines: Lines) -> MissingLines | None:
+    """The lines that would resolve what the lines do not show."""
+    spans = _spans(plant, plant.spread.max(axis=0) > _GAP_MAX)
+    return MissingLines.of(lines, spans) if spans else None
 
 
-def _check_gaps(plant: PlantBand, size: Floats, step_hz: float) -> None:
+def _check_gaps(plant: PlantBand, size: Floats, lines: Lines) -> None:
     matters = (size > _MATTERS[0]) & (size < _MATTERS[1])
     wrong = np.any(matters & (plant.spread > _GAP_MAX), axis=0)
     if not wrong.any():
@@ -56,13 +59,14 @@ def _check_gaps(plant: PlantBand, size: Floats, step_hz: float) -> None:
             "excite these lines with more amplitude, or measure longer",
             dropped_hz=lacking,
         )
-    spans = _spans(plant, wrong, step_hz)
+    missing = MissingLines.of(lines, _spans(plant, wrong))
     raise TuneError(
         "lines-missing",
         f"the lines do not resolve the response near {at:.4g} Hz, where the loop is close to −1",
-        f"add lines: {', '.join(spans)} Hz",
+        missing.remedy,
         frequency_hz=at,
-        lines=spans,
+        lines=missing.lines,
+        window=missing.window,
     )
 
 
@@ -72,8 +76,8 @@ def _in_gap(plant: PlantBand, wrong: NDArray[np.bool_], frequency_hz: float) -> 
     return int(np.searchsorted(plant.lines_hz, frequency_hz)) in gaps
 
 
-def _spans(plant: PlantBand, wrong: NDArray[np.bool_], step_hz: float) -> list[str]:
-    """One span for each group of neighbouring gaps, with the step that the third difference asks for."""
+def _spans(plant: PlantBand, wrong: NDArray[np.bool_]) -> list[_Span]:
+    """Ends and step of each group of neighbouring gaps, Hz; the step is that which the third difference asks for."""
     gaps = sorted(
         {
             min(int(np.searchsorted(plant.lines_hz, f, side="right")) - 1, plant.lines_hz.size - 2)
@@ -87,11 +91,14 @@ def _spans(plant: PlantBand, wrong: NDArray[np.bool_], step_hz: float) -> list[s
         else:
             groups.append([gap])
     found = []
+    distance = np.diff(plant.lines_hz)
     for group in groups:
         low, high = float(plant.lines_hz[group[0]]), float(plant.lines_hz[group[-1] + 1])
         inside = (plant.frequency_hz >= low) & (plant.frequency_hz <= high)
         finer = float(np.ceil((plant.spread[:, inside].max() / _GAP_GOOD) ** (1 / 3)))
-        found.append(_span(low, high, (plant.lines_hz[group[0] + 1] - low) / max(finer, 2.0), step_hz))
+        # Across a resonance the third difference says too little: at least as fine as beside the gaps.
+        beside = distance[max(0, group[0] - 1) : group[-1] + 2].min()
+        found.append((low, high, float(min(distance[group].min() / max(finer, 2.0), beside))))
     return found
 
 
@@ -103,18 +110,13 @@ def _crossover_hz(plant: PlantBand, loop: Complex) -> tuple[float, float]:
     return float(first), float(plant.frequency_hz[above[-1]] if above.size else plant.frequency_hz[0])
 
 
-def _span(low_hz: float, high_hz: float, wanted_hz: float, step_hz: float) -> str:
-    """`start:stop:step` in multiples of the resolution, or of a fraction of it where that is too coarse."""
-    step = np.floor(wanted_hz / step_hz) * step_hz if wanted_hz >= step_hz else step_hz / np.ceil(step_hz / wanted_hz)
-    start = max(np.floor(low_hz / step), 1) * step
-    return f"{start:.4g}:{np.ceil(high_hz / step) * step:.4g}:{step:.4g}"
-
-
-def _missing(crossover_hz: float, fact: str, spans: list[str]) -> TuneError:
+def _missing(crossover_hz: float, fact: str, lines: Lines, span: _Span) -> TuneError:
+    missing = MissingLines.of(lines, [span])
     return TuneError(
         "lines-missing",
         f"the loop crosses |L| = 1 at {crossover_hz:.4g} Hz, and {fact}",
-        f"add lines: {', '.join(spans)} Hz",
+        missing.remedy,
         frequency_hz=crossover_hz,
-        lines=spans,
+        lines=missing.lines,
+        window=missing.window,
     )

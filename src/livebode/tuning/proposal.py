@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Loop, Model, Responses, TuneError
+from livebode.core import Lines, Loop, Model, Responses, TuneError
 from livebode.tuning.coverage import check_coverage, missing_resonances
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.predicted import PredictedMargins, predicted
@@ -161,13 +161,12 @@ def tune(
     asked = specification or LoopSpecification()
     rate = rate_hz or responses.lines.rate_hz
     plant = PlantBand.of(responses, rate, coherence=asked.coherence, confidence=asked.confidence)
-    step_hz = responses.lines.resolution_hz
     best = _best(loop.feedback, plant, asked)
     if best is None:
-        raise _no_start(plant, step_hz)
+        raise _no_start(plant, responses.lines)
     structure = best.problem.structure
     feedback = structure.feedback(best.x)
-    check_coverage(plant, plant.value * structure.response(best.x)[0], step_hz)
+    check_coverage(plant, plant.value * structure.response(best.x)[0], responses.lines)
     promised = _margins_of(plant, feedback.model, 1.0)
     required = asked.bandwidth_hz
     return ControllerProposal(
@@ -239,14 +238,15 @@ def _limits(best: SearchResult) -> tuple[str, ...]:
     return tuple(words for _, words in sorted(found.values()))
 
 
-def _no_start(plant: PlantBand, step_hz: float) -> TuneError:
+def _no_start(plant: PlantBand, lines: Lines) -> TuneError:
     """Why no setting keeps the limits: lines that do not resolve the plant, or wide bounds."""
-    if spans := missing_resonances(plant, step_hz):
+    if missing := missing_resonances(plant, lines):
         return TuneError(
             "lines-missing",
             "the lines do not resolve the response, and no controller is safe for all that it may be between them",
-            f"add lines: {', '.join(spans)} Hz",
-            lines=spans,
+            missing.remedy,
+            lines=missing.lines,
+            window=missing.window,
         )
     share = plant.radius / np.abs(plant.value)
     at = np.unravel_index(int(np.argmax(np.where(plant.above, 0, share))), share.shape)
