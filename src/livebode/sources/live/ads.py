@@ -24,6 +24,7 @@ NOTIFIED_MAX = 100_000
 ALIVE_S = 2.0
 NO_RING_S = 0.25
 _NO_SYMBOL = 0x710
+_CALLBACKS: list[Any] = []  # those that were subscribed, for the life of the process
 _REFUSED = {_NO_SYMBOL: "the PLC has no such symbol", 0x0D: "the PLC's port is locked", 0x71B: "access was denied"}
 
 
@@ -183,6 +184,9 @@ class AdsSource(LiveSource):
             self._deliver(batch)
 
     def _unsubscribe(self, plc: Any, handles: tuple[int, int | None]) -> None:
+        # pyads frees the callback with the subscription, but the thread of its library still delivers what has arrived
+        # before: without this the process ends by a segmentation fault.
+        _CALLBACKS.append(self._pyads.pyads_ex.callback_store[plc._adr, handles[0]])
         try:
             plc.del_device_notification(*handles)
         except self._pyads.ADSError:
