@@ -93,7 +93,7 @@ def required(root: Path, group: str) -> Iterator[str]:
         yield from settings["project"]["dependencies"]
         for name, extra in settings["project"].get("optional-dependencies", {}).items():
             if name != "all":  # which names the others
-                yield from extra
+                yield from (one for one in extra if Requirement(one).name != settings["project"]["name"])
 
 
 def locked(root: Path) -> str:
