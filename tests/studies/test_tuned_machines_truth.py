@@ -142,8 +142,7 @@ def test_it_refuses_an_unchecked_loop_low_coherence_and_missing_lines() -> None:
     with pytest.raises(TuneError, match="add the lines") as refusal:
         tune(selected(responses, (f < 6) | (f > 150)), machine.loop, loop_checked=True)
     assert refusal.value.code == "tune.lines-missing"
-    for span in refusal.value.lines:
-        Lines.parse(span, 4000.0, 40000, rounded=True)
+    Lines.parse(refusal.value.lines, 4000.0, 40000, rounded=True)
     with pytest.raises(TuneError, match="only PID, Cascade and PositionPD"):
         tune(responses, Loop(2.0 * VELOCITY), loop_checked=True)
 
