@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.analysis.strokes import MotionSamples
-from livebode.core.distributions import t_quantile
 from livebode.motion.friction_curve import FrictionCurve, friction_curve
 
 Floats = NDArray[np.float64]
@@ -38,9 +37,7 @@ class FrictionReport:
 
     def each_way(self, probability: float = 0.95) -> dict[str, tuple[Floats, Floats]]:
         """Coulomb and viscous friction forward and backward, with bounds, shape (2,) each."""
-        factor = t_quantile(0.5 + probability / 2, self.directions.dof)
-        each = {"forward": self.directions.direction(1), "backward": self.directions.direction(-1)}
-        return {name: (value, factor * np.sqrt(np.diag(covariance))) for name, (value, covariance) in each.items()}
+        return {name: self.directions.direction(sign, probability) for name, sign in (("forward", 1), ("backward", -1))}
 
     @property
     def differing(self) -> bool:

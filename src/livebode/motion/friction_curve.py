@@ -43,7 +43,7 @@ class FrictionCurve:
     value, covariance
         Shape (parameters,) and (parameters, parameters), in the units of the recording.
     dof
-        Degrees of freedom of the covariance.
+        Degrees of freedom of each variance, shape (parameters,).
     places
         Positions of the Coulomb frictions; empty without.
     speed
@@ -60,7 +60,7 @@ class FrictionCurve:
     units: tuple[str, ...]
     value: Floats
     covariance: Floats
-    dof: int
+    dof: NDArray[np.int64]
     places: Floats
     speed: tuple[float, float]
     residual: float
@@ -79,7 +79,7 @@ class FrictionCurve:
         By Student's t, because the covariance is estimated from correlated residuals. A model error, such as friction
         that depends on the temperature, is covered as far as it varies within the recording.
         """
-        return np.asarray(self.sigma * t_quantile(0.5 + probability / 2, self.dof))
+        return np.asarray(self.sigma * [t_quantile(0.5 + probability / 2, int(dof)) for dof in self.dof])
 
     def __getitem__(self, name: str) -> float:
         return float(self.value[self.index(name)])
@@ -103,17 +103,20 @@ class FrictionCurve:
         if "stribeck_speed" in self.names:
             linear[:, self.index("stribeck_speed")] = 0.0
         variance = np.einsum("ij,jk,ik->i", slope, self.covariance, slope)
-        return linear @ self.value, np.sqrt(variance) * t_quantile(0.5 + probability / 2, self.dof)
+        least = int(self.dof[np.any(slope != 0, axis=0)].min(initial=self.dof.max()))
+        return linear @ self.value, np.sqrt(variance) * t_quantile(0.5 + probability / 2, least)
 
-    def direction(self, sign: int) -> tuple[Floats, Floats]:
-        """Coulomb and viscous friction of one direction with their covariance, shapes (2,) and (2, 2).
+    def direction(self, sign: int, probability: float = 0.95) -> tuple[Floats, Floats]:
+        """Coulomb and viscous friction of one direction with their bounds, shapes (2,) and (2,).
 
         The offset counts as Coulomb friction: Fc ± F0 and Fv ± asymmetry. Needs a curve of `directions`, no places.
         """
         take = np.zeros((2, len(self.names)))
         take[0, [self.index("coulomb"), self.index("offset")]] = 1.0, sign
         take[1, [self.index("viscous"), self.index("asymmetry")]] = 1.0, sign
-        return take @ self.value, take @ self.covariance @ take.T
+        sigma = np.sqrt(np.diag(take @ self.covariance @ take.T))
+        factor = [t_quantile(0.5 + probability / 2, int(self.dof[row != 0].min())) for row in take]
+        return take @ self.value, sigma * factor
 
     def _slopes(self, v: Floats) -> Floats:
         """Derivative of the friction by each parameter, shape (speeds, parameters)."""
@@ -142,7 +145,7 @@ class FrictionCurve:
         return {
             "parameters": found,
             "covariance": self.covariance.tolist(),
-            "dof": self.dof,
+            "dof": self.dof.tolist(),
             "places": self.places.tolist(),
             "speed": list(self.speed),
             "residual": self.residual,
@@ -215,7 +218,7 @@ def friction_curve(
         )
     at = _places(motion.position[used], places)
     names, columns = _columns(motion, directions, at)
-    found = regress(columns, motion.input, used)
+    found = regress(columns, motion.input, used, motion.kernel.correlation)
     names, found = _with_stribeck(names, columns, motion, used, found, top)
     return _curve(names, found, motion, used, at, block, input, output, kind)
 
@@ -262,7 +265,7 @@ def _with_stribeck(
     amount, speed = full.value[-2:]
     seen = amount > 0 and top * _STRIBECK[0] / 4 < speed < top
     # The speed must be known too: a flat Stribeck curve is a change of the Coulomb friction.
-    limit = t_quantile(0.5 + _SEEN / 2, full.dof) * full.sigma[-2:]
+    limit = full.sigma[-2:] * [t_quantile(0.5 + _SEEN / 2, int(dof)) for dof in full.dof[-2:]]
     return (
         ([*names, "stribeck", "stribeck_speed"], full)
         if seen and amount > limit[0] and speed > limit[1]
@@ -278,12 +281,12 @@ def _stribeck(columns: Floats, motion: SmoothMotion, used: NDArray[np.bool_], to
     v, sign, u = motion.velocity, motion.sign, motion.input
 
     def at(speed: float) -> Regression:
-        return regress(np.column_stack([columns, sign * _decay(v, speed)]), u, used)
+        return regress(np.column_stack([columns, sign * _decay(v, speed)]), u, used, motion.kernel.correlation)
 
     speed = min((top * share for share in _STRIBECK), key=lambda s: at(s).squares)
     for _ in range(_ROUNDS):
         slope = float(at(speed).value[-1]) * sign * _decay_slope(v, speed)
-        full = regress(np.column_stack([columns, sign * _decay(v, speed), slope]), u, used)
+        full = regress(np.column_stack([columns, sign * _decay(v, speed), slope]), u, used, motion.kernel.correlation)
         step = float(np.clip(full.value[-1], -speed / 2, speed))
         speed += step
         if abs(step) < _SETTLED * speed:

@@ -16,6 +16,7 @@ OutputKind = Literal["position", "velocity"]
 
 _HALF_POWER = np.sqrt(np.log(2)) / (2 * np.pi)  # σ of a Gaussian times the frequency at which its power is a half
 _REACH = 6.0  # σ on each side, beyond which a kernel is zero: at 4 its second moment lacks 0.5 %
+_LAGS = 6  # beyond, smoothed white noise is correlated by less than 1e-3
 _SHARPER = 5.0  # times the band: the speed whose sign decides about dry friction
 _SLOWEST = 0.01  # of the highest speed
 _SAMPLES_MIN = 2.0  # σ in samples: below it the sampled derivative of the kernel is wrong
@@ -50,6 +51,16 @@ class SmoothKernel:
     def reach(self) -> int:
         """Samples on each side on which a smoothed value depends."""
         return int(np.ceil(_REACH * self.sigma))
+
+    @property
+    def step(self) -> int:
+        """Samples between those that a regression uses."""
+        return round(self.sigma)
+
+    @property
+    def correlation(self) -> Floats:
+        """Of smoothed white noise at lags of 0, 1, … steps, shape (lags,)."""
+        return np.asarray(np.exp(-((np.arange(_LAGS) * self.step / self.sigma) ** 2) / 4))
 
     def smooth(self, signal: Floats, derivative: int = 0) -> Floats:
         """The smoothed signal or a derivative of it per second, at the samples that have `reach` ones on both sides."""
@@ -129,7 +140,7 @@ class SmoothMotion:
         inner = slice(kernel.reach, len(block) - kernel.reach)
         least = _SLOWEST * float(np.max(np.abs(speed))) if slowest is None else slowest
         way = y if kind == "position" else np.cumsum(y) / block.rate_hz
-        step = slice(None, None, max(round(kernel.sigma), 1))
+        step = slice(None, None, kernel.step)
         return cls(
             input=kernel.smooth(block[input])[step],
             position=way[inner][step],
