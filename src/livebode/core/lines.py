@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, gcd, lcm
+from sys import float_info
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,7 +183,7 @@ def check_window(window: int, rate_hz: float) -> None:
             window=window,
             window_max=WINDOW_MAX,
         )
-    if not (isinstance(rate_hz, (int, float, np.number)) and np.isfinite(rate_hz) and rate_hz > 0):
+    if not (isinstance(rate_hz, (int, float, np.number)) and 0 < rate_hz <= float_info.max):
         raise UsageError(
             "out-of-range",
             f"{rate_hz=} is not a positive number of samples per second",
