@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -93,3 +95,23 @@ def test_friction_that_is_not_described_ends_in_a_sentence() -> None:
     done = livebode("friction", str(recording("emps/DATA_EMPS.mat")), "--input", "vir", "--json")
     assert done.code == 2
     assert json.loads(done.err)["error"]["facts"]["argument"] == "position"
+
+
+def test_a_part_of_the_recording_is_what_another_program_cuts_from_it(tmp_path: Path) -> None:
+    block = _block(0)
+    names = [channel.name for channel in block.channels]
+
+    def read(path: Path, first: int, stop: int, *more: object) -> Any:
+        t = np.arange(first, stop) / RATE_HZ
+        table = np.column_stack([t, *(block[name][first:stop] for name in names)])
+        np.savetxt(path, table, delimiter=",", header=",".join(["time", *names]), comments="", fmt="%.17g")
+        done = livebode("friction", path, "--input", "F", "--position", "x", "--json", *more)
+        assert done.code == 0, done.err
+        return json.loads(done.out)["parameters"]
+
+    half = len(block) // 2
+    whole = read(tmp_path / "a.csv", 0, len(block), "--from", f"{len(block) - half} samples")
+    assert whole == read(tmp_path / "b.csv", len(block) - half, len(block))
+    refused = livebode("friction", tmp_path / "a.csv", "--input", "F", "--position", "x", "--to", "3 periods")
+    assert refused.code == 2
+    assert "no periods" in refused.err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -13,7 +14,10 @@ from livebode.core import Block, RecordError, UsageError
 from livebode.locations import Location
 from livebode.motion.smooth_motion import OutputKind
 from livebode.records import RunRecord
-from livebode.sources import open_log
+from livebode.sources import Log, open_log
+
+ChoosePart = Callable[[Axis | None, Log], Log]
+"""The part to use of a recording, of which the configuration is known or not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,21 +47,25 @@ def read_strokes(
     angle: str | None = None,
     rate_hz: float | None = None,
     time: str | None = None,
+    part: ChoosePart | None = None,
 ) -> MotionSamples:
     """The longest stretch without gaps of a recording, or of that of a configuration or a run.
 
-    The channels and the reading are those of the configuration or the run, unless they are given here.
+    The channels and the reading are those of the configuration or the run, unless they are given here. `part` chooses
+    the part of the recording; default: all of it.
 
     Raises
     ------
     UsageError
-        If a channel is not known, or it is not known whether the output is a position or a velocity.
+        If a channel is not known, or it is not known whether the output is a position or a velocity, or the part has no
+        samples.
     RecordError
         If the run is not from a recording.
     RecordingError, SignalError
         If the recording cannot be read, or has no stretch without gaps.
     """
-    log, settings, run = _configured(target)
+    log, axis, run = _configured(target)
+    settings: dict[str, Any] = {} if axis is None else axis.model_dump(exclude_none=True)
     signals = settings.get("signals", {})
     torque = input or signals.get("input")
     if torque is None:
@@ -82,21 +90,23 @@ def read_strokes(
         dbc=source.get("dbc"),
         channels=[output],
     )
+    if part is not None:
+        opened = part(axis, opened)
     block, recorded = clean_stretch(opened, [name for name in dict.fromkeys([torque, output, turned]) if name])
     given: Literal["position", "velocity"] | None = "position" if position else "velocity" if velocity else None
     kind = given or _kind(block, output)
     return MotionSamples(block, torque, output, kind, recorded, run, settings, turned)
 
 
-def _configured(target: Location) -> tuple[Location, dict[str, Any], Path | None]:
-    """The recording, the sections of the configuration, and the directory of the run."""
+def _configured(target: Location) -> tuple[Location, Axis | None, Path | None]:
+    """The recording, the configuration, and the directory of the run."""
     if isinstance(target, Path) and target.is_dir():
         axis = _recorded_axis(target)
         run = target
     elif target.suffix.lower() == ".toml" and isinstance(target, Path):
         axis, run = Axis.read(target), None
     else:
-        return target, {}, None
+        return target, None, None
     logs = axis.source.logs
     if len(logs) != 1:
         raise UsageError(
@@ -105,7 +115,7 @@ def _configured(target: Location) -> tuple[Location, dict[str, Any], Path | None
             "name a recording",
             value=len(logs),
         )
-    return logs[0], axis.model_dump(exclude_none=True), run
+    return logs[0], axis, run
 
 
 def _recorded_axis(run: Path) -> Axis:

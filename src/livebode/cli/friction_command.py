@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from livebode.cli import terminal
-from livebode.cli.options import Json, Rate, Time
+from livebode.cli.options import From, Json, Rate, Time, To
 from livebode.cli.remote import results_directory
 from livebode.core import OutputError
 from livebode.core.writing import writing
@@ -35,6 +35,8 @@ def friction_command(
     ] = None,
     position: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Position of the axis.")] = None,
     velocity: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Velocity of the axis.")] = None,
+    from_: From = None,
+    to: To = None,
     rate: Rate = None,
     time: Time = None,
     places: Annotated[
@@ -60,10 +62,12 @@ def friction_command(
     from livebode.analysis.friction import friction_of
     from livebode.analysis.strokes import read_strokes
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
+    from livebode.preparation.part import motion_part
     from livebode.records import to_json
 
     strokes = read_strokes(
-        location(target), input=input, position=position, velocity=velocity, rate_hz=rate, time=time
+        location(target), input=input, position=position, velocity=velocity, rate_hz=rate, time=time,
+        part=motion_part(from_, to),
     )  # fmt: skip
     found = friction_of(strokes, places=places, band_hz=band, slowest=slowest)
     into = picture or (None if strokes.run is None else results_directory(strokes.run) / "friction.png")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from livebode.cli import terminal
-from livebode.cli.options import Json, Rate, Time
+from livebode.cli.options import From, Json, Rate, Time, To
 from livebode.cli.remote import results_directory
 from livebode.core import OutputError, UsageError
 from livebode.core.writing import writing
@@ -48,6 +48,8 @@ def orders_command(
         str | None,
         typer.Option(metavar="HZ", help="Lines of an excitation or the mains, which are not orders: 20,40,50."),
     ] = None,
+    from_: From = None,
+    to: To = None,
     rate: Rate = None,
     time: Time = None,
     table: Annotated[
@@ -68,11 +70,13 @@ def orders_command(
     from livebode.analysis.strokes import read_strokes
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.configuration.orders_section import OrdersSection
+    from livebode.preparation.part import motion_part
     from livebode.records import to_json
 
     motion = read_strokes(
-        location(target), input=input, position=position, velocity=velocity, angle=angle, rate_hz=rate, time=time
-    )
+        location(target), input=input, position=position, velocity=velocity, angle=angle, rate_hz=rate, time=time,
+        part=motion_part(from_, to),
+    )  # fmt: skip
     section = OrdersSection.model_validate(motion.settings.get("orders", {}))
     found = orders_of(
         motion,

@@ -31,6 +31,25 @@ def configured_part(axis: Axis, log: Log) -> Log:
     return chosen_part(log, source.from_, source.to, source.skip_periods, periods_in)
 
 
+def motion_part(begin: str | None, end: str | None) -> Callable[[Axis | None, Log], Log]:
+    """Chooses the part from `begin` to `end` of strokes, which have no periods; without limits that of [source]."""
+
+    def no_periods(_: Log) -> tuple[int, int]:
+        raise UsageError(
+            "conflict",
+            "strokes have no periods of an excitation",
+            "give the part in seconds or samples",
+            argument="from" if begin else "to",
+        )
+
+    def chosen(axis: Axis | None, log: Log) -> Log:
+        if begin or end:
+            return chosen_part(log, begin, end, 0, no_periods)
+        return log if axis is None else configured_part(axis, log)
+
+    return chosen
+
+
 def chosen_part(
     log: Log, begin: float | str | None, end: float | str | None, skip_periods: int, periods_in: FindPeriods
 ) -> Log:
