@@ -96,6 +96,7 @@ def test_a_refusal_is_repeated_and_a_permanent_one_is_counted(tmp_path: Path) ->
         receiver.code = 200
         axis.change(2.0, 3)
         until(lambda: len(receiver.posted) == 2, "the event after it")
+        until(lambda: axis.counts("hook")["events_delivered"] == 2, "its answer")
         counts = axis.counts("hook")
     assert (counts["events_delivered"], counts["events_refused"]) == (2, 1)
 
