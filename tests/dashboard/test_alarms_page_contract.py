@@ -179,7 +179,7 @@ def test_the_wall_mode_is_read_from_three_metres_and_ends_with_escape(tab: Tab) 
     assert page.locator("button:visible, input:visible, select:visible").count() == 0, "nothing to operate"
     assert tab.js("document.documentElement.scrollWidth <= 1920 && document.documentElement.scrollHeight <= 1080")
     page.locator(".wall-sentence", has_text="belt 2.0 % softer").wait_for()
-    page.reload()
+    tab.reload()
     tab.until("window.livebode?.wall.on && bode.curves.measured")
     page.keyboard.press("Escape")
     assert not page.locator("#wall").is_visible()

@@ -311,8 +311,7 @@ def test_zoom_options_and_cursors_survive_a_reload(tab: Tab) -> None:
     tab.js("(bode.go(70), bode.place(false), bode.go(100), bode.place(true))")
     tab.js("(bode.zooming.along(1, [-120, 30]), bode.zoom([40, 110]))")
     before = tab.js("[bode.sight, bode.zooming.heights, bode.cursors.hz, bode.view.options, page.quantity]")
-    tab.page.wait_for_timeout(600)  # the address follows with a pause, as browsers limit its changes
-    tab.page.reload()
+    tab.reload()
     tab.until("window.livebode?.bode.drawn.measured && bode.curves.measured.frame.quantity === 'open loop'")
     after = tab.js("[bode.sight, bode.zooming.heights, bode.cursors.hz, bode.view.options, page.quantity]")
     assert json.loads(json.dumps(after)) == before
@@ -381,8 +380,7 @@ def test_references_have_names_and_survive_another_quantity_and_a_reload(tab: Ta
     tab.page.keyboard.press("Escape")
     tab.page.locator("#legend button", has_text="with <b>load</b>").wait_for()
     show(tab, "open loop")
-    tab.page.wait_for_timeout(600)  # the address follows with a pause, as browsers limit its changes
-    tab.page.reload()
+    tab.reload()
     tab.until("window.livebode?.bode.drawn['reference 2']?.db && bode.drawn.measured && bode.drawn.model")
     assert tab.page.locator("#legend [data-name='reference 2']").inner_text() == "with <b>load</b>"
     feedback = LoopSection.model_validate(LOOP).build(RATE_HZ).feedback_at(F)

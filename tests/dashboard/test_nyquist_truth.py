@@ -237,7 +237,7 @@ def test_what_if_is_the_loop_times_the_filter_in_every_quantity(tab: Tab, run: P
         assert np.allclose(radius, 3 * bound, rtol=2e-3, atol=1e-4), quantity
     tab.page.locator('#quantities [data-value="plant"]').click()
     tab.until("bode.curves.measured?.frame.quantity === 'plant' && bode.drawn.measured && !bode.curves['what if']")
-    tab.page.reload()
+    tab.reload()
     tab.until("window.livebode?.bode.filter")
     assert tab.js("bode.filter") == TRIED
     tab.page.locator("#what-if").click()
@@ -289,7 +289,7 @@ def test_a_reload_keeps_the_plot_and_its_neighbourhood_of_minus_one(tab: Tab) ->
     tab.page.locator("#near").click()
     tab.until("location.hash.includes('nyquist-box')")
     assert tab.js("bode.plane.sight") == [[-2.5, 0.5], [-1.5, 1.5]]
-    tab.page.reload()
+    tab.reload()
     tab.until("window.livebode?.bode.plane?.traced.length === 2")
     assert tab.js("bode.plane.kind") == "nyquist"
     assert tab.js("bode.plane.sight") == [[-2.5, 0.5], [-1.5, 1.5]]

@@ -210,7 +210,7 @@ def test_the_tracking_plot_zooms_in_time_with_data_of_the_record(tab: Tab, whole
     page.locator("#tab-margins").click()
     tab.until("marginTrends.items.get('margins\\0phase_margin').made?.scales.x.max === page.zoom[1]")
 
-    page.reload()
+    tab.reload()
     tab.until("window.livebode && page.zoom && bode.curves.measured && page.seen?.[1] === page.zoom[0]")
     assert tab.js("page.zoom") == pytest.approx([from_s, to_s], abs=1e-3)
     page.mouse.move(x[0] + 100, y)

@@ -95,6 +95,14 @@ class Tab:
     def __exit__(self, *_: object) -> None:
         self.context.close()
 
+    def reload(self) -> None:
+        """Load the page again, once its address holds every choice: a page changes its address only so often."""
+        self.page.evaluate(
+            "async () => { const { link } = await import('/static/address.js');"
+            " while (link() !== location.href) await new Promise((done) => setTimeout(done, 20)); }"
+        )
+        self.page.reload()
+
     def until(self, expression: str) -> None:
         """Wait for JavaScript to become true; before the page has loaded its parts, their names are not defined."""
         self.page.wait_for_function(
