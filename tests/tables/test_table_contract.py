@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import duckdb
 import numpy as np
 import pyarrow as pa
@@ -96,3 +98,11 @@ def test_a_misfit_of_columns_and_schema_is_an_error() -> None:
         example().text("u")
     with pytest.raises(KeyError, match="missing"):
         example()["missing"]
+
+
+def test_without_nanoarrow_an_exchange_names_the_extra_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    arrow = pa.table({"t": [0.5]})
+    monkeypatch.setitem(sys.modules, "nanoarrow", None)
+    monkeypatch.delitem(sys.modules, "livebode.tables.exchange", raising=False)
+    with pytest.raises(ModuleNotFoundError, match=r"nanoarrow, which is not installed.*livebode\[parquet\]"):
+        Table.from_arrow(arrow)

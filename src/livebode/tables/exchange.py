@@ -7,15 +7,20 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
-import nanoarrow as na
 import numpy as np
-from nanoarrow.c_schema import c_schema_view
 from numpy.typing import NDArray
 
 from livebode.tables.record_batch import buffers_of
 from livebode.tables.schema import KINDS, STRING, Field, Schema
 from livebode.tables.table import Column, Table
 from livebode.tables.text import Text
+
+try:
+    import nanoarrow as na
+    from nanoarrow.c_schema import c_schema_view
+except ModuleNotFoundError as error:
+    message = "an exchange of tables needs nanoarrow, which is not installed; install livebode[parquet]"
+    raise ModuleNotFoundError(message, name=error.name) from None
 
 _TEXTS: dict[str, np.dtype[Any]] = {"string": np.dtype("int32"), "large_string": np.dtype("int64")}
 """Types of text with the type of their offsets."""

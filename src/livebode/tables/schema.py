@@ -87,6 +87,6 @@ class Schema:
         return len(self.fields)
 
     def __arrow_c_schema__(self) -> object:
-        from livebode.tables.exchange import schema_to_arrow  # nanoarrow is loaded where tables are exchanged
+        from livebode.tables.exchange import schema_to_arrow  # of the extra parquet
 
         return schema_to_arrow(self).__arrow_c_schema__()

@@ -71,12 +71,14 @@ class Table:
 
         Raises
         ------
+        ImportError
+            If nanoarrow, of the extra `parquet`, is not installed and the data are not a Table.
         TypeError
             If a column contains neither numbers, truth values nor text.
         """
         if isinstance(data, Table):
             return data
-        from livebode.tables.exchange import from_arrow  # nanoarrow is loaded where tables are exchanged
+        from livebode.tables.exchange import from_arrow  # of the extra parquet
 
         return from_arrow(data)
 
