@@ -98,6 +98,14 @@ def _moving(seed: int, seconds: float, *faults: TensionLoss) -> Callable[[], Tab
     )
 
 
+def _tuned() -> Table:
+    """An axis at standstill, excited from below its bandwidth to beyond its resonance."""
+    lines = Lines.parse("4:100:2, 104:400:8", _RATE_HZ, 2000)
+    return _simulated(
+        _SIGNALS, motion=_HELD, excitation_n_m=multisine(lines, 0.2), seconds=8.0, run_in_s=10.0, seed=10
+    )()
+
+
 def _single_chirp() -> Table:
     period = chirp(10, 200, _RATE_HZ, 3 * int(_RATE_HZ), 2.0)
     return _simulated(_SIGNALS, motion=_HELD, excitation_n_m=period, seconds=3.0, seed=6)()
@@ -185,6 +193,12 @@ EXAMPLES = {
         {"loop.parquet": _standstill(5)},
         ("loop.toml",),
         ("livebode run loop.toml", "livebode margins runs/loop"),
+    ),
+    "tune": Example(
+        "an axis whose described controllers are checked and tuned",
+        {"tune.parquet": _tuned},
+        ("tune.toml",),
+        ("livebode run tune.toml", "livebode check-loop runs/tune", "livebode tune runs/tune"),
     ),
     "design": Example(
         "before an experiment: a recording without excitation, and the description of a machine",
