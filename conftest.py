@@ -11,6 +11,8 @@ Half a million objects of modules and tests live from the collection to the end.
 them: a sixth of the time of a collection was its search through them. For what tests make it comes a tenth as often:
 they make much that they keep to their end, and memory is there.
 
+A generated example has no time limit: on a busy computer it measures the neighbours.
+
 Ctrl-C reaches the processes that tests start. A shell lets what it starts in the background ignore it, and they would
 inherit that: a test would never see the end of a command.
 """
@@ -26,6 +28,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from _pytest.doctest import DoctestModule
+from hypothesis import settings
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -33,6 +36,8 @@ if TYPE_CHECKING:
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+settings.register_profile("livebode", settings(), deadline=None)  # with what Hypothesis sets in CI
+settings.load_profile("livebode")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
