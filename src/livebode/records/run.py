@@ -117,8 +117,8 @@ class RunRecord:
     ) -> RunRecord:
         """The run in this directory; with `output_only` also one without responses, of which `lines` raises KeyError.
 
-        With `matrix` it may be a matrix run. With `entry`, such as "velocity2/u1", it must be one, and the result is the
-        view of that entry.
+        With `matrix` it may be a matrix run. With `entry`, such as "velocity2/u1", it must be one, and the result is
+        the view of that entry.
 
         Raises
         ------
@@ -210,8 +210,8 @@ class RunRecord:
         none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
         return MatrixResponses.join(list(self.matrix_batches()) or list(none))
 
-    def matrix_batches(self) -> Iterator[MatrixResponses]:
-        """All readable matrices in order, in parts of bounded size.
+    def matrix_batches(self, size_bytes_max: int | None = None) -> Iterator[MatrixResponses]:
+        """All readable matrices in order, in parts of bounded size; or the newest, from files up to this size.
 
         Raises
         ------
@@ -226,7 +226,7 @@ class RunRecord:
                 path=str(self.path),
             )
         shape = matrix_shape(self.summary, self.lines)
-        responses = self._whole(self.tables("responses"), shape.response_rows, (MATRIX_SCHEMA.names,))
+        responses = self._whole(self.tables("responses", size_bytes_max), shape.response_rows, (MATRIX_SCHEMA.names,))
         covariance = self._whole(self.tables("covariance"), shape.covariance_rows, (COVARIANCE_SCHEMA.names,))
         yield from matrices(responses, covariance, shape)
 
