@@ -141,7 +141,7 @@ def test_a_live_source_gives_what_the_recording_gives(block: Block, recorded: Pa
         input = ["u1", "u2"]
         excitation = ["w1", "w2"]
         [lines]
-        frequencies = "10:40:10"
+        frequencies = "10:60:5"
         window = 800
         [tracking]
         hop = 200

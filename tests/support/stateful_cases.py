@@ -190,7 +190,7 @@ def matrix_columns() -> Case:
 
     return Case(
         lambda: MatrixColumns(inputs, lines),
-        [lambda stage, part=part: step(stage, part) for part in (matrices[:1], matrices[1:], matrices[0:0])],
+        [lambda stage, part=part: step(stage, part) for part in (matrices[:1], matrices[1:2], matrices[2:])],
         [lambda: MatrixColumns(inputs, lines + 1)],
     )
 
