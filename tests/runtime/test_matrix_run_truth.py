@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import livebode
+from livebode.configuration import Axis
+from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Block, Channel, ConfigError, RecordError, SignalError
 from livebode.mimo import MatrixSettings, MatrixTracker
 from livebode.records import RunRecord
@@ -87,6 +89,11 @@ def test_an_entry_reads_as_an_ordinary_run(recorded: Path) -> None:
         assert view.average.valid.all()
     fit = livebode.Run(recorded, entry="velocity1/u1")
     assert fit.average.frequency_hz.tolist() == LINES.frequency_hz.tolist()
+
+
+def test_the_recorded_configuration_is_that_of_the_run(recorded: Path, log: Path) -> None:
+    words = recorded_configuration(RunRecord.open(recorded, matrix=True).summary)
+    assert Axis.of(words, "run.json").signals == gantry_axis(log).signals
 
 
 def test_where_one_entry_is_needed_the_error_names_them(recorded: Path, tmp_path: Path) -> None:
