@@ -153,7 +153,7 @@ class _Factors:
     def _append(self, table: Table) -> None:
         shape = (table.num_rows // self._shape.covariance_rows, *self._value.shape[1:])
         value = _complex(table, shape)
-        sample = table["sample"].reshape(len(value), -1)[:, 0]
+        sample = table["sample"][:: self._shape.covariance_rows]
         self._sample = np.concatenate([self._sample, sample])
         self._value = np.concatenate([self._value, value])
 
