@@ -46,12 +46,14 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86, spe
     jobs: list[tuple[str, str, list[str]]] = [(name, name, []) for name in ("twiddle", "machine")]
     if not spectra64:
         jobs += [(f"lines/{name}", name, []) for name in ("lines", "rows", "sizes")]
+        jobs += [("matrix/matrix", "matrix", []), ("matrix/matrices", "matrices", [])]
         jobs += [(f"repeating/{name}", name, []) for name in ("numbers", "hum", "distortion", "periods")]
         table = "nearest", "number", "moment", "read", "shortest", "write", "runs"
         jobs += [(f"table/{name}", f"table_{name}", []) for name in table]
     for name, isa in SETS.items() if dispatch else ():
         jobs.append(("lines/rows", f"rows_{name}", [f"-DLB_LINES_NAME=lb_lines_{name}", *isa]))
         jobs.append(("lines/sizes", f"sizes_{name}", [f"-DLB_SIZES_NAME=lb_sizes_{name}", *isa]))
+        jobs.append(("matrix/matrices", f"matrices_{name}", [f"-DLB_MATRIX_NAME=lb_matrix_{name}", *isa]))
     for bits in (64,) if spectra64 else (32, 64):
         jobs += [(name, f"{name}{bits}", [f"-DLB_BITS={bits}"]) for name in TYPED]
         for name, isa in SETS.items() if dispatch else ():
@@ -137,8 +139,9 @@ def test_wide_objects_use_wide_registers(built):
             (file,) = (f for f in built[2] if f.name == f"tile{bits}_{name}.o")
             assembly = run(needed("objdump"), "-d", file)
             assert len(re.findall(rf"vmul{suffix} .*%{register}", assembly)) > 20
-        (file,) = (f for f in built[2] if f.name == f"rows_{name}.o")
-        assert len(re.findall(rf"vdivpd .*%{register}", run(needed("objdump"), "-d", file))) > 5
+        for stage, least in (("rows", 5), ("matrices", 1)):
+            (file,) = (f for f in built[2] if f.name == f"{stage}_{name}.o")
+            assert len(re.findall(rf"vdivpd .*%{register}", run(needed("objdump"), "-d", file))) > least
 
 
 def test_undefined_symbols_are_few_and_known(built):
@@ -169,7 +172,7 @@ def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factor
         (tmp_path / f"run {name}").mkdir()
         hashes[name] = tuple(
             program(tmp_path / f"run {name}", compiler, objects, part)
-            for part in ("bits", "lines", "repeating", "table")
+            for part in ("bits", "lines", "matrix", "repeating", "table")
         )
     assert len(set(hashes.values())) == 1, hashes
 
@@ -200,6 +203,7 @@ def test_sanitizers_find_nothing(tmp_path):
     program(tmp_path, compiler, objects, "misuse", *sanitize)
     program(tmp_path, compiler, objects, "bits", *sanitize)
     program(tmp_path, compiler, objects, "lines", *sanitize)
+    program(tmp_path, compiler, objects, "matrix", *sanitize)
     program(tmp_path, compiler, objects, "repeating", *sanitize)
     program(tmp_path, compiler, objects, "table", *sanitize)
 

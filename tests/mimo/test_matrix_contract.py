@@ -35,11 +35,13 @@ def tracker(**options: object) -> MatrixTracker:
 ORTHOGONAL = np.tile(MatrixExcitation.orthogonal(LINES, 2).samples, 4)
 
 
+@pytest.mark.parametrize("experiments", [None, 1])
 @pytest.mark.parametrize("size", [1, 37, 50, 411, 1600])
-def test_the_matrices_do_not_depend_on_how_the_samples_are_cut(size: int) -> None:
+def test_the_matrices_do_not_depend_on_how_the_samples_are_cut(size: int, experiments: int | None) -> None:
+    """With one experiment the inputs do not separate, so the singular values decide."""
     whole = block_of(ORTHOGONAL, noise=0.1)
-    expected = tracker().process(whole)
-    cut = tracker()
+    expected = tracker(experiments=experiments).process(whole)
+    cut = tracker(experiments=experiments)
     found = MatrixResponses.join(
         [cut.process(whole.cut(i, min(i + size, len(whole)))) for i in range(0, len(whole), size)]
     )
@@ -97,6 +99,12 @@ def test_inputs_that_move_together_are_invalid_with_the_reason() -> None:
     assert "moves together with others" in together.why()[0]
     assert "7 lines from 10 to 40 Hz" in together.why()[0]
     assert np.isnan(together.value).all()
+
+
+@pytest.mark.parametrize("condition_max", [1e3, 1e12])
+def test_one_experiment_does_not_separate_two_inputs_whatever_the_limit(condition_max: float) -> None:
+    found = tracker(experiments=1, condition_max=condition_max).process(block_of(ORTHOGONAL))
+    assert not found.valid.any()
 
 
 def test_noise_on_inputs_that_move_together_does_not_separate_them() -> None:

@@ -60,17 +60,21 @@ def test_without_noise_every_estimator_gives_the_sampled_plant(kind: str, estima
     assert np.nanmax(responses.sigma[valid] / np.abs(TRUTH)) < 1e-9
 
 
-def test_the_best_linear_approximation_of_the_whole_recording_is_the_mean_of_the_tracker() -> None:
+@pytest.mark.parametrize(("experiments", "memory", "dof"), [(2, 4, 6), (4, 2, 4)])
+def test_the_best_linear_approximation_of_the_whole_recording_is_the_mean_of_the_tracker(
+    experiments: int, memory: int, dof: int
+) -> None:
     """An offline oracle: FFTs of the settled periods, and least squares over all of them with w as instrument."""
     block = recording("orthogonal", 4, noise=0.05)
-    found = MatrixTracker(settings(average=True, memory=4, hop=200)).process(block)[-1:]
+    options = {"experiments": experiments, "memory": memory, "hop": 200}
+    found = MatrixTracker(settings(average=True, **options)).process(block)[-1:]
     periods = block.data.reshape(7, 8, SETTLE + 2, 200)[:, :, -1]
     spectra = np.fft.fft(periods, axis=2)[:, :, list(LINES.bins)]
     w, u, y = spectra[:2], spectra[2:4], spectra[4:]
     for k in range(len(LINES)):
         oracle = y[:, :, k] @ w[:, :, k].conj().T @ np.linalg.inv(u[:, :, k] @ w[:, :, k].conj().T)
         assert np.allclose(found.value[0, k], oracle, rtol=1e-9, atol=1e-9 * np.abs(oracle).max())
-    assert found.dof[0] == 6
+    assert found.dof[0] == dof
 
 
 def test_bounds_of_each_entry_cover_the_truth_as_stated() -> None:

@@ -53,7 +53,8 @@ class MatrixResponses(RowArrays):
         Multiple coherence of each output with all inputs, shape (rows, lines, outputs), between 0 and 1.
     condition
         Condition number of the inputs over the experiments, each input scaled to the same power over all lines, shape
-        (rows, lines). 1: they are orthogonal; large: they move together.
+        (rows, lines). 1: they are orthogonal; large: they move together. For more than two inputs it is an upper bound,
+        at most inputs / 2 times too large, and exact where a column is invalid.
     reason
         Number in `REASONS`, shape (rows, lines, inputs): 0 where the column is valid.
     first, sample

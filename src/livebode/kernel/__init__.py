@@ -1,7 +1,8 @@
-"""The sliding DFT, the line stage, the verdicts on lines and the fit in C, and their NumPy twins, the definitions.
+"""The sliding DFT, the stages of lines and of matrices, the verdicts on lines and the fit in C, and their NumPy twins.
 
-The twins are `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.estimation.repeating_twin`,
-`livebode.kernel.fit_twin`, `livebode.kernel.belt_twin` and `livebode.kernel.runs_twin`.
+The twins are the definitions: `livebode.kernel.twin`, `livebode.kernel.line_twin`, `livebode.kernel.matrix_twin`,
+`livebode.estimation.repeating_twin`, `livebode.kernel.fit_twin`, `livebode.kernel.belt_twin` and
+`livebode.kernel.runs_twin`.
 """
 
 from livebode.kernel._belt import (
@@ -51,6 +52,7 @@ from livebode.kernel._lines import (
     process_each,
     process_lines,
 )
+from livebode.kernel._matrix import MatrixHistory, MatrixRows, MatrixStage, MatrixWindows, process_matrices
 from livebode.kernel._repeating import (
     ADDED,
     FORGOTTEN,
@@ -111,6 +113,10 @@ __all__ = [
     "LineWindows",
     "MarginGrid",
     "MarginRows",
+    "MatrixHistory",
+    "MatrixRows",
+    "MatrixStage",
+    "MatrixWindows",
     "NewestWindows",
     "PeriodSpectra",
     "PeriodState",
@@ -141,6 +147,7 @@ __all__ = [
     "largest_sizes",
     "process_each",
     "process_lines",
+    "process_matrices",
     "read_rows",
     "write_rows",
 ]

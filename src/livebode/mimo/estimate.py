@@ -26,15 +26,20 @@ class Windows:
     Attributes
     ----------
     output, denominator, reference
-        Shapes (rows, lines, repetitions, signals, experiments).
+        Shapes (rows, lines, repetitions, signals, experiments). A reference that is None is the mean of the denominator
+        over the repetitions. With as many experiments as references, this is the estimate of any reference that is the
+        same in all repetitions: S_yr·S_dr⁻¹ = (Ȳ·R*)·(D̄·R*)⁻¹ = Ȳ·D̄⁻¹ with means over the repetitions.
     count
         Repetitions without a gap, shape (rows,).
+    excitation
+        Of which it is verified that they are different experiments; None: it is not.
     """
 
     output: Complex
     denominator: Complex
-    reference: Complex
+    reference: Complex | None
     count: NDArray[np.int64]
+    excitation: Complex | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,16 +65,21 @@ def estimate(windows: Windows, average: bool, condition_max: float) -> Estimate:
     newest_only = 1 if not average else 0
     used = np.where(windows.count > 0, windows.count if average else 1, 0)
     part = slice(None) if average else slice(0, 1)
-    y, d, r = (
-        _side_by_side(_only(s[:, :, part], used)) for s in (windows.output, windows.denominator, windows.reference)
-    )
     scatter, dof = _scatter(windows, np.arange(repetitions) >= newest_only)
     outputs = windows.output.shape[3]
-    mean = _only(windows.denominator[:, :, part], used).sum(axis=2) / np.maximum(used, 1)[:, None, None, None]
+    mean = _mean(windows.denominator[:, :, part], used)
     kept, condition, reason = _separation(mean, scatter[:, :, outputs:, outputs:], dof, used, condition_max)
-    if windows.reference is not windows.denominator:
-        excitation = _only(windows.reference[:, :, part], used).sum(axis=2) / np.maximum(used, 1)[:, None, None, None]
-        reason[(reason == 0).all(axis=2) & ~_separates(excitation, condition_max)] = 3
+    if windows.excitation is not None:
+        apart = separates(_mean(windows.excitation[:, :, part], used), condition_max)
+        reason[(reason == 0).all(axis=2) & ~apart] = 3
+    if windows.reference is None:
+        y, d, r = _mean(windows.output[:, :, part], used), mean, mean
+        of_one = 1.0 / np.maximum(used, 1)
+    else:
+        y, d, r = (
+            _side_by_side(_only(s[:, :, part], used)) for s in (windows.output, windows.denominator, windows.reference)
+        )
+        of_one = np.ones(len(used))
     solution = _solution(d, r, kept, reason)
     value = y @ solution
     known = np.where(reason[:, :, None, :] == 0, value, 0.0)
@@ -77,11 +87,17 @@ def estimate(windows: Windows, average: bool, condition_max: float) -> Estimate:
     with np.errstate(invalid="ignore", divide="ignore"):
         noise = rest @ scatter @ _star(rest) / np.where((dof > 0) & (used > 0), dof, np.nan)[:, None, None, None]
         own = np.maximum(np.einsum("rkoo->rko", noise).real, 0.0)
-        signal = np.sum(np.abs(known @ d) ** 2, axis=3) / (np.maximum(used, 1) * experiments)[:, None, None]
+        number = experiments * (1 if windows.reference is None else np.maximum(used, 1))
+        signal = np.sum(np.abs(known @ d) ** 2, axis=3) / np.reshape(number, (-1, 1, 1))
         coherence = signal / (signal + own)
-    spread = _star(solution) @ solution
+    spread = _star(solution) @ solution * of_one[:, None, None, None]
     spread = np.swapaxes(spread, 2, 3)  # E δ_i·conj(δ_j) is that of the rows of P
     return Estimate(value, noise, spread, dof, coherence, condition, reason)
+
+
+def _mean(spectra: Complex, used: NDArray[np.int64]) -> Complex:
+    """Of each experiment over the repetitions, shape (rows, lines, signals, experiments)."""
+    return np.asarray(_only(spectra, used).sum(axis=2) / np.maximum(used, 1)[:, None, None, None])
 
 
 def _star(matrix: Complex) -> Complex:
@@ -137,7 +153,7 @@ def _separation(
     return projection, condition, reason
 
 
-def _separates(excitation: Complex, condition_max: float) -> Flags:
+def separates(excitation: Complex, condition_max: float) -> Flags:
     """Whether the excitations are as different over the experiments as inputs must be, shape (rows, lines).
 
     They are not where `dwell` or `start` is not that of the recording; the inputs may differ there by transients.

@@ -125,8 +125,9 @@ class MatrixSettings:
         indirect need as many excitations as inputs.
     estimator
         "direct": G = S_yu·S_uu⁻¹, biased in closed loop by noise that feedback carries into u. "joint":
-        G = S_yw·S_uw⁻¹, unbiased in closed loop. "indirect": G = T·(E − F·T)⁻¹ with T = S_yw·S_ww⁻¹, biased by every
-        error in the description of the controllers.
+        G = S_yw·S_uw⁻¹, unbiased in closed loop; with as many experiments as inputs w cancels, and only shows whether
+        the experiments are different. "indirect": G = T·(E − F·T)⁻¹ with T = S_yw·S_ww⁻¹, biased by every error in the
+        description of the controllers.
     loop
         The controllers, and when signals were logged.
     experiments

@@ -8,14 +8,24 @@ from numpy.typing import NDArray
 from livebode.core import Block, Emit, Event, MatrixResponses, SignalError, Stage, StatefulBase, hand_over, ignore
 from livebode.estimation.spectra import LineSpectra, SpectraRows
 from livebode.estimation.watch import InputStatistics
-from livebode.mimo.estimate import Estimate, Windows, estimate
+from livebode.kernel import (
+    MatrixHistory,
+    MatrixRows,
+    MatrixStage,
+    MatrixWindows,
+    chosen_instruction_set,
+    process_matrices,
+)
+from livebode.mimo.estimate import Estimate, Windows, estimate, separates
 from livebode.mimo.settings import MatrixSettings
 
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
-_VALUES_MAX = 1 << 20
-"""Complex numbers that are gathered at once: 16 MiB."""
+_AT_ONCE = 128
+"""Rows that are computed at once; the ring of windows has room for them."""
+_VALUES_MAX = 1 << 21
+"""Numbers that are gathered at once for singular values: 16 MiB."""
 
 
 class MatrixTracker(StatefulBase):
@@ -48,23 +58,40 @@ class MatrixTracker(StatefulBase):
     True
     """
 
-    _stage = Stage("matrix-tracker", 1)
-    _STATE = ("_spectra", "_watch", "_past", "_complete")
+    _stage = Stage("matrix-tracker", 2)
+    _STATE = ("_spectra", "_watch", "_past", "_complete", "_next", "_apart")
 
     def __init__(self, settings: MatrixSettings) -> None:
         self.settings = s = settings
         self._events: list[Event] = []
-        roles = ["output"] * len(s.output)
-        roles += [] if s.estimator == "indirect" else ["input"] * len(s.input)
-        roles += ["excitation"] * (len(s.channels) - len(roles))
+        outputs, inputs = len(s.output), len(s.columns)
+        # With as many experiments as inputs, the estimate does not depend on the reference (`Windows`), which then
+        # shows whether the experiments are different; of one input there is nothing to show.
+        self._referenced = s.estimator == "joint" and s.count != inputs
+        self._channels = s.channels if self._referenced or inputs > 1 else s.channels[: outputs + inputs]
+        roles = ["output"] * outputs + ["excitation" if s.estimator == "indirect" else "input"] * inputs
+        roles += ["excitation"] * (len(self._channels) - len(roles))
         advanced = np.array([s.loop.timing.advance_ticks(role) for role in roles])  # type: ignore[arg-type]
         bins = np.array(s.lines.bins)
         plain = np.zeros(len(roles), dtype=np.bool_)
         self._spectra = LineSpectra(s.lines.window, bins, s.step, plain, advanced, None)
         self._watch = InputStatistics(self._events, s.lines.window)
-        remembered = s.memory * s.count * s.places
-        self._past = np.zeros((len(roles), remembered, len(bins)), dtype=np.complex128)
-        self._complete = np.zeros(remembered, dtype=np.bool_)
+        self._matrices = MatrixStage(
+            outputs,
+            inputs,
+            len(bins),
+            len(roles) - outputs - inputs,
+            s.count,
+            s.memory,
+            s.places,
+            s.average,
+            s.estimator != "direct",
+            s.condition_max,
+            chosen_instruction_set(),
+        )
+        self._past, self._complete, self._work = MatrixHistory.empty(self._matrices, _AT_ONCE)
+        self._next = 0
+        self._apart = np.ones(len(bins), dtype=np.bool_)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -94,7 +121,7 @@ class MatrixTracker(StatefulBase):
                 rate_hz=block.rate_hz,
                 lines_rate_hz=s.lines.rate_hz,
             )
-        data = block.data[[block.index(name) for name in s.channels]]
+        data = block.data[[block.index(name) for name in self._channels]]
         if self._watch.starts(block):
             self._spectra.restart(block.start)
             self._complete[:] = False
@@ -106,53 +133,90 @@ class MatrixTracker(StatefulBase):
 
     def _responses(self, rows: SpectraRows, block: Block) -> MatrixResponses:
         s = self.settings
-        settled = (rows.sample - s.start) % s.span + 1 >= s.first_place
+        settled = np.flatnonzero((rows.sample - s.start) % s.span + 1 >= s.first_place)
         sample = rows.sample[settled]
-        past = np.concatenate([self._past, rows.spectrum[:, settled]], axis=1)
-        complete = np.concatenate([self._complete, rows.clean[settled]])
-        remembered = len(self._complete)
-        newest = remembered + np.arange(len(sample))
-        each = max(1, _VALUES_MAX // (s.memory * s.count * past.shape[0] * past.shape[2]))
-        parts = [self._estimate(past, complete, newest[i : i + each]) for i in range(0, max(len(newest), 1), each)]
-        self._past, self._complete = past[:, -remembered:].copy(), complete[-remembered:].copy()
-        names = Estimate.__dataclass_fields__
-        joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        found, count = self._estimate(rows, settled)
         used = s.memory if s.average else 1
         middle = sample - (s.lines.window - 1) / 2 - s.span * (s.count - 1) / 2
         if s.average:
-            middle = middle - s.cycle * (self._repetitions(complete, newest) - 1) / 2
+            middle = middle - s.cycle * (count - 1) / 2
         return MatrixResponses(
             s.lines,
             tuple(s.output),
             s.columns,
-            **joined,
+            **vars(found),
             first=sample - s.lines.window + 1 - s.cycle * (used - 1) - s.span * (s.count - 1),
             sample=sample,
             time_s=np.asarray(block.origin_s + middle / block.rate_hz, dtype=np.float64),
         )
 
-    def _before(self, newest: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Rows of the windows at the same place, shape (rows, repetitions, experiments), the newest first."""
-        s = self.settings
-        back = s.places * np.arange(s.memory * s.count).reshape(s.memory, s.count)
-        return np.asarray(newest[:, np.newaxis, np.newaxis] - back)
+    def _estimate(self, rows: SpectraRows, settled: NDArray[np.intp]) -> tuple[Estimate, NDArray[np.int64]]:
+        """Matrices of some rows, and how many repetitions each has."""
+        stage, history = self._matrices, MatrixHistory(self._past, self._complete, self._work)
+        found = MatrixRows.empty(stage, len(settled))
+        reason = np.zeros((*found.sure.shape, stage.inputs), dtype=np.int8)
+        for begin in range(0, len(settled), _AT_ONCE):
+            part = slice(begin, begin + _AT_ONCE)
+            place, some = settled[part].astype(np.int64), found.part(part)
+            process_matrices(stage, history, MatrixWindows(self._next, rows.spectrum, place, rows.clean), some)
+            known = some.complete[:, np.newaxis] > 0
+            reason[part][~known[:, 0]] = 1
+            apart = self._excited_apart(rows.sample[settled[part]], some.complete)
+            unsure = known & (~some.sure | ~apart | self._referenced)
+            if unsure.any():
+                self._replace(some, reason[part], unsure)
+            self._next = (self._next + len(place)) % len(self._complete)
+        values = found.value, found.noise, found.spread, found.dof, found.coherence, found.condition
+        own = Estimate(*values, reason)
+        return (self._through_loop(own) if self.settings.estimator == "indirect" else own), found.complete
 
-    def _repetitions(self, complete: Flags, newest: NDArray[np.intp]) -> NDArray[np.int64]:
-        """How many of the newest repetitions are complete, without one that is not between them."""
-        whole = complete[self._before(newest)].all(axis=2)
-        return np.asarray(np.logical_and.accumulate(whole, axis=1).sum(axis=1))
+    def _excited_apart(self, sample: NDArray[np.int64], complete: NDArray[np.int64]) -> Flags:
+        """Whether the excitations are different experiments, shape (rows, lines), by the first row of each experiment.
 
-    def _estimate(self, past: Complex, complete: Flags, newest: NDArray[np.intp]) -> Estimate:
+        The estimate of as many experiments as inputs does not depend on them. But where `dwell` or `start` is not that
+        of the recording, transients could separate the inputs.
+        """
+        s, stage = self.settings, self._matrices
+        if not stage.beside or self._referenced:
+            return np.ones((len(sample), stage.lines), dtype=np.bool_)
+        begins = np.flatnonzero(((sample - s.start) % s.span + 1 == s.first_place) & (complete > 0))
+        excitation = self._windows(begins, 1)[:, :, 0, stage.outputs + stage.inputs :]
+        known = np.concatenate([self._apart[np.newaxis], separates(excitation, s.condition_max)])
+        found = known[np.searchsorted(begins, np.arange(len(sample)), side="right")]
+        self._apart = known[-1]
+        return np.asarray(found)
+
+    def _replace(self, found: MatrixRows, reason: NDArray[np.int8], unsure: Flags) -> None:
+        """By the estimate with singular values, where it is not sure that the inputs separate."""
+        stage = self._matrices
+        rows = np.flatnonzero(unsure.any(axis=1))
+        each = max(1, _VALUES_MAX // (stage.experiments * stage.repetitions * self._past[0].size))
+        for at in (rows[i : i + each] for i in range(0, len(rows), each)):
+            exact = self._exact(at, found.complete[at])
+            which = np.zeros_like(unsure)
+            which[at] = unsure[at]
+            for name in ("value", "noise", "spread", "coherence", "condition"):
+                getattr(found, name)[which] = getattr(exact, name)[unsure[at]]
+            reason[which] = exact.reason[unsure[at]]
+
+    def _exact(self, at: NDArray[np.intp], complete: NDArray[np.int64]) -> Estimate:
+        """The estimate with singular values of rows, counted from the next place in the ring."""
+        s, stage = self.settings, self._matrices
+        spectra = self._windows(at, s.memory)
+        output, denominator, given = np.split(spectra, (stage.outputs, stage.outputs + stage.inputs), axis=3)
+        reference = given if self._referenced else denominator if s.estimator == "direct" else None
+        excitation = given if stage.beside else None
+        return estimate(Windows(output, denominator, reference, complete, excitation), s.average, s.condition_max)
+
+    def _windows(self, at: NDArray[np.intp], repetitions: int) -> Complex:
+        """Spectra of rows, counted from the next place in the ring.
+
+        Shape (rows, lines, repetitions, signals, experiments), the newest first.
+        """
         s = self.settings
-        count = self._repetitions(complete, newest)
-        # (signals, rows, repetitions, experiments, lines) to (rows, lines, repetitions, signals, experiments)
-        windows = np.ascontiguousarray(past[:, self._before(newest)].transpose(1, 4, 2, 0, 3))
-        outputs, columns = len(s.output), len(s.columns)
-        denominator = windows[:, :, :, outputs : outputs + columns]
-        reference = denominator if s.estimator != "joint" else windows[:, :, :, outputs + columns :]
-        these = Windows(windows[:, :, :, :outputs], denominator, reference, count)
-        found = estimate(these, s.average, s.condition_max)
-        return self._through_loop(found) if s.estimator == "indirect" else found
+        back = s.places * np.arange(repetitions * s.count).reshape(repetitions, s.count)
+        past = self._past[(self._next + at[:, np.newaxis, np.newaxis] - back) % len(self._complete)]
+        return np.asarray((past[:, :, :, :, 0] + 1j * past[:, :, :, :, 1]).transpose(0, 4, 1, 3, 2))
 
     def _through_loop(self, found: Estimate) -> Estimate:
         """G = T·(E − F·T)⁻¹, and dG = (1 + G·F)·dT·(E − F·T)⁻¹; invalid unless all columns of T are valid."""
