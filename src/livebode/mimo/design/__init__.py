@@ -1,0 +1,8 @@
+"""The experiment on several inputs for a machine, its limits, and a required accuracy or the available time."""
+
+from livebode.mimo.design.choose import choose_matrix
+from livebode.mimo.design.machine import MatrixLimits, MatrixMachine, Peak
+from livebode.mimo.design.result import Alternative, MatrixDesign
+from livebode.mimo.design.spec import MatrixSpec
+
+__all__ = ["Alternative", "MatrixDesign", "MatrixLimits", "MatrixMachine", "MatrixSpec", "Peak", "choose_matrix"]
