@@ -87,7 +87,7 @@ def _show_sigma(console: Console, design: MatrixDesign) -> None:
     each = -(-lines // _LINES_SHOWN)
     first = int(design.bound.max(axis=(1, 2)).argmax()) % each
     entries = [
-        (o, i, f"σ {output}/{input}")
+        (o, i, f"{output}\nfrom {input}")
         for o, output in enumerate(design.outputs)
         for i, input in enumerate(design.inputs)
     ]
@@ -95,6 +95,7 @@ def _show_sigma(console: Console, design: MatrixDesign) -> None:
     for k in range(first, lines, each):
         f = design.excitation.lines.frequency_hz[k]
         table.add_row(f"{f:.6g} Hz", *(f"{design.sigma[k, o, i]:.3g}" for o, i, _ in entries))
+    console.print("sigma of each entry after all repetitions:")
     console.print(table)
     if each > 1:
         console.print(f"(one line in {each}; all are in design.json)")

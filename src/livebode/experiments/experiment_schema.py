@@ -12,6 +12,8 @@ from livebode.configuration.schema import Schema, schema_of
 from livebode.experiment_design import ExperimentSpec, MachineLimits
 from livebode.experiment_design.spec_checks import KIND_OF_KEY
 from livebode.experiments.experiment import BELT, SIGNALS, Experiment
+from livebode.experiments.matrix_experiment import MACHINES, Drives, MatrixExperiment
+from livebode.mimo.design import MatrixLimits, MatrixSpec
 
 _CONFIG = ConfigDict(extra="forbid")
 
@@ -40,6 +42,22 @@ def experiment_schema() -> Schema:
         "oneOf": [{"required": ["belt"]}, {"required": ["measured"]}],
         "not": {"required": ["belt", "loop"]},
     }
+
+
+def matrix_experiment_schema() -> Schema:
+    """Schema of an experiment.toml for a machine with several motors."""
+    described: Any = {name: (_table(kind) | None, None) for name, (kind, _, _) in MACHINES.items()}
+    limits: Any = (_table(MatrixLimits) | None, None)
+    model: Any = create_model(
+        "MatrixExperimentFile",
+        __base__=MatrixExperiment,
+        __doc__=MatrixExperiment.__doc__,
+        excitation=(_table(MatrixSpec), ...),
+        drives=(_table(Drives), ...),
+        limits=limits,
+        **described,
+    )
+    return schema_of(model, "matrix-experiment") | {"oneOf": [{"required": [name]} for name in MACHINES]}
 
 
 def _table(kind: Any) -> type[BaseModel]:

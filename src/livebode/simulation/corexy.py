@@ -23,6 +23,19 @@ class CoreXY(LinearMechanism):
     a spring and a damper. The cart moves along the bridge in x, and with the bridge in y, so that y moves more mass:
     from torques to speeds of the motors, everything couples. With equal belts x and y alone do not couple.
 
+    Parameters
+    ----------
+    motor_inertia_kg_m2, radius_m, motor_viscous_n_m_s
+        Inertia of each motor, radius of its pulley, and viscous friction.
+    stiffness_a_n_per_m, stiffness_b_n_per_m
+        Of belt a and of belt b.
+    damping_n_s_per_m
+        Of each belt.
+    cart_kg, bridge_kg
+        Mass that moves in x and y, and mass that moves only in y.
+    guide_viscous_n_s_per_m
+        Viscous friction of each guide.
+
     Raises
     ------
     UsageError

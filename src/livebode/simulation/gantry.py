@@ -23,6 +23,19 @@ class Gantry(LinearMechanism):
     small: the ends of the beam are at Y ± d·θ, and the cart, at x from the centre, is at Y + x·θ. Each belt is a spring
     and a damper between r·φ and its end of the beam; the guides resist yaw.
 
+    Parameters
+    ----------
+    motor_inertia_kg_m2, radius_m, motor_viscous_n_m_s
+        Inertia of each motor, radius of its pulley, and viscous friction.
+    stiffness_n_per_m, damping_n_s_per_m
+        Of each belt.
+    beam_kg, beam_inertia_kg_m2, half_width_m
+        Mass of the beam, its inertia in yaw, and half of the distance between the belts.
+    yaw_stiffness_n_m, yaw_damping_n_m_s
+        Of the guides, per radian of yaw.
+    cart_kg, cart_m
+        Mass of the cart, and its place from the centre of the beam.
+
     Raises
     ------
     UsageError

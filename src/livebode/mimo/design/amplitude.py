@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,8 +63,8 @@ def _solved(rows: Floats, limits: Floats, begin: Floats) -> Floats:
         from scipy.optimize import minimize
 
     inside = begin / max(1.0, float((limits @ begin).max()))
-    start = np.append(inside, np.log((rows @ inside**-2.0).max()))
-    constraints = [
+    start: Floats = np.append(inside, np.log((rows @ inside**-2.0).max()))
+    constraints: Any = [
         {
             "type": "ineq",
             "fun": lambda x: x[-1] - np.log(rows @ x[:-1] ** -2.0),
@@ -77,7 +79,7 @@ def _solved(rows: Floats, limits: Floats, begin: Floats) -> Floats:
         },
     ]
     found = minimize(
-        lambda x: x[-1],
+        lambda x: float(x[-1]),
         start,
         jac=lambda _: np.eye(len(start))[-1],
         bounds=[*[(1e-6, 1e6)] * len(inside), (None, None)],

@@ -10,9 +10,9 @@ import numpy as np
 from annotated_types import Gt
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import UsageError, counted
+from livebode.core import CHANNELS_MAX, UsageError, counted
 from livebode.mimo.excitation import MatrixExcitation
-from livebode.mimo.settings import CHANNELS_MAX, MatrixLoop
+from livebode.mimo.settings import MatrixLoop
 from livebode.simulation import MotorLoop
 
 Floats = NDArray[np.float64]
@@ -155,7 +155,7 @@ class MatrixMachine:
             torque = _each(limits.torque_n_m_max, motors, "torque_n_m_max", "motor")
         if limits.current_a_max is not None:
             allowed = self._constant() * _each(limits.current_a_max, motors, "current_a_max", "motor")
-            for i in np.flatnonzero(allowed < torque):
+            for i in np.flatnonzero(allowed < torque).tolist():
                 names[i] = f"torque of motor {i + 1}, by its current"
             torque = np.minimum(torque, allowed)
         for i in range(motors):
