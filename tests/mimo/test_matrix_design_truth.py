@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, DesignError, UsageError
 from livebode.mimo import MatrixResponses, MatrixSettings, MatrixTracker
-from livebode.mimo.design import MatrixDesign, MatrixLimits, MatrixMachine, MatrixSpec, choose_matrix
+from livebode.mimo.design import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
 from livebode.mimo.design.amplitude import best_amplitudes
 from livebode.mimo.design.candidate import RESERVE
 from livebode.simulation import CoreXYLoop, GantryLoop
 
-GANTRY = MatrixMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001), torque_constant_n_m_per_a=0.5)
-COREXY = MatrixMachine(loop=CoreXYLoop(), noise=(0.05, 0.05, 0.0005, 0.0005))
+GANTRY = MechanismMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001), torque_constant_n_m_per_a=0.5)
+COREXY = MechanismMachine(loop=CoreXYLoop(), noise=(0.05, 0.05, 0.0005, 0.0005))
 LIMITS = {
     "gantry": MatrixLimits(torque_n_m_max=(3.0, 2.0), current_a_max=5.0, speed_max=(20.0, 20.0, 0.3), travel_max=0.3),
     "CoreXY": MatrixLimits(torque_n_m_max=0.2, travel_max=(2.0, 2.0, 0.001, 0.001)),
@@ -40,7 +40,7 @@ def played(found: MatrixDesign, noise: float = 1.0, seed: int = 0) -> Block:
     """All repetitions on the simulated machine, from rest."""
     w = np.tile(found.excitation.samples, found.repetitions)
     white = np.random.default_rng(seed).standard_normal((len(found.outputs), w.shape[1]))
-    return found.machine.loop.simulate(w, noise=noise * found.machine.deviation[:, None] * white)
+    return found.machine.loop.simulate(w, noise=noise * np.reshape(found.machine.noise, (-1, 1)) * white)
 
 
 def tracked(found: MatrixDesign, block: Block) -> MatrixResponses:
@@ -189,6 +189,6 @@ def test_what_does_not_fit_is_rejected(machine: dict, limits: dict, spec: dict) 
     with pytest.raises(UsageError):
         choose_matrix(
             MatrixSpec(**({"lines": "10:60:10", "window": 400} | spec)),
-            MatrixMachine(**described),
+            MechanismMachine(**described),
             MatrixLimits(**limits),
         )

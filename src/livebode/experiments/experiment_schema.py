@@ -47,17 +47,20 @@ def experiment_schema() -> Schema:
 def matrix_experiment_schema() -> Schema:
     """Schema of an experiment.toml for a machine with several motors."""
     described: Any = {name: (_table(kind) | None, None) for name, (kind, _, _) in MACHINES.items()}
-    limits: Any = (_table(MatrixLimits) | None, None)
+    described |= {"limits": (_table(MatrixLimits) | None, None), "drives": (_table(Drives) | None, None)}
     model: Any = create_model(
         "MatrixExperimentFile",
         __base__=MatrixExperiment,
         __doc__=MatrixExperiment.__doc__,
         excitation=(_table(MatrixSpec), ...),
-        drives=(_table(Drives), ...),
-        limits=limits,
         **described,
     )
-    return schema_of(model, "matrix-experiment") | {"oneOf": [{"required": [name]} for name in MACHINES]}
+    return schema_of(model, "matrix-experiment") | {
+        "oneOf": [
+            *({"required": [name, "drives"]} for name in MACHINES),
+            {"required": ["measured_matrix"], "not": {"required": ["drives"]}},
+        ]
+    }
 
 
 def _table(kind: Any) -> type[BaseModel]:

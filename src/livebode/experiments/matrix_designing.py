@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,10 +69,11 @@ def design_matrix(
     check_names(name, experiment.log)
     check_free(directory, force)
     design = choose_matrix(experiment.spec(), experiment.machine(), experiment.machine_limits())
+    text = matrix_axis_text(design, experiment.log, experiment.loop_tables(design.machine))
     with writing(directory), whole_directory(directory, shutil.rmtree) as partial:
         for kind in kinds:
             MATRIX_FORMATS[kind](partial / f"{name}{kind}", design, name)
-        (partial / AXIS).write_text(matrix_axis_text(design, experiment.log), encoding="utf-8")
+        (partial / AXIS).write_text(text, encoding="utf-8")
         (partial / SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
         if draw is not None:
             draw(design, partial / f"{name}.png")
@@ -82,7 +83,7 @@ def design_matrix(
     return DesignedMatrix(design, directory, files)
 
 
-def matrix_axis_text(design: MatrixDesign, log: str) -> str:
+def matrix_axis_text(design: MatrixDesign, log: str, loop: Mapping[str, Any]) -> str:
     """The configuration with which `livebode run` tracks a recording that begins with the first experiment."""
     used = design.excitation
     tables: dict[str, Any] = {
@@ -100,16 +101,7 @@ def matrix_axis_text(design: MatrixDesign, log: str) -> str:
             "settle_periods": used.settle,
             "memory": design.repetitions,
         },
-        "loop": {
-            "controllers": [
-                {
-                    "output": output,
-                    "input": input,
-                    "velocity": {"gain": pid.gain, "integral_time_s": pid.integral_time_s, "rate_hz": pid.rate_hz},
-                }
-                for output, input, pid in zip(design.outputs, design.inputs, design.machine.loop.controllers)
-            ]
-        },
+        "loop": loop,
     }
     head = (
         f"#:schema ./{SCHEMA}\n# Written by `livebode design`; play the experiments {design.repetitions} times, "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from annotated_types import Gt
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -13,9 +13,11 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from livebode.configuration.toml_file import read_table
 from livebode.core import ConfigError, nearest_name
 from livebode.experiments.experiment import made_of
-from livebode.mimo.design import MatrixLimits, MatrixMachine, MatrixSpec
+from livebode.experiments.measured_matrix import MeasuredMatrixSection, loop_of, measured_machine
+from livebode.mimo.design import MatrixLimits, MatrixMachine, MatrixSpec, MechanismMachine
 from livebode.simulation import CoreXY, CoreXYLoop, Gantry, GantryLoop, ModalLoop, ModalMachine, MotorLoop
 
+T = TypeVar("T")
 _Positive = Annotated[float, Gt(0)]
 MACHINES: Mapping[str, tuple[type[Any], type[MotorLoop], str]] = {
     "gantry": (Gantry, GantryLoop, "gantry"),
@@ -23,6 +25,8 @@ MACHINES: Mapping[str, tuple[type[Any], type[MotorLoop], str]] = {
     "modes": (ModalMachine, ModalLoop, "machine"),
 }
 """Description, loop and its field for each table that describes a machine."""
+_TABLES = (*MACHINES, "measured_matrix")
+_NEEDED = ("names", "units", "frequency_hz", "damping", "input_shapes", "output_shapes")
 _CONTROL = ("rate_hz", "gain_n_m_s", "integral_time_s")
 
 
@@ -59,13 +63,15 @@ class MatrixExperiment(BaseModel):
     excitation
         What the experiments must reach.
     drives
-        The controllers of the motors and the noise.
+        The controllers of the motors and the noise; of a measured machine those of the run.
     gantry
         A beam with a motor at each end.
     corexy
         Two motors whose belts both move the cart in x and y.
     modes
         Any machine by its modes.
+    measured_matrix
+        A machine that a run of several inputs measured.
     limits
         Limits of all axes at once.
     log
@@ -75,10 +81,11 @@ class MatrixExperiment(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     excitation: dict[str, Any]
-    drives: dict[str, Any]
+    drives: dict[str, Any] | None = None
     gantry: dict[str, Any] | None = None
     corexy: dict[str, Any] | None = None
     modes: dict[str, Any] | None = None
+    measured_matrix: MeasuredMatrixSection | None = None
     limits: dict[str, Any] = {}
     log: str = "log.csv"
 
@@ -94,7 +101,11 @@ class MatrixExperiment(BaseModel):
         data = read_table(path)
         if isinstance(given := data.get("excitation", {}), dict):
             data["excitation"] = given | dict(over or {})
-        return cls.of(data, str(path))
+        found = cls.of(data, str(path))
+        if found.measured_matrix is None:
+            return found
+        there = found.measured_matrix.model_copy(update={"run": path.parent / found.measured_matrix.run})
+        return found.model_copy(update={"measured_matrix": there})
 
     @classmethod
     def of(cls, data: Mapping[str, Any], origin: str) -> MatrixExperiment:
@@ -103,13 +114,21 @@ class MatrixExperiment(BaseModel):
             found = cls.model_validate(data)
         except ValidationError as error:
             raise _first_of(error).at(origin) from None
-        described = [name for name in MACHINES if getattr(found, name) is not None]
+        described = [name for name in _TABLES if getattr(found, name) is not None]
         if len(described) != 1:
             raise ConfigError(
                 "key-conflict",
                 f"the machine is described by {' and by '.join(f'[{name}]' for name in described) or 'nothing'}",
-                f"describe it by one of {', '.join(f'[{name}]' for name in MACHINES)}",
+                f"describe it by one of {', '.join(f'[{name}]' for name in _TABLES)}",
                 key=(described or ["gantry"])[0],
+            ).at(origin)
+        if (found.drives is None) != (found.measured_matrix is not None):
+            needed = found.drives is None
+            raise ConfigError(
+                "key-missing" if needed else "key-conflict",
+                "[drives] is missing" if needed else "[drives] and [measured_matrix] both describe the controllers",
+                "describe the controllers and the noise" if needed else "remove [drives]",
+                key="drives",
             ).at(origin)
         return found
 
@@ -122,27 +141,42 @@ class MatrixExperiment(BaseModel):
         return made_of(MatrixLimits, self.limits, "limits")
 
     def machine(self) -> MatrixMachine:
-        """The described machine under its drives."""
-        drives = _made(Drives, self.drives, "drives", ("noise",))
-        for name, (kind, loop, role) in MACHINES.items():
-            if (table := getattr(self, name)) is not None:
-                needed = ("names", "units", "frequency_hz", "damping", "input_shapes", "output_shapes")
-                machine = _made(kind, table, name, needed if name == "modes" else ())
-                control = {key: self.drives[key] for key in _CONTROL if key in self.drives}
-                return MatrixMachine(
-                    loop=loop(**{role: machine}, **control),
-                    noise=drives.noise,
-                    torque_constant_n_m_per_a=drives.torque_constant_n_m_per_a,
-                )
-        raise AssertionError(MACHINES)
+        """The described machine under its drives, or the measured one."""
+        if self.measured_matrix is not None:
+            return measured_machine(self.measured_matrix)
+        drives = _made(Drives, self.drives or {}, "drives", ("noise",))
+        name = next(name for name in MACHINES if getattr(self, name) is not None)
+        kind, loop, role = MACHINES[name]
+        machine = _made(kind, getattr(self, name), name, _NEEDED if name == "modes" else ())
+        control = {key: getattr(drives, key) for key in _CONTROL if getattr(drives, key) is not None}
+        return MechanismMachine(
+            loop=loop(**{role: machine}, **control),
+            noise=drives.noise,
+            torque_constant_n_m_per_a=drives.torque_constant_n_m_per_a,
+        )
+
+    def loop_tables(self, machine: MatrixMachine) -> dict[str, Any]:
+        """[loop] of the axis.toml."""
+        if self.measured_matrix is not None:
+            return loop_of(self.measured_matrix)
+        assert isinstance(machine, MechanismMachine)
+        controllers = [
+            {
+                "output": output,
+                "input": input,
+                "velocity": {"gain": pid.gain, "integral_time_s": pid.integral_time_s, "rate_hz": pid.rate_hz},
+            }
+            for (output, _), input, pid in zip(machine.outputs, machine.inputs, machine.loop.controllers)
+        ]
+        return {"controllers": controllers}
 
 
 def describes_several_motors(path: Path) -> bool:
     """Whether an experiment.toml describes a machine with several motors."""
-    return any(name in MACHINES for name in read_table(path))
+    return any(name in _TABLES for name in read_table(path))
 
 
-def _made(kind: type[Any], given: Mapping[str, Any], section: str, needed: tuple[str, ...]) -> Any:
+def _made(kind: type[T], given: Mapping[str, Any], section: str, needed: tuple[str, ...]) -> T:
     if missing := [name for name in needed if name not in given]:
         raise ConfigError(
             "key-missing", f"'{section}.{missing[0]}' is missing", "add it", key=f"{section}.{missing[0]}"

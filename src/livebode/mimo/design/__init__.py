@@ -2,7 +2,19 @@
 
 from livebode.mimo.design.choose import choose_matrix
 from livebode.mimo.design.machine import MatrixLimits, MatrixMachine, Peak
+from livebode.mimo.design.measured import MeasuredMachine
+from livebode.mimo.design.mechanism import MechanismMachine
 from livebode.mimo.design.result import Alternative, MatrixDesign
 from livebode.mimo.design.spec import MatrixSpec
 
-__all__ = ["Alternative", "MatrixDesign", "MatrixLimits", "MatrixMachine", "MatrixSpec", "Peak", "choose_matrix"]
+__all__ = [
+    "Alternative",
+    "MatrixDesign",
+    "MatrixLimits",
+    "MatrixMachine",
+    "MatrixSpec",
+    "MeasuredMachine",
+    "MechanismMachine",
+    "Peak",
+    "choose_matrix",
+]

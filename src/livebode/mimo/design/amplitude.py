@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,8 +61,8 @@ def _solved(rows: Floats, limits: Floats, begin: Floats) -> Floats:
         from scipy.optimize import minimize
 
     inside = begin / max(1.0, float((limits @ begin).max()))
-    start: Floats = np.append(inside, np.log((rows @ inside**-2.0).max()))
-    constraints: Any = [
+    start = np.append(inside, np.log((rows @ inside**-2.0).max()))
+    constraints = [
         {
             "type": "ineq",
             "fun": lambda x: x[-1] - np.log(rows @ x[:-1] ** -2.0),
@@ -78,7 +76,7 @@ def _solved(rows: Floats, limits: Floats, begin: Floats) -> Floats:
             "jac": lambda _: np.hstack([-limits, np.zeros((len(limits), 1))]),
         },
     ]
-    found = minimize(
+    found = minimize(  # type: ignore[call-overload]
         lambda x: float(x[-1]),
         start,
         jac=lambda _: np.eye(len(start))[-1],

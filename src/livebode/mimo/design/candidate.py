@@ -52,7 +52,7 @@ class Candidate:
     @property
     def repetition_s(self) -> float:
         """Time of one repetition."""
-        return self.excitation.samples.shape[1] / self.excitation.lines.rate_hz
+        return float(self.excitation.samples.shape[1] / self.excitation.lines.rate_hz)
 
     @property
     def needed(self) -> int:
@@ -118,22 +118,18 @@ def _cost(unit: MatrixExcitation, spec: MatrixSpec, machine: MatrixMachine) -> F
     difference = np.eye(response.shape[2]) + machine.described.feedback_at(f) @ response  # (lines, j, inputs)
     energy = np.sum(np.abs(unit.spectra) ** 2, axis=0).T  # (lines, j)
     spread = np.abs(difference.transpose(0, 2, 1)) ** 2 / energy[:, None, :]
-    noise = machine.deviation[:, None] ** 2 * 4 / unit.lines.window
+    noise = machine.deviation(f)[:, :, None, None] ** 2 * 4 / unit.lines.window
     wanted = spec.target(response)
-    return np.asarray(noise[None, :, :, None] * spread[:, None, :, :] / wanted[..., None] ** 2)
+    return np.asarray(noise * spread[:, None, :, :] / wanted[..., None] ** 2)
 
 
 def _settle(found: Candidate, spec: MatrixSpec, machine: MatrixMachine) -> int:
-    """Periods in which the slowest mode decays from the largest peak of an output below the noise of its lines."""
+    """Periods in which a transient decays below the noise of a line, after all repetitions."""
     lines = found.excitation.lines
-    outputs = machine.loop.signals(_driven(found, machine))[2 * len(machine.inputs) :]
-    line_noise = machine.deviation * 2 / np.sqrt(lines.window * repetitions(found, spec))
-    remaining = float((SETTLED * line_noise / np.abs(outputs).max(axis=1)).min())
-    return 1 if remaining >= 1 else int(np.clip(machine.loop.settle_periods(lines.window, remaining), 1, _SETTLE_MAX))
-
-
-def _driven(found: Candidate, machine: MatrixMachine) -> Floats:
-    return machine.loop.inputs(found.excitation.samples)
+    line_noise = (
+        machine.deviation(lines.frequency_hz).min(axis=0) * 2 / np.sqrt(lines.window * repetitions(found, spec))
+    )
+    return int(np.clip(machine.settle_periods(found.excitation, SETTLED * line_noise), 1, _SETTLE_MAX))
 
 
 def repetitions(found: Candidate, spec: MatrixSpec) -> int:

@@ -30,15 +30,16 @@ def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits
 
     Examples
     --------
+    >>> from livebode.mimo.design import MechanismMachine
     >>> from livebode.simulation import GantryLoop
-    >>> machine = MatrixMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001))
+    >>> machine = MechanismMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001))
     >>> spec = MatrixSpec(lines="10:60:10", window=400, kind="orthogonal")
     >>> found = choose_matrix(spec, machine, MatrixLimits(torque_n_m_max=3.0))
     >>> found.excitation.kind, found.sigma.shape
     ('orthogonal', (6, 3, 2))
     """
     machine.check(limits)
-    lines = Lines.parse(spec.lines, machine.loop.rate_hz, spec.window)
+    lines = Lines.parse(spec.lines, machine.rate_hz, spec.window)
     if len(lines) < len(machine.inputs):
         raise UsageError(
             "out-of-range",
@@ -53,7 +54,8 @@ def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits
     best, times = found[order[0]], repetitions(found[order[0]], spec)
     gentle = min(1.0, float(best.ratio.max()) / sqrt(times)) if spec.requires else 1.0
     excitation = best.excitation.scaled(gentle)
-    predicted = predict(excitation, machine.response, machine.deviation, machine.described)
+    f = lines.frequency_hz
+    unit = predict(excitation, machine.response, 1.0, machine.described).sigma
     design = MatrixDesign(
         machine=machine,
         limits=limits,
@@ -61,8 +63,8 @@ def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits
         excitation=excitation,
         repetitions=times,
         time_s=times * best.repetition_s,
-        response=machine.response(lines.frequency_hz),
-        sigma=predicted.sigma / sqrt(times),
+        response=machine.response(f),
+        sigma=unit * machine.deviation(f)[:, :, None] / sqrt(times),
         peaks=tuple(replace(peak, size=peak.size * gentle) for peak in best.peaks),
         alternatives=tuple(_alternative(found[i], spec, gentle if i == order[0] else 1.0) for i in order),
         choices=(),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.core import counted
-from livebode.mimo.design.candidate import RESERVE, SETTLED
+from livebode.mimo.design.candidate import RESERVE
 
 if TYPE_CHECKING:
     from livebode.mimo.design.result import MatrixChoice, MatrixDesign
@@ -51,7 +51,7 @@ def explained(design: MatrixDesign) -> tuple[MatrixChoice, ...]:
         ),
     ]
     rows += [
-        (f"peak {peak.name}", f"{peak.size:.3g} {peak.unit}", f"limit {peak.limit:.3g}; with all transients, from rest")
+        (f"peak {peak.name}", f"{peak.size:.3g} {peak.unit}", f"limit {peak.limit:.3g}; {design.machine.peaks_include}")
         for peak in design.peaks
     ]
     return tuple(MatrixChoice(*row) for row in rows)
@@ -75,9 +75,7 @@ def _kind_reason(design: MatrixDesign) -> str:
 def _settle_reason(design: MatrixDesign) -> str:
     if design.spec.settle_periods is not None:
         return "specified"
-    loop = design.machine.loop
-    half_ms = 1000 * np.log(0.5) / np.log(loop.decay) / loop.rate_hz
-    return f"the slowest mode halves in {half_ms:.3g} ms; it decays below {SETTLED:g} of the noise of a line"
+    return design.machine.settle_reason
 
 
 def _amplitude_reason(design: MatrixDesign) -> str:

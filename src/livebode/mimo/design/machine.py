@@ -1,26 +1,24 @@
-"""The machine of a design, the limits of all its axes, and the peaks of its signals with all transients."""
+"""The machine of a design, and the limits of all its axes."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import CHANNELS_MAX, UsageError, counted
+from livebode.core import UsageError
 from livebode.mimo.excitation import MatrixExcitation
 from livebode.mimo.settings import MatrixLoop
-from livebode.simulation import MotorLoop
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _Positive = Annotated[float, Gt(0)]
 _Each = _Positive | Sequence[_Positive]
-
-_REPETITIONS = 2  # that are simulated from rest; later ones repeat the second
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,69 +53,61 @@ class Peak:
     limit: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class MatrixMachine:
-    """A mechanism with its drives at standstill, and the noise that is measured.
+class MatrixMachine(ABC):
+    """What a design needs of a machine with several motors: the plant in its loop, the noise and the signals."""
 
-    Parameters
-    ----------
-    loop
-        Motors under their velocity controllers.
-    noise
-        Standard deviation of white noise on each output, in its unit; one for all, or one for each.
-    torque_constant_n_m_per_a
-        Of each motor; None: not known.
-
-    Raises
-    ------
-    UsageError
-        If the numbers do not fit the outputs or the motors, a value is not above 0, or the loop is not stable.
-    """
-
-    loop: MotorLoop
-    noise: float | Sequence[float]
-    torque_constant_n_m_per_a: float | Sequence[float] | None = None
-    inputs: tuple[str, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "inputs", tuple(f"u{i + 1}" for i in range(self.loop.mechanism.motors)))
-        self.deviation  # noqa: B018 - it is checked
-        if not 2 <= len(self.inputs) <= CHANNELS_MAX:
-            raise UsageError(
-                "out-of-range",
-                f"the machine has {counted(len(self.inputs), 'motor')}, and experiments separate 2 to {CHANNELS_MAX}",
-                "describe one motor as [belt], or use [measured]",
-                argument="input_shapes",
-            )
-        if not self.loop.decay < 1:
-            raise UsageError(
-                "out-of-range",
-                "the loop of the described machine is not stable: a motion of it grows from tick to tick",
-                "correct the gains of the drives or the description",
-                argument="gain_n_m_s",
-            )
+    torque_constant_n_m_per_a: float | Sequence[float] | None
 
     @property
+    @abstractmethod
+    def rate_hz(self) -> float:
+        """Of the recording."""
+
+    @property
+    @abstractmethod
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the plant inputs."""
+
+    @property
+    @abstractmethod
+    def excitations(self) -> tuple[str, ...]:
+        """Names of the excitations, one for each input."""
+
+    @property
+    @abstractmethod
     def outputs(self) -> tuple[tuple[str, str], ...]:
         """Names and units."""
-        return self.loop.mechanism.outputs
 
     @property
-    def deviation(self) -> Floats:
-        """Of the noise, shape (outputs,)."""
-        return _each(self.noise, len(self.outputs), "noise", "output")
-
-    @property
+    @abstractmethod
     def described(self) -> MatrixLoop:
-        """The controllers for the estimators."""
-        motors, outputs = len(self.inputs), len(self.outputs)
-        rows = [[None] * i + [pid] + [None] * (outputs - i - 1) for i, pid in enumerate(self.loop.controllers)]
-        assert len(rows) == motors
-        return MatrixLoop(feedback=rows)
+        """The controllers."""
 
+    @abstractmethod
     def response(self, frequency_hz: ArrayLike) -> Complex:
         """Of the plant, shape (lines, outputs, inputs)."""
-        return self.loop.mechanism.response(frequency_hz, self.loop.rate_hz)
+
+    @abstractmethod
+    def deviation(self, frequency_hz: ArrayLike) -> Floats:
+        """Standard deviation of the noise, as if it were white, shape (lines, outputs)."""
+
+    @abstractmethod
+    def settle_periods(self, excitation: MatrixExcitation, below: Floats) -> int:
+        """Periods until the transient of a change of experiment is below these magnitudes of the outputs."""
+
+    @property
+    @abstractmethod
+    def settle_reason(self) -> str:
+        """Why they are so many."""
+
+    @property
+    @abstractmethod
+    def peaks_include(self) -> str:
+        """What the peaks include, in words."""
+
+    @abstractmethod
+    def unit_rows(self, excitation: MatrixExcitation) -> Floats:
+        """Torques, outputs and travels for each input's excitation alone, (signals, samples, inputs)."""
 
     def check(self, limits: MatrixLimits) -> None:
         """UsageError for limits that do not fit the machine, or if there are none."""
@@ -130,21 +120,14 @@ class MatrixMachine:
             )
 
     def unit_signals(self, excitation: MatrixExcitation, limits: MatrixLimits) -> tuple[Floats, list[Peak]]:
-        """The limited signals as a share of their limits, from rest, shape (signals, samples, inputs).
+        """The limited signals as a share of their limits, shape (signals, samples, inputs), with names and limits.
 
-        The last axis has the part of each input's excitation alone: the loop is linear. With their names and limits.
+        The last axis has the part of each input's excitation alone: the loop is linear.
         """
-        motors = len(self.inputs)
-        once = np.tile(excitation.samples, _REPETITIONS)
-        inputs = np.zeros((2 * motors + len(self.outputs), once.shape[1], motors))
-        inputs[range(motors), :, range(motors)] = once
-        signals, travels = self.loop.signals(inputs)[motors:], self.loop.travels(inputs)
-        rows = np.concatenate([signals, travels])
-        shares, peaks = [], []
-        for name, unit, row, limit in self._limited(limits):
-            shares.append(rows[row] / limit)
-            peaks.append(Peak(name, unit, 0.0, limit))
-        return np.stack(shares), peaks
+        rows = self.unit_rows(excitation)
+        limited = list(self._limited(limits))
+        shares = np.stack([rows[row] / limit for _, _, row, limit in limited])
+        return shares, [Peak(name, unit, 0.0, limit) for name, unit, _, limit in limited]
 
     def _limited(self, limits: MatrixLimits) -> Iterator[tuple[str, str, int, float]]:
         """Name, unit, row among torques, outputs and travels, and limit."""
@@ -152,9 +135,9 @@ class MatrixMachine:
         torque = np.full(motors, np.inf)
         names = [f"torque of motor {i + 1}" for i in range(motors)]
         if limits.torque_n_m_max is not None:
-            torque = _each(limits.torque_n_m_max, motors, "torque_n_m_max", "motor")
+            torque = each_of(limits.torque_n_m_max, motors, "torque_n_m_max", "motor")
         if limits.current_a_max is not None:
-            allowed = self._constant() * _each(limits.current_a_max, motors, "current_a_max", "motor")
+            allowed = self._constant() * each_of(limits.current_a_max, motors, "current_a_max", "motor")
             for i in np.flatnonzero(allowed < torque).tolist():
                 names[i] = f"torque of motor {i + 1}, by its current"
             torque = np.minimum(torque, allowed)
@@ -166,7 +149,7 @@ class MatrixMachine:
             (limits.travel_max, "travel_max", "travel", motors + outputs),
         ):
             if given is not None:
-                for o, limit in enumerate(_each(given, outputs, name, "output")):
+                for o, limit in enumerate(each_of(given, outputs, name, "output")):
                     channel, unit = self.outputs[o]
                     shown = unit if word == "speed" else unit.removesuffix("/s")
                     yield f"{word} of {channel}", shown, first + o, float(limit)
@@ -179,10 +162,11 @@ class MatrixMachine:
                 "give torque_constant_n_m_per_a, or torque_n_m_max instead",
                 argument="torque_constant_n_m_per_a",
             )
-        return _each(self.torque_constant_n_m_per_a, len(self.inputs), "torque_constant_n_m_per_a", "motor")
+        return each_of(self.torque_constant_n_m_per_a, len(self.inputs), "torque_constant_n_m_per_a", "motor")
 
 
-def _each(value: float | Sequence[float], count: int, name: str, whose: str) -> Floats:
+def each_of(value: float | Sequence[float], count: int, name: str, whose: str) -> Floats:
+    """One value above 0 for each, shape (count,); UsageError where they are not."""
     given = np.asarray(value, dtype=np.float64)
     if given.shape not in ((), (count,)):
         raise UsageError(

@@ -101,7 +101,7 @@ class MatrixDesign:
     @property
     def excitations(self) -> tuple[str, ...]:
         """Names of the excitations, one for each input."""
-        return tuple(f"w{i + 1}" for i in range(len(self.inputs)))
+        return self.machine.excitations
 
     @property
     def outputs(self) -> tuple[str, ...]:
