@@ -85,7 +85,7 @@ def matrix_rows(responses: MatrixResponses) -> Table:
 
 def covariance_rows(responses: MatrixResponses) -> Table:
     """The factors of the covariance in long form: lines within a response, then "noise" and "spread" by rows."""
-    flat = [factor.reshape(*factor.shape[:2], -1) for factor in (responses.noise, responses.spread)]
+    flat = [factor.reshape(*factor.shape[:2], factor.shape[2] ** 2) for factor in (responses.noise, responses.spread)]
     value = np.concatenate(flat, axis=2)
     rows, lines, size = value.shape
     numbers = [np.indices((len(names), len(names))).reshape(2, -1) for names in (responses.outputs, responses.inputs)]
