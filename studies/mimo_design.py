@@ -86,8 +86,9 @@ def row(name: str, kind: str, recordings: int) -> str:
 
 
 def main(words: list[str]) -> int:
-    print("| machine, experiments | settle | repetitions | time | worst 95 % bound | error over predicted sigma, entries "
-          "| worst line | largest share of a limit |")  # fmt: skip
+    heads = ["machine, experiments", "settle", "repetitions", "time", "worst 95 % bound"]
+    heads += ["error over predicted sigma, entries", "worst line", "largest share of a limit"]
+    print(f"| {' | '.join(heads)} |")
     print("|---|---|---|---|---|---|---|---|")
     for name in MACHINES:
         for kind in KINDS:

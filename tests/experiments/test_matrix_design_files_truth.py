@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from livebode import Run
+from livebode import Run, interface
 from livebode.core import Block
 from livebode.experiments.experiment_schema import matrix_experiment_schema
 from livebode.experiments.matrix_experiment import MatrixExperiment
@@ -21,7 +21,7 @@ from livebode.sources import open_log
 from tests.support.command import livebode, write_csv
 from tests.support.schemas import validator
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "gantry.toml"
+EXAMPLE = Path(interface.__file__).parent / "example_files" / "several-motors.toml"
 MODES = """
 [modes]
 names = ["v1", "v2"]

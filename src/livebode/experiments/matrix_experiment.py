@@ -25,7 +25,8 @@ MACHINES: Mapping[str, tuple[type[Any], type[MotorLoop], str]] = {
     "modes": (ModalMachine, ModalLoop, "machine"),
 }
 """Description, loop and its field for each table that describes a machine."""
-_TABLES = (*MACHINES, "measured_matrix")
+TABLES = (*MACHINES, "measured_matrix")
+"""Tables of which an experiment has one: the machine."""
 _NEEDED = ("names", "units", "frequency_hz", "damping", "input_shapes", "output_shapes")
 _CONTROL = ("rate_hz", "gain_n_m_s", "integral_time_s")
 
@@ -114,20 +115,23 @@ class MatrixExperiment(BaseModel):
             found = cls.model_validate(data)
         except ValidationError as error:
             raise _first_of(error).at(origin) from None
-        described = [name for name in _TABLES if getattr(found, name) is not None]
+        described = [name for name in TABLES if getattr(found, name) is not None]
         if len(described) != 1:
             raise ConfigError(
                 "key-conflict",
                 f"the machine is described by {' and by '.join(f'[{name}]' for name in described) or 'nothing'}",
-                f"describe it by one of {', '.join(f'[{name}]' for name in _TABLES)}",
+                f"describe it by one of {', '.join(f'[{name}]' for name in TABLES)}",
                 key=(described or ["gantry"])[0],
             ).at(origin)
-        if (found.drives is None) != (found.measured_matrix is not None):
-            needed = found.drives is None
+        if found.measured_matrix is None and found.drives is None:
             raise ConfigError(
-                "key-missing" if needed else "key-conflict",
-                "[drives] is missing" if needed else "[drives] and [measured_matrix] both describe the controllers",
-                "describe the controllers and the noise" if needed else "remove [drives]",
+                "key-missing", "[drives] is missing", "describe the controllers and the noise", key="drives"
+            ).at(origin)
+        if found.measured_matrix is not None and found.drives is not None:
+            raise ConfigError(
+                "key-conflict",
+                "[drives] and [measured_matrix] both describe the controllers",
+                "remove [drives]",
                 key="drives",
             ).at(origin)
         return found
@@ -173,7 +177,7 @@ class MatrixExperiment(BaseModel):
 
 def describes_several_motors(path: Path) -> bool:
     """Whether an experiment.toml describes a machine with several motors."""
-    return any(name in _TABLES for name in read_table(path))
+    return any(name in TABLES for name in read_table(path))
 
 
 def _made(kind: type[T], given: Mapping[str, Any], section: str, needed: tuple[str, ...]) -> T:

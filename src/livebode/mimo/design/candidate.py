@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from livebode.core import Lines
 from livebode.excitation import low_crest_phases
 from livebode.mimo.design.amplitude import best_amplitudes
-from livebode.mimo.design.machine import MatrixLimits, MatrixMachine, Peak
+from livebode.mimo.design.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode.mimo.design.spec import Kind, MatrixSpec
 from livebode.mimo.excitation import MatrixExcitation
 
@@ -47,7 +47,7 @@ class Candidate:
     excitation: MatrixExcitation
     amplitude: Floats
     ratio: Floats
-    peaks: tuple[Peak, ...]
+    peaks: tuple[LimitedPeak, ...]
 
     @property
     def repetition_s(self) -> float:
@@ -103,7 +103,7 @@ def _at(
     cost = _cost(unit, spec, machine)
     amplitude = best_amplitudes(cost.reshape(-1, cost.shape[-1]), signals / (1 - RESERVE))
     sizes = np.abs(signals @ amplitude).max(axis=1)
-    reached = tuple(Peak(one.name, one.unit, float(size * one.limit), one.limit) for one, size in zip(peaks, sizes))
+    reached = tuple(replace(one, size=float(size * one.limit)) for one, size in zip(peaks, sizes))
     return Candidate(unit.scaled(amplitude), amplitude, np.sqrt(cost @ amplitude**-2.0), reached)
 
 

@@ -44,7 +44,7 @@ class MatrixLimits:
 
 
 @dataclass(frozen=True)
-class Peak:
+class LimitedPeak:
     """The largest magnitude of a signal over all experiments, with the transients between them, and its limit."""
 
     name: str
@@ -119,7 +119,7 @@ class MatrixMachine(ABC):
                 argument="torque_n_m_max",
             )
 
-    def unit_signals(self, excitation: MatrixExcitation, limits: MatrixLimits) -> tuple[Floats, list[Peak]]:
+    def unit_signals(self, excitation: MatrixExcitation, limits: MatrixLimits) -> tuple[Floats, list[LimitedPeak]]:
         """The limited signals as a share of their limits, shape (signals, samples, inputs), with names and limits.
 
         The last axis has the part of each input's excitation alone: the loop is linear.
@@ -127,7 +127,7 @@ class MatrixMachine(ABC):
         rows = self.unit_rows(excitation)
         limited = list(self._limited(limits))
         shares = np.stack([rows[row] / limit for _, _, row, limit in limited])
-        return shares, [Peak(name, unit, 0.0, limit) for name, unit, _, limit in limited]
+        return shares, [LimitedPeak(name, unit, 0.0, limit) for name, unit, _, limit in limited]
 
     def _limited(self, limits: MatrixLimits) -> Iterator[tuple[str, str, int, float]]:
         """Name, unit, row among torques, outputs and travels, and limit."""

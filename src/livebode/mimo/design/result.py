@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.mimo.design.machine import MatrixLimits, MatrixMachine, Peak
+from livebode.mimo.design.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode.mimo.design.spec import HOLDING_95, MatrixSpec
 from livebode.mimo.excitation import MatrixExcitation
 
@@ -84,7 +84,7 @@ class MatrixDesign:
     time_s: float
     response: Complex
     sigma: Floats
-    peaks: tuple[Peak, ...]
+    peaks: tuple[LimitedPeak, ...]
     alternatives: tuple[Alternative, ...]
     choices: tuple[MatrixChoice, ...]
 
