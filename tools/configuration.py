@@ -10,7 +10,7 @@ from typing import Any
 
 from livebode.archive.settings import archive_schema
 from livebode.configuration.schema import axis_schema
-from livebode.experiments.experiment_schema import experiment_schema
+from livebode.experiments.experiment_schema import experiment_schema, matrix_experiment_schema
 
 HEAD = """# Configuration
 
@@ -58,6 +58,7 @@ MORE = {
     "[publish]": "[Connections](../how-to/connect/index.md) has a page for each kind.",
     "belt": "See [the simulated axis](axis.md).",
     "measured": "A limit on a quantity whose extremes are not known is rejected.",
+    "drives": "See [several motors](../how-to/excitation.md#several-motors).",
     "cluster": "See [archives](../how-to/archive.md).",
     "measure": "See [measuring](../how-to/measure.md).",
     "excitation": "See [excitation design](../how-to/excitation.md).",
@@ -67,17 +68,23 @@ LOOP = """As in axis.toml; by default the loop of the run. `[loop.velocity]` bel
 `[loop.position_pd]` to a position. The excitation is added at the plant input. It is not checked whether a loop other
 than the run's is stable.
 """
+SEVERAL = "experiment.toml of several motors"
 SOURCE = """As in axis.toml: a live source, whose controller plays the excitation and sends the samples.
 """
 
-_FILES = (("axis", axis_schema()), ("experiment", experiment_schema()), ("archive", archive_schema()))
+_FILES = (
+    ("axis.toml", axis_schema()),
+    ("experiment.toml", experiment_schema()),
+    (SEVERAL, matrix_experiment_schema()),
+    ("archive.toml", archive_schema()),
+)
 
 
 def page() -> str:
     """The page in Markdown."""
     parts = [HEAD]
     for name, schema in _FILES:
-        parts += [f"## {name}.toml\n", *_tables(schema, "", schema, schema.get("else", {}))]
+        parts += [f"## {name}\n", *_tables(schema, "", schema, schema.get("else", {}))]
     return "\n".join(parts)
 
 
@@ -86,7 +93,9 @@ def _tables(file: Schema, name: str, table: Schema, needed: Schema) -> Iterator[
     required = table.get("required", []) + needed.get("required", [])
     keys = {key: _resolved(file, value) for key, value in table["properties"].items() if key != "axes"}
     if name:
-        yield f"### [{name}]\n"
+        # A heading occurs once on the page.
+        whose = " of several motors" if file["title"] == "matrix-experiment.toml" else ""
+        yield f"### [{name}]{whose}\n"
         about = table["description"].removeprefix(f"[{name}]: ")
         yield textwrap.fill(f"{about[0].upper()}{about[1:]} {MORE.get(name, '')}", 120, break_on_hyphens=False) + "\n"
     rows = [_row(key, value, key in required) for key, value in keys.items() if "properties" not in value]

@@ -19,6 +19,7 @@ from livebode.cli.app import app
 from livebode.configuration import Axis
 from livebode.configuration.axes import merged, tables_of
 from livebode.experiments.experiment import Experiment
+from livebode.experiments.matrix_experiment import TABLES, MatrixExperiment
 from livebode.fleet.settings import FleetSettings
 from tests.support.pages import PAGES, ROOT, steps_of
 
@@ -46,6 +47,10 @@ def test_the_toml_of_a_page_is_a_configuration(text: str) -> None:
         return
     if isinstance(data.get("axes"), list):
         assert FleetSettings.of(data, "fleet.toml")
+        return
+    if data.keys() & set(TABLES):
+        drives = {} if "measured_matrix" in data else {"drives": {"noise": 0.1}}
+        assert MatrixExperiment.of({"excitation": {}} | drives | data, "experiment.toml").machine_limits()
         return
     if "excitation" in data:
         assert Experiment.of(data, "experiment.toml")

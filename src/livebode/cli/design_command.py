@@ -11,7 +11,7 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.band import parsed_band
 from livebode.cli.options import Json
-from livebode.core import counted
+from livebode.core import UsageError, counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -53,8 +53,16 @@ def design_command(
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.experiments.designing import design_experiment  # with the simulation
     from livebode.experiments.experiment import Experiment
+    from livebode.experiments.matrix_experiment import describes_several_motors
     from livebode.records import to_json
 
+    if describes_several_motors(experiment):
+        from livebode.cli.matrix_design import design_several
+
+        _refuse_for_several(band=band, resolution=resolution, amplitude=amplitude)
+        above = {"lines": lines, "window": window, "accuracy": accuracy, "seed": seed}
+        design_several(experiment, above, out, to, name, force=force, as_json=as_json)
+        return
     over: dict[str, Any] = {
         "resolution_hz": resolution, "amplitude_n_m": amplitude, "accuracy": accuracy, "seed": seed,
         "lines": lines, "window": window,
@@ -71,6 +79,17 @@ def design_command(
         print(made.left_out)
     print(f"{made.directory}/: {', '.join(made.files)}")
     tell_how_to_draw()
+
+
+def _refuse_for_several(**given: object) -> None:
+    for option, value in given.items():
+        if value is not None:
+            raise UsageError(
+                "conflict",
+                f"{option} does not belong to a design for several motors",
+                "give lines and window; amplitudes are chosen by the limits",
+                argument=option,
+            )
 
 
 def working() -> AbstractContextManager[object]:

@@ -10,13 +10,16 @@ import typer
 from livebode.cli.options import Json
 from livebode.core import UsageError
 
-_FILES = ("axis", "experiment", "archive")
+_FILES = ("axis", "experiment", "matrix-experiment", "archive")
 
 
 def schema_command(
     file: Annotated[
         str,
-        typer.Argument(metavar="axis|experiment|archive", help="The file: axis.toml, experiment.toml or archive.toml."),
+        typer.Argument(
+            metavar="axis|experiment|matrix-experiment|archive",
+            help="The file: axis.toml, experiment.toml, that of a machine with several motors, or archive.toml.",
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="File to write. \\[default: standard output]")
@@ -45,6 +48,8 @@ def schema_command(
         from livebode.configuration.schema import axis_schema as schema
     elif file == "archive":
         from livebode.archive.settings import archive_schema as schema
+    elif file == "matrix-experiment":
+        from livebode.experiments.experiment_schema import matrix_experiment_schema as schema
     else:
         from livebode.experiments.experiment_schema import experiment_schema as schema
     text = to_json(schema(), indent=2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,16 +9,16 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from livebode.configuration.schema import axis_schema
-from livebode.core import ConfigError, OutputError, UsageError
+from livebode.core import UsageError
 from livebode.core.files import whole_directory
 from livebode.core.installing import install_command
 from livebode.core.writing import writing
 from livebode.experiment_design import FORMATS, Design, axis_text, choose, write
+from livebode.experiments.design_directory import AXIS, MARK, SCHEMA, check_free, check_names
 from livebode.experiments.experiment import Experiment
 from livebode.records import to_json
 from livebode.structured_text import PERIOD_MAX
 
-_MARK, _AXIS, _SCHEMA = "design.json", "axis.toml", "axis.schema.json"
 Picture = Callable[[Design, Path], None]
 
 
@@ -76,8 +75,8 @@ def design_experiment(
                 value=kind,
                 allowed=list(FORMATS),
             )
-    _check_names(name, experiment.log)
-    _check_free(directory, force)
+    check_names(name, experiment.log)
+    check_free(directory, force)
     design = choose(experiment.spec(), experiment.machine(), experiment.machine_limits())
     lines = design.waveform.lines
     left_out = {} if kinds else _without(lines.window)
@@ -92,42 +91,15 @@ def design_experiment(
             motion=experiment.motion_table(lines.window / lines.rate_hz),
             tracking=experiment.tracking(),
         )
-        (partial / _AXIS).write_text(f"#:schema ./{_SCHEMA}\n{configuration}", encoding="utf-8")
-        (partial / _SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
+        (partial / AXIS).write_text(f"#:schema ./{SCHEMA}\n{configuration}", encoding="utf-8")
+        (partial / SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
         if draw is not None:
             draw(design, partial / f"{name}.png")
-        files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
+        files = tuple(sorted([*(path.name for path in partial.iterdir()), MARK]))
         facts = {"files": files} | design.plain()
-        (partial / _MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
-        _check_free(directory, force)
+        (partial / MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
+        check_free(directory, force)
     return Designed(design, directory, files, "\n".join(left_out.values()))
-
-
-def _check_names(name: str, log: str) -> None:
-    if not name.strip() or not name.isprintable() or name.startswith(".") or Path(name).name != name:
-        raise UsageError(
-            "invalid-name",
-            f"{name!r} cannot be the name of a file",
-            "choose letters, digits and underscores",
-            argument="name",
-            value=name,
-        )
-    if not log.isprintable() or not Path(log).name:
-        raise ConfigError(
-            "value-invalid",
-            f"log = {log!r} cannot be the file of a recording",
-            "specify one such as 'log.csv'",
-            key="log",
-            value=log,
-        )
-    if log in (_MARK, _AXIS, _SCHEMA, f"{name}.png", *(f"{name}{kind}" for kind in FORMATS)):
-        raise ConfigError(
-            "key-conflict",
-            f"log = {log!r} is a file of the design",
-            "give the recording another name",
-            key="log",
-            value=log,
-        )
 
 
 def _without(window: int) -> dict[str, str]:
@@ -138,37 +110,3 @@ def _without(window: int) -> dict[str, str]:
     if window > PERIOD_MAX:
         reasons[".st"] = f"no .st: its {window} samples are more than the {PERIOD_MAX} of a PLC's table"
     return reasons
-
-
-def _check_free(directory: Path, force: bool) -> None:
-    if not (directory.exists() or directory.is_symlink()):
-        return
-    if not force:
-        raise OutputError(
-            "exists",
-            f"{str(directory)!r} exists already",
-            "choose another directory, or replace it with force",
-            path=str(directory),
-        )
-    if directory.is_symlink() or not (directory / _MARK).is_file():
-        raise OutputError(
-            "not-replaceable",
-            f"{str(directory)!r} is not the directory of an earlier design",
-            "choose another directory",
-            path=str(directory),
-        )
-    if others := sorted({path.name for path in directory.iterdir()} - _left_by(directory / _MARK)):
-        raise OutputError(
-            "not-replaceable",
-            f"{str(directory)!r} also contains {others[0]!r}, which is not from a design",
-            "move it, or choose another directory",
-            path=str(directory),
-            name=others[0],
-        )
-
-
-def _left_by(mark: Path) -> set[str]:
-    try:
-        return set(json.loads(mark.read_text(encoding="utf-8"))["files"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return set()

@@ -12,6 +12,8 @@ from livebode.configuration.schema import Schema, schema_of
 from livebode.experiment_design import ExperimentSpec, MachineLimits
 from livebode.experiment_design.spec_checks import KIND_OF_KEY
 from livebode.experiments.experiment import BELT, SIGNALS, Experiment
+from livebode.experiments.matrix_experiment import MACHINES, Drives, MatrixExperiment
+from livebode.mimo.design import MatrixLimits, MatrixSpec
 
 _CONFIG = ConfigDict(extra="forbid")
 
@@ -39,6 +41,25 @@ def experiment_schema() -> Schema:
     return found | {
         "oneOf": [{"required": ["belt"]}, {"required": ["measured"]}],
         "not": {"required": ["belt", "loop"]},
+    }
+
+
+def matrix_experiment_schema() -> Schema:
+    """Schema of an experiment.toml for a machine with several motors."""
+    described: Any = {name: (_table(kind) | None, None) for name, (kind, _, _) in MACHINES.items()}
+    described |= {"limits": (_table(MatrixLimits) | None, None), "drives": (_table(Drives) | None, None)}
+    model: Any = create_model(
+        "MatrixExperimentFile",
+        __base__=MatrixExperiment,
+        __doc__=MatrixExperiment.__doc__,
+        excitation=(_table(MatrixSpec), ...),
+        **described,
+    )
+    return schema_of(model, "matrix-experiment") | {
+        "oneOf": [
+            *({"required": [name, "drives"]} for name in MACHINES),
+            {"required": ["measured_matrix"], "not": {"required": ["drives"]}},
+        ]
     }
 
 

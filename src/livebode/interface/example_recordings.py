@@ -218,12 +218,13 @@ EXAMPLES = {
         ("livebode run tune.toml", "livebode check-loop runs/tune", "livebode tune runs/tune"),
     ),
     "design": Example(
-        "before an experiment: a recording without excitation, and the description of a machine",
+        "before an experiment: a recording without excitation, and descriptions of two machines",
         {"quiet.parquet": _quiet},
-        ("experiment.toml",),
+        ("experiment.toml", "several-motors.toml"),
         (
             "livebode inspect quiet.parquet --lines 20:140:10 --window 400 --output velocity --input u",
             "livebode design experiment.toml --out runs/experiment",
+            "livebode design several-motors.toml --out runs/several-motors",
         ),
     ),
     "output-only": Example(

@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, UsageError
-from livebode.simulation.hold import held
+from livebode.core import Block, UsageError
+from livebode.simulation.mechanism import LinearMechanism
+from livebode.simulation.motor_loop import MotorLoop
 
 Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-
-OUTPUTS = ("velocity1", "velocity2", "cart")
-"""Speeds of the two motors, rad/s, and of the cart along the belts, m/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gantry:
+class Gantry(LinearMechanism):
     """Two motors, each with a belt to one end of a cross beam; a cart at a fixed place on the beam.
 
     Coordinates are the angles φ1, φ2 of the motors, the position Y of the beam's centre and its yaw angle θ, which is
     small: the ends of the beam are at Y ± d·θ, and the cart, at x from the centre, is at Y + x·θ. Each belt is a spring
-    and a damper between r·φ and its end of the beam; the guides resist yaw. Without dry friction and limits the machine
-    is linear, and its simulation is exact.
+    and a damper between r·φ and its end of the beam; the guides resist yaw.
+
+    Parameters
+    ----------
+    motor_inertia_kg_m2, radius_m, motor_viscous_n_m_s
+        Inertia of each motor, radius of its pulley, and viscous friction.
+    stiffness_n_per_m, damping_n_s_per_m
+        Of each belt.
+    beam_kg, beam_inertia_kg_m2, half_width_m
+        Mass of the beam, its inertia in yaw, and half of the distance between the belts.
+    yaw_stiffness_n_m, yaw_damping_n_m_s
+        Of the guides, per radian of yaw.
+    cart_kg, cart_m
+        Mass of the cart, and its place from the centre of the beam.
 
     Raises
     ------
@@ -92,45 +102,24 @@ class Gantry:
         return mass, damping, stiffness
 
     @property
-    def state_space(self) -> tuple[Floats, Floats, Floats]:
-        """A, B, C of x' = A·x + B·torque, out = C·x with x = (q, q'): shapes (8, 8), (8, 2), (3, 8); see `OUTPUTS`."""
-        mass, damping, stiffness = self.matrices
-        a = np.zeros((8, 8))
-        a[:4, 4:] = np.eye(4)
-        a[4:, :4], a[4:, 4:] = -np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)
-        b = np.zeros((8, 2))
-        b[4:] = np.linalg.inv(mass)[:, :2]
-        c = np.zeros((3, 8))
-        c[0, 4] = c[1, 5] = c[2, 6] = 1.0
-        c[2, 7] = self.cart_m
-        return a, b, c
+    def torque_map(self) -> Floats:
+        """The torques act on φ1 and φ2."""
+        return np.eye(4, 2)
 
     @property
-    def modes_hz(self) -> Floats:
-        """Undamped frequencies, Hz, ascending: the yaw against the guides, and two that stretch the belts."""
-        mass, _, stiffness = self.matrices
-        squares = np.sort(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)
-        return np.asarray(np.sqrt(squares[squares > 1.0]) / (2 * np.pi))
+    def output_map(self) -> Floats:
+        """Speeds of the motors and of the cart."""
+        return np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, self.cart_m]])
 
-    def sampled(self, rate_hz: float) -> tuple[Floats, Floats, Floats]:
-        """A, B, C from tick to tick with torques that are constant over a tick: exact."""
-        a, b, c = self.state_space
-        columns = [held(a, column, 1 / rate_hz) for column in b.T]
-        return columns[0][0], np.stack([column for _, column in columns], axis=1), c
-
-    def response(self, frequency_hz: ArrayLike, rate_hz: float) -> Complex:
-        """Truth: from the torques to `OUTPUTS` behind the hold, shape (lines, outputs, inputs)."""
-        a, b, c = self.sampled(rate_hz)
-        z = np.exp(2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64)) / rate_hz)
-        return np.asarray(c @ np.linalg.solve(z[:, None, None] * np.eye(8) - a, b.astype(np.complex128)))
+    @property
+    def outputs(self) -> tuple[tuple[str, str], ...]:
+        """Speeds of the two motors, rad/s, and of the cart along the belts, m/s."""
+        return (("velocity1", "rad/s"), ("velocity2", "rad/s"), ("cart", "m/s"))
 
 
 @dataclass(frozen=True, kw_only=True)
-class GantryLoop:
-    """A gantry under a PI velocity controller for each motor: torque = w − gain·(1 + ∫/Ti)·velocity.
-
-    Every tick the drives read the speeds of their motors, compute, and hold the torque until the next tick. Signals are
-    logged as a Loop expects: speeds before and torques after the update.
+class GantryLoop(MotorLoop):
+    """A gantry under a PI velocity controller for each motor.
 
     Examples
     --------
@@ -140,76 +129,56 @@ class GantryLoop:
     """
 
     gantry: Gantry = field(default_factory=Gantry)
-    rate_hz: float = 4000.0
-    gain_n_m_s: float = 0.3
-    integral_time_s: float = 0.05
 
     @property
-    def matrices(self) -> tuple[Floats, Floats]:
-        """Φ and Γ of z(n+1) = Φ·z + Γ·(w, disturbance, noise) with z = (x, integrals), shapes (10, 10), (10, 7).
+    def mechanism(self) -> Gantry:
+        """The gantry."""
+        return self.gantry
 
-        The disturbance is a torque beside u, the noise is on the three outputs.
-        """
-        a, b, c = self.gantry.sampled(self.rate_hz)
-        gain, step = self.gain_n_m_s, 1 / (self.rate_hz * self.integral_time_s)
-        speeds = c[:2]
-        # The integral after the update is that before it plus step·speed.
-        control = -gain * np.hstack([(1 + step) * speeds, np.eye(2)])
-        state = np.vstack([np.hstack([a, np.zeros((8, 2))]) + b @ control, np.hstack([step * speeds, np.eye(2)])])
-        fed = -gain * (1 + step) * np.eye(2, 3)
-        entry = np.zeros((10, 7))
-        entry[:8, :2] = entry[:8, 2:4] = b
-        entry[:8, 4:], entry[8:, 4:] = b @ fed, step * np.eye(2, 3)
-        return state, entry
+    def simulate_places(
+        self,
+        excitation: Floats,
+        cart_m: Sequence[float],
+        disturbance: Floats | None = None,
+        noise: Floats | None = None,
+    ) -> Block:
+        """The recording of experiments of equal length, before each of which the cart goes to another place.
 
-    @property
-    def decay(self) -> float:
-        """Size of the slowest eigenvalue that decays: transients shrink by it each tick; below 1 in a stable loop.
-
-        Two eigenvalues are 1: the beam remains where it comes to rest, as a constant that no line contains.
-        """
-        return float(np.sort(np.abs(np.linalg.eigvals(self.matrices[0])))[-3])
-
-    def simulate(self, excitation: Floats, disturbance: Floats | None = None, noise: Floats | None = None) -> Block:
-        """The recording of a simulation from rest.
+        Speeds and positions continue over the change, which takes no time; the motion of the cart is not included.
 
         Parameters
         ----------
-        excitation, disturbance
-            Torques added to those of the controllers, N m, and beside them, shape (2, samples).
-        noise
-            On the three outputs as the drives read and log them, shape (3, samples).
+        excitation, disturbance, noise
+            As of `simulate`.
+        cart_m
+            Place of the cart in each part of the recording, m.
+
+        Raises
+        ------
+        UsageError
+            If the samples are not a multiple of the places, or a place is not on the beam.
+
+        Examples
+        --------
+        >>> w = np.zeros((2, 800))
+        >>> w[:, 0] = 1.0, -1.0
+        >>> len(GantryLoop().simulate_places(w, [-0.3, 0.3]))
+        800
         """
-        inputs = np.zeros((7, excitation.shape[1]))
-        inputs[:2] = excitation
-        for at, given in ((slice(2, 4), disturbance), (slice(4, 7), noise)):
-            inputs[at] = 0.0 if given is None else given
-        return Block(self.signals(inputs), CHANNELS, self.rate_hz)
-
-    def signals(self, inputs: Floats) -> Floats:
-        """w, u and outputs of inputs (w, disturbance, noise): (7, samples) or, of several runs, (7, samples, runs)."""
-        state, entry = self.matrices
-        samples = inputs.shape[1]
-        flat = inputs.reshape(7, -1)
-        pushes = np.ascontiguousarray(np.moveaxis((entry @ flat).reshape(10, *inputs.shape[1:]), 1, 0))
-        states = np.empty_like(pushes)
-        now = np.zeros(pushes.shape[1:])
-        for n in range(samples):
-            states[n] = now
-            now = state @ now + pushes[n]
-        c = self.gantry.state_space[2]
-        z = np.moveaxis(states, 1, 0).reshape(10, -1)
-        outputs = c @ z[:8] + flat[4:]
-        step = 1 / (self.rate_hz * self.integral_time_s)
-        torque = flat[:2] - self.gain_n_m_s * (outputs[:2] * (1 + step) + z[8:])
-        return np.vstack([flat[:2], torque, outputs]).reshape(7, *inputs.shape[1:])
-
-    def settle_periods(self, window: int, remaining: float = 1e-9) -> int:
-        """Whole periods after which this share of a transient remains: the `settle` of an experiment."""
-        return int(np.ceil(np.log(remaining) / (window * np.log(self.decay))))
+        inputs = self.inputs(excitation, disturbance, noise)
+        if not len(cart_m) or inputs.shape[1] % len(cart_m):
+            raise UsageError(
+                "wrong-shape",
+                f"{inputs.shape[1]} samples are not a multiple of {len(cart_m)} places",
+                "give one place for each experiment",
+                argument="cart_m",
+            )
+        parts, state = [], None
+        for place, given in zip(cart_m, np.split(inputs, len(cart_m), axis=1)):
+            there = replace(self, gantry=replace(self.gantry, cart_m=place))
+            seen, state = there.continued(given, state)
+            parts.append(seen)
+        return Block(np.concatenate(parts, axis=1), self.channels, self.rate_hz)
 
 
-CHANNELS = (
-    *(Channel("w1", "N m"), Channel("w2", "N m"), Channel("u1", "N m"), Channel("u2", "N m")),
-    *(Channel("velocity1", "rad/s"), Channel("velocity2", "rad/s"), Channel("cart", "m/s")),
-)
+CHANNELS = GantryLoop().channels

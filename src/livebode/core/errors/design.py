@@ -24,6 +24,7 @@ class DesignError(LivebodeError):
 
     area: ClassVar[str] = "design"
     codes: ClassVar[Mapping[str, str]] = {
+        "accuracy-not-reached": "The required sigma of each entry cannot be reached in the time and within the limits.",
         "amplitude-undetermined": "No amplitude can be chosen, as neither noise nor limits are known.",
         "crest-factor-not-reached": "No excitation with such a low crest factor was found.",
         "feedback-unknown": "The feedback of the loop is needed and not described.",
@@ -32,5 +33,6 @@ class DesignError(LivebodeError):
         "motion-unknown": "A quantity has a limit, but its range in the motion alone is not given.",
         "name-forbidden": "The name is not allowed in the language or format of the file.",
         "no-room-in-motion": "The motion alone exceeds a limit, or leaves no room for an excitation.",
+        "not-enough-time": "The available time is shorter than two repetitions of the experiments.",
         "rounded-away": "Rounding to the steps of the drive changes the excitation too much.",
     }
