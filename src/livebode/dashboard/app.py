@@ -24,6 +24,7 @@ from livebode.dashboard.fleet_pages import FleetPages
 from livebode.dashboard.fleet_view import FleetView
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
+from livebode.dashboard.loop_trial import loop_trial
 from livebode.dashboard.past import Past
 from livebode.dashboard.runs_pages import RunsPages
 from livebode.dashboard.saved import applied, listed
@@ -74,6 +75,7 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
         Route("/api/past", pages.past),
         Route("/api/moment", pages.moment),
         Route("/api/signals", pages.signals),
+        Route("/api/loop", pages.loop),
         Route("/api/export", pages.export),
         Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
         Route("/api/shelve", pages.shelve, methods=["POST"]),
@@ -152,6 +154,14 @@ class _Pages:
         asked = queries.signals_asked(request.query_params, len(self._board.states))
         found = await signals(self._board, self._begun(asked.axis), asked)
         return Response(found, media_type="application/octet-stream")
+
+    async def loop(self, request: Request) -> Response:
+        """The controllers and the plant with its bounds, from which the page computes other gains and filters."""
+        if (state := self._asked_state(request)) is None:
+            return _unknown()
+        assert state.quantities is not None
+        found = await self._board.elsewhere(loop_trial, Past.of(state), state.quantities, dict(state.summary))
+        return JSONResponse(found)
 
     async def export(self, request: Request) -> Response:
         """Responses of a span of time as a file; a single response if the span has no length."""

@@ -102,6 +102,11 @@ class State:
         self.quantities = Quantities.of(self._summary)
         self._fitted, self._healthy, self._remark = overlays_of(self._summary, self.quantities)
 
+    @property
+    def summary(self) -> Mapping[str, Any]:
+        """The current run.json."""
+        return self._summary
+
     def refresh(self) -> None:
         """Take new data from the hub."""
         hub = self.hub

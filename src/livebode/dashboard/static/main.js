@@ -36,7 +36,7 @@ import { Trends } from "./trends.js";
 import { lamp } from "./verdict.js";
 import { viewMenu } from "./view-menu.js";
 import { Wall } from "./wall.js";
-import { whatIfMenu } from "./whatif-menu.js";
+import { WhatIfCard } from "./whatif-card.js";
 import { named } from "./words.js";
 import { zoneChoice } from "./zone.js";
 
@@ -287,6 +287,7 @@ function begin({ facts, axes, trends }) {
     map.begin(facts, page.schedule);
     fill();
     saved.fetch();
+    page.dirty.add("trial");
   }
   const gone = other && references.stored.size > 0;
   if (gone) references.releaseAll();
@@ -295,6 +296,7 @@ function begin({ facts, axes, trends }) {
   over.disable("position", facts.schedule ? "" : NO_POSITION);
   mapOver.disable("position", facts.schedule ? "" : NO_POSITION);
   drawLegend();
+  whatIf.begin();
   parameters.begin(trends);
   margins.begin(trends, whyNoMargins(facts));
   marginTrends.begin(trends);
@@ -409,6 +411,7 @@ function draw(now) {
     return true;
   };
   if (due("bode", 0)) bode.draw();
+  if (due("trial", 0)) whatIf.draw();
   if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule, bode);
   if (due("rows", TRACK_MS)) drawRows(now);
   if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) {
@@ -440,12 +443,12 @@ const { over, mapOver } = controls(page, parts, { watch, fill, watchShown, clear
 const showAlarm = alarmMoment(page, timeline, { references, complain });
 tools($("bode-tools"), bode);
 viewMenu($("bode-view"), $("bode-view-panel"), bode, () => delayMs(parameters.items.values(), timeline.atS ?? NaN));
-whatIfMenu(bode);
+const whatIf = new WhatIfCard(page, bode, { watch, complain });
 const operator = () => page.facts?.role === "operator";
 const curves = curvesMenu($("bode-curves"), $("bode-curves-panel"), { bode, references, saved, operator, complain });
 const showClock = zoneChoice($("clock", HTMLSelectElement));
 const lost = new Lost($("lost"));
 describe(page, { bode, tracking, map, trends: [parameters, marginTrends] });
 onClock(newClock);
-window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom };
+window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, whatIf };
 requestAnimationFrame(draw);

@@ -263,6 +263,56 @@ export interface SavedCurves {
   annotations: Annotation[];
 }
 
+/** A curve times a parameter to a power; without a name the curve alone. See tuning/feedback_parts.py. */
+export interface LoopTerm {
+  name: string;
+  power: number;
+  re: number[];
+  im: number[];
+}
+
+/** F = gain·(sum of the terms)·(1 + outer). */
+export interface LoopParts {
+  terms: LoopTerm[];
+  outer: LoopTerm | null;
+}
+
+/** The plant on a grid of frequencies with the radius that contains it; `known` of them are not above the lines. */
+export interface LoopBand {
+  frequency_hz: number[];
+  known: number;
+  lines_hz: number[];
+  dropped: number;
+  confidence: number;
+  places: { re: number[]; im: number[]; radius: number[] }[];
+  parts: LoopParts;
+}
+
+/** What a trial of other gains and filters needs; see loop_trial.py. */
+export interface LoopFacts {
+  described: boolean;
+  /** of `livebode check-loop` */
+  verdict: "as described" | "one change" | "not explained" | "not checked";
+  sentence: string;
+  /** Key of each parameter in the configuration. */
+  tables: Record<string, string>;
+  values: Record<string, number>;
+  rate_hz: number;
+  /** Grid of the page. */
+  frequency_hz: number[];
+  parts: LoopParts;
+  band: LoopBand | null;
+  band_why_not: string;
+  /** Filters of `livebode tune`. */
+  proposed: {
+    rate_hz: number;
+    notches: { hz: number; depth_db: number; damping: number }[];
+    low_passes_hz: number[];
+  } | null;
+}
+
+export type LoopAnswer = (LoopFacts & { why_not: "" }) | { why_not: string; described?: undefined };
+
 /** What the page shows, and what is to be drawn again (`dirty`). */
 export interface Page {
   axis: number;
