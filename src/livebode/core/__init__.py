@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from livebode.core._frequency_response import PER_LINE, Quantity
     from livebode.core._kinds import PlotKind
     from livebode.core._loop import Loop
+    from livebode.core._matrix_responses import CHANNELS_MAX, REASONS, MatrixResponses
     from livebode.core._plant_kinds import PlantKinds
     from livebode.core._plotting import plot_responses
     from livebode.core._response import PER_RESPONSE, Response, Responses, widened
@@ -67,6 +68,11 @@ _NAMES = {
     ),
     "_kinds": ("PlotKind",),
     "_loop": ("Loop",),
+    "_matrix_responses": (
+        "CHANNELS_MAX",
+        "REASONS",
+        "MatrixResponses",
+    ),
     "_plant_kinds": ("PlantKinds",),
     "_plotting": ("plot_responses",),
     "_response": (
@@ -119,11 +125,13 @@ __getattr__ = on_first_use(__name__, _NAMES)
 logging.getLogger("livebode").addHandler(logging.NullHandler())
 
 __all__ = [
+    "CHANNELS_MAX",
     "LEFT_OUT",
     "NOT_WHOLE",
     "PER_LINE",
     "PER_RESPONSE",
     "PID",
+    "REASONS",
     "SPIKE",
     "ArchiveError",
     "BaselineError",
@@ -144,6 +152,7 @@ __all__ = [
     "LivebodeError",
     "LocationError",
     "Loop",
+    "MatrixResponses",
     "MeasurementError",
     "Model",
     "OutputError",
