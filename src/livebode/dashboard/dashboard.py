@@ -16,6 +16,7 @@ from livebode.core import RecordError, ServerError
 from livebode.core.installing import not_installed
 from livebode.dashboard.access import Access
 from livebode.dashboard.hub import Hub
+from livebode.dashboard.matrix_view import views_of
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
@@ -76,10 +77,9 @@ class Dashboard:
 
     def view(self, directory: Path) -> None:
         """Show a run that was recorded, or that another process records; LivebodeError if it cannot be read."""
-        state, viewed = State(directory.resolve().name, len(self._states)), Viewed(directory)
-        viewed.fill(state)
-        self._viewed[len(self._states)] = viewed
-        self._states.append(state)
+        for state, viewed in views_of(directory, len(self._states)):
+            self._viewed[state.axis] = viewed
+            self._states.append(state)
 
     def view_all(self, directory: Path) -> None:
         """Show the list of all runs in a directory, instead of axes; each run is read when its page is opened.

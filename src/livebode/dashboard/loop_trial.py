@@ -22,7 +22,6 @@ from livebode.dashboard.overlays import grid_hz
 from livebode.dashboard.past import Past
 from livebode.dashboard.proposed_filters import proposed_filters
 from livebode.dashboard.quantities import Quantities
-from livebode.records import RunRecord
 from livebode.tuning.feedback_parts import FeedbackParts, FeedbackTerm
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.specification import LoopSpecification
@@ -85,7 +84,7 @@ def _band(past: Past, quantities: Quantities, model: Model) -> dict[str, Any]:
 def _responses(past: Past) -> Responses:
     """Those that `livebode tune` uses, if they can be read soon."""
     if past.readable and _size_bytes(past.directory) <= _READ_BYTES:
-        return Responses.join(list(RunRecord.open(past.directory).steady_batches()))
+        return Responses.join(list(past.record().steady_batches()))
     found = next(past.all_between(-inf, inf)) if past.overview is None else past.overview
     return found[np.flatnonzero(found.ready)]
 

@@ -19,6 +19,7 @@ import { Lost } from "./lost.js";
 import { byId as $, choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
 import { isMargin, Margins, marginWords } from "./margins.js";
+import { Matrix } from "./matrix.js";
 import { past } from "./past.js";
 import { readout } from "./readout.js";
 import { recognised } from "./recognition.js";
@@ -117,10 +118,12 @@ const timeline = new Timeline(
     onMoment: (timeS) => {
       rememberMoment(timeS);
       showMoment(timeS);
+      matrix.fetch();
     },
     onLive: () => {
       rememberMoment(null);
       goLive();
+      matrix.fetch();
     },
   },
 );
@@ -296,6 +299,7 @@ function begin({ facts, axes, trends }) {
   over.disable("position", facts.schedule ? "" : NO_POSITION);
   mapOver.disable("position", facts.schedule ? "" : NO_POSITION);
   drawLegend();
+  matrix.begin(facts);
   whatIf.begin();
   parameters.begin(trends);
   margins.begin(trends, whyNoMargins(facts));
@@ -443,6 +447,13 @@ const { over, mapOver } = controls(page, parts, { watch, fill, watchShown, clear
 const showAlarm = alarmMoment(page, timeline, { references, complain });
 tools($("bode-tools"), bode);
 viewMenu($("bode-view"), $("bode-view-panel"), bode, () => delayMs(parameters.items.values(), timeline.atS ?? NaN));
+const matrix = new Matrix(page, timeline, {
+  choose: (axis) => {
+    axisChoice.value = String(axis);
+    axisChoice.dispatchEvent(new Event("change"));
+  },
+  complain,
+});
 const whatIf = new WhatIfCard(page, bode, { watch, complain });
 const operator = () => page.facts?.role === "operator";
 const curves = curvesMenu($("bode-curves"), $("bode-curves-panel"), { bode, references, saved, operator, complain });
@@ -450,5 +461,5 @@ const showClock = zoneChoice($("clock", HTMLSelectElement));
 const lost = new Lost($("lost"));
 describe(page, { bode, tracking, map, trends: [parameters, marginTrends] });
 onClock(newClock);
-window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, whatIf };
+window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, whatIf, matrix };
 requestAnimationFrame(draw);

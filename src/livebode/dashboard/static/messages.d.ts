@@ -68,6 +68,30 @@ export interface Run extends Axis {
   model: string;
   baseline: boolean;
   remark: string;
+  /** of an entry of a matrix run; null of any other run */
+  matrix: MatrixNames | null;
+}
+
+/** Signals of a matrix run; the axes of its entries follow the first one, output by output. */
+export interface MatrixNames {
+  name: string;
+  outputs: string[];
+  inputs: string[];
+  first_axis: number;
+}
+
+/** One matrix; see matrix_answer.py. */
+export interface MatrixAnswer extends MatrixNames {
+  frequency_hz: number[];
+  time_s: number;
+  dof: Sent;
+  /** by output and input; `reach` is 3σ/|G| */
+  entries: { db: Sent[]; reach: Sent[]; unit: string }[][];
+  /** of each input: lines at which its column is invalid, by reason */
+  reasons: Partial<Record<"incomplete" | "not excited" | "not separated", number>>[];
+  singular_db: Sent[][];
+  condition: Sent[];
+  coherence: Sent[][];
 }
 
 export type Facts = Waiting | Run;
