@@ -3,6 +3,7 @@
 import { tr } from "./language.js";
 import { element } from "./make.js";
 import { keepsClear, largestAbove, nearestHz, predicted, stable } from "./predicted.js";
+import { recognised } from "./recognition.js";
 import { feedback, nothing } from "./trial.js";
 import { orNoLimit } from "./whatif-text.js";
 import { fixed, hertz } from "./words.js";
@@ -67,7 +68,7 @@ export class TrialMargins {
     this.cells.clear();
     const { band } = facts;
     if (!band) {
-      this.host.replaceChildren(element("p", { class: "empty" }, facts.band_why_not));
+      this.host.replaceChildren(element("p", { class: "empty" }, recognised(facts.band_why_not)));
       return;
     }
     this.before = both(band, loops(band, facts, nothing()));
