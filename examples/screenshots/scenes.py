@@ -204,6 +204,25 @@ def what_if_phone(studio: Studio) -> bytes:
     return picture(page)
 
 
+def _matrix(studio: Studio, **options: Any) -> Page:
+    return studio.page(studio.views([studio.gantry]), until="() => document.querySelector('#matrix figure')", **options)
+
+
+@scene
+def matrix(studio: Studio) -> bytes:
+    return picture(_matrix(studio, color_scheme="light"))
+
+
+@scene
+def matrix_dark(studio: Studio) -> bytes:
+    return picture(_matrix(studio, color_scheme="dark"))
+
+
+@scene
+def matrix_phone(studio: Studio) -> bytes:
+    return picture(_matrix(studio, size=PHONE, **MOBILE))
+
+
 @scene
 def runs(studio: Studio) -> bytes:
     return picture(studio.page(studio.weeks_url, until="() => document.querySelector('#rows tr')"))

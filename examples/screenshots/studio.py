@@ -15,7 +15,7 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from examples.screenshots.machines import Afterwards, Tracked, at_standstill, healthy, write_loop
+from examples.screenshots.machines import Afterwards, Tracked, at_standstill, healthy, write_gantry, write_loop
 from livebode.core import Lines
 from livebode.dashboard import Dashboard, Serving
 from livebode.monitoring import Baseline
@@ -75,6 +75,15 @@ class Studio(ExitStack):
         livebode = Path(sys.executable).with_name("livebode")
         for command in (["run", axis, "--out", run], ["check-loop", run], ["tune", run]):
             subprocess.run([livebode, *command], check=True, stdout=subprocess.DEVNULL)
+        return run
+
+    @cached_property
+    def gantry(self) -> Path:
+        """A finished run with a matrix of responses."""
+        axis = write_gantry(self.folder / "two motors")
+        run = axis.parent / "gantry"
+        livebode = Path(sys.executable).with_name("livebode")
+        subprocess.run([livebode, "run", axis, "--out", run], check=True, stdout=subprocess.DEVNULL)
         return run
 
     def at_standstill(self, name: str, lines: Lines, amplitude_n_m: float) -> Path:

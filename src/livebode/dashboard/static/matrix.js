@@ -273,7 +273,7 @@ function figuresOf({ frequency_hz: hz, singular_db: singular, condition, coheren
       ),
       figure({
         width: 440,
-        height: 160,
+        height: 145,
         hz,
         curves: values.map((v, k) => ({ ink: INKS[k], dash: DASHES[k], values: v })),
         range,
