@@ -9,11 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Self
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
 from livebode.configuration.axis import FitSection
 from livebode.core import Block, Channel, Lines
 from livebode.dashboard import Hub
 from livebode.estimation import Settings, Tracker, plant_kinds
 from livebode.excitation import multisine
+from livebode.mimo.excitation import MatrixExcitation
 from livebode.monitoring import Baseline, Monitor
 from livebode.runtime import Destination
 from livebode.runtime.change_detection import ChangeDetection
@@ -21,12 +26,56 @@ from livebode.runtime.demo import RATE_HZ, demo_axis, described_loop
 from livebode.runtime.fits import Fits
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.run_loop import RunLoop
-from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Standstill
+from livebode.simulation import BeltAxis, GantryLoop, Sensor, SimulatedAxis, Standstill, TwoMassLoop
 
 Afterwards = Literal["live", "silent", "over"]
 BLOCK = 400
 _PATIENCE_S = 120.0
 _PARAMETERS = 4  # of the fitted model
+_AXIS = """
+[source]
+log = "log.parquet"
+rate_hz = 4000
+[signals]
+output = "y"
+input = "u"
+excitation = "w"
+[lines]
+frequencies = "4:100:2, 104:400:8"
+window = 2000
+[tracking]
+hop = 500
+[loop.velocity]
+gain = 0.2308
+integral_time_s = 0.2
+rate_hz = 4000
+[loop.position]
+gain = 1.0
+rate_hz = 2000
+rate_divider = 2
+[fit]
+model = "two-mass"
+output = "velocity"
+radius_m = 0.019
+"""
+_GANTRY = """
+[source]
+log = "log.parquet"
+rate_hz = 4000
+[signals]
+output = ["velocity1", "velocity2"]
+input = ["u1", "u2"]
+excitation = ["w1", "w2"]
+[lines]
+frequencies = "6:60:2, 64:120:4"
+window = 2000
+[tracking]
+estimator = "joint"
+hop = 2000
+[experiments]
+dwell_periods = 3
+settle_periods = 2
+"""
 
 
 @dataclass
@@ -120,3 +169,27 @@ def at_standstill(lines: Lines, amplitude_n_m: float) -> tuple[Held, Settings]:
     )
     settings = Settings(lines=lines, output="velocity", input="u", excitation="w", schedule="x", hop=lines.window // 4)
     return Held(SimulatedAxis(axis), 6.0, "over"), settings
+
+
+def write_loop(folder: Path) -> Path:
+    """A recording of two masses in their loop at standstill, and the axis.toml that describes it, which is returned."""
+    lines = Lines.parse("4:100:2, 104:400:8", RATE_HZ, 2000)
+    w = 0.1 * multisine(lines)
+    u, y = TwoMassLoop().run(w, 10, sigma=0.1, seed=1)
+    return _written(folder, _AXIS, {"w": np.resize(w, u.size), "u": u[0], "y": y[0]})
+
+
+def write_gantry(folder: Path) -> Path:
+    """A recording of a gantry with two motors, and the axis.toml that describes it, which is returned."""
+    lines = Lines.parse("6:60:2, 64:120:4", RATE_HZ, 2000)
+    excitation = MatrixExcitation.orthogonal(lines, 2, 0.5, dwell=3, settle=2)
+    w = np.tile(excitation.samples, 4)
+    block = GantryLoop().simulate(w, noise=0.2 * np.random.default_rng(0).standard_normal((3, w.shape[1])))
+    return _written(folder, _GANTRY, dict(zip(block.names, block.data)))
+
+
+def _written(folder: Path, text: str, columns: dict[str, np.ndarray]) -> Path:
+    folder.mkdir()
+    pq.write_table(pa.table(columns), folder / "log.parquet")
+    (folder / "axis.toml").write_text(text, encoding="utf-8")
+    return folder / "axis.toml"

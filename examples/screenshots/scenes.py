@@ -167,19 +167,60 @@ def lost_server(studio: Studio) -> bytes:
 
 @scene
 def nyquist(studio: Studio) -> bytes:
-    return picture(studio.page(studio.faulty_url, "#quantity=open loop&view=nyquist&what-if=12_0_0_0.3_0&tab=margins"))
+    return picture(studio.page(studio.faulty_url, "#quantity=open loop&view=nyquist&what-if=gain~0.9232&tab=margins"))
 
 
 @scene
 def nichols(studio: Studio) -> bytes:
-    return picture(studio.page(studio.faulty_url, "#quantity=open loop&view=nichols&what-if=20_0_60_0.3_1"))
+    return picture(
+        studio.page(studio.faulty_url, "#quantity=open loop&view=nichols&what-if=gain~2.308~~notch~60~20~0.3~~delay~1")
+    )
+
+
+TRIAL = (
+    "#quantity=open loop&sliders=1&what-if=gain~2.4~~integral_time_s~0.04~~position_gain~25~~notch~75~8~1~~low-pass~300"
+)
+
+
+def _what_if(studio: Studio, address: str = TRIAL, **options: Any) -> Page:
+    drawn = "() => window.livebode?.bode.drawn['what if'] && document.querySelector('#what-if-margins tbody')"
+    return studio.page(studio.views([studio.tuned]), address, until=drawn, **options)
 
 
 @scene
-def open_loop(studio: Studio) -> bytes:
-    page = studio.page(studio.faulty_url, "#quantity=open loop&what-if=20_0_60_0.3_1")
-    page.locator("#what-if").click()
+def what_if(studio: Studio) -> bytes:
+    return picture(_what_if(studio, color_scheme="light"))
+
+
+@scene
+def what_if_nyquist_dark(studio: Studio) -> bytes:
+    return picture(_what_if(studio, TRIAL + "&view=nyquist&nyquist-box=-2_1_-1.5_1.5", color_scheme="dark"))
+
+
+@scene
+def what_if_phone(studio: Studio) -> bytes:
+    page = _what_if(studio, size=PHONE, **MOBILE)
+    page.evaluate("() => document.querySelector('.bode').scrollIntoView()")
     return picture(page)
+
+
+def _matrix(studio: Studio, **options: Any) -> Page:
+    return studio.page(studio.views([studio.gantry]), until="() => document.querySelector('#matrix figure')", **options)
+
+
+@scene
+def matrix(studio: Studio) -> bytes:
+    return picture(_matrix(studio, color_scheme="light"))
+
+
+@scene
+def matrix_dark(studio: Studio) -> bytes:
+    return picture(_matrix(studio, color_scheme="dark"))
+
+
+@scene
+def matrix_phone(studio: Studio) -> bytes:
+    return picture(_matrix(studio, size=PHONE, **MOBILE))
 
 
 @scene

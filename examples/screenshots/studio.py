@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -14,7 +15,7 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from examples.screenshots.machines import Afterwards, Tracked, at_standstill, healthy
+from examples.screenshots.machines import Afterwards, Tracked, at_standstill, healthy, write_gantry, write_loop
 from livebode.core import Lines
 from livebode.dashboard import Dashboard, Serving
 from livebode.monitoring import Baseline
@@ -65,6 +66,25 @@ class Studio(ExitStack):
     def standstill(self) -> Path:
         """A finished run at 101 lines."""
         return self.at_standstill("101 lines", Lines.parse("10:1010:10", rate_hz=RATE_HZ, window=1600), 0.1)
+
+    @cached_property
+    def tuned(self) -> Path:
+        """A finished run of two masses in their loop: its description was checked, and `livebode tune` has proposed."""
+        axis = write_loop(self.folder / "two masses")
+        run = axis.parent / "axis"
+        livebode = Path(sys.executable).with_name("livebode")
+        for command in (["run", axis, "--out", run], ["check-loop", run], ["tune", run]):
+            subprocess.run([livebode, *command], check=True, stdout=subprocess.DEVNULL)
+        return run
+
+    @cached_property
+    def gantry(self) -> Path:
+        """A finished run with a matrix of responses."""
+        axis = write_gantry(self.folder / "two motors")
+        run = axis.parent / "gantry"
+        livebode = Path(sys.executable).with_name("livebode")
+        subprocess.run([livebode, "run", axis, "--out", run], check=True, stdout=subprocess.DEVNULL)
+        return run
 
     def at_standstill(self, name: str, lines: Lines, amplitude_n_m: float) -> Path:
         """A finished run at standstill."""

@@ -105,7 +105,13 @@ def panels(tab: Tab) -> Iterator[tuple[str, str]]:
     for key, name in (("p", "parameters"), ("g", "margins")):
         page.keyboard.press(key)
         yield name, ".more"
-    for panel in ("bode-view", "bode-curves", "what-if"):
+    page.locator("#what-if").click()
+    page.locator("#what-if-margins tbody").wait_for()
+    page.get_by_role("button", name="add a notch").click()
+    yield "what if", "#what-if-card"
+    page.locator("#what-if-reset").click()
+    page.keyboard.press("Escape")
+    for panel in ("bode-view", "bode-curves"):
         page.locator(f"#{panel}").click()
         yield panel, f"#{panel}-panel"
         page.keyboard.press("Escape")

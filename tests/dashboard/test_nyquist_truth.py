@@ -1,4 +1,4 @@
-"""Nyquist plot, Nichols chart and "What if" agree with NumPy: points, bounds, contours, margins, zoom, address."""
+"""Nyquist plot and Nichols chart agree with NumPy: points, bounds, contours, margins, zoom, address."""
 
 from __future__ import annotations
 
@@ -196,69 +196,6 @@ def test_a_picture_and_the_print_show_the_chosen_plot(tab: Tab) -> None:
     assert tab.page.locator("#sheet canvas").count() == 3
     tab.page.evaluate("dispatchEvent(new Event('afterprint'))")
     assert scales(tab) == pytest.approx(before)
-
-
-def filtered(f: np.ndarray) -> np.ndarray:
-    """C of `TRIED`, from its parts."""
-    r = f / 60
-    notch = (1 - r**2 + 2j * 0.5 * r / 10) / (1 - r**2 + 2j * 0.5 * r)
-    return 10 ** (6 / 20) / (1 + 1j * f / 200) * notch * np.exp(-2j * np.pi * f * 1e-3)  # type: ignore[no-any-return]
-
-
-TRIED = {"gainDb": 6, "lowpassHz": 200, "notchHz": 60, "notchDamping": 0.5, "delayMs": 1}
-
-
-def test_what_if_is_the_loop_times_the_filter_in_every_quantity(tab: Tab, run: Path) -> None:
-    value, sigma = loop(run)
-    truth = value * filtered(F)
-    slope = filtered(F) / (1 + truth) ** 2
-    show(tab, "nyquist")
-    tab.page.locator("#what-if").click()
-    for part, number in TRIED.items():
-        field = tab.page.locator(f"#what-if-panel [data-part={part}]")
-        field.fill(str(number))
-        field.press("Tab")
-    tab.until("bode.plane.traced.some((t) => t.name === 'what if')")
-    text = tab.page.locator("#what-if-panel .tried")
-    assert text.inner_text().startswith("From the fitted model: ")
-    assert "proposes nothing to the machine" in tab.page.locator("#what-if-panel").inner_text()
-    expected = {
-        "open loop": (truth, sigma * np.abs(filtered(F))),
-        "closed loop": (truth / (1 + truth), sigma * np.abs(slope)),
-        "sensitivity": (1 / (1 + truth), sigma * np.abs(slope)),
-    }
-    for quantity, (curve, bound) in expected.items():
-        tab.page.locator(f'#quantities [data-value="{quantity}"]').click()
-        tab.until(f"bode.curves.measured?.frame.quantity === '{quantity}' && bode.curves['what if']")
-        found = traced(tab, "what if", "x") + 1j * traced(tab, "what if", "y")
-        # T and S travel as float32 and become L again: relative to what is near −1 and near zero.
-        assert np.allclose(found, curve, rtol=2e-4, atol=2e-4), quantity
-        radius = tab.numbers("bode.curves['what if'].reach") * np.abs(curve)
-        assert np.allclose(radius, 3 * bound, rtol=2e-3, atol=1e-4), quantity
-    tab.page.locator('#quantities [data-value="plant"]').click()
-    tab.until("bode.curves.measured?.frame.quantity === 'plant' && bode.drawn.measured && !bode.curves['what if']")
-    tab.reload()
-    tab.until("window.livebode?.bode.filter")
-    assert tab.js("bode.filter") == TRIED
-    tab.page.locator("#what-if").click()
-    tab.page.locator("#what-if-panel button").click()
-    assert tab.js("bode.filter") is None
-    tab.until("!location.hash.includes('what-if')")
-    tab.page.locator('#quantities [data-value="open loop"]').click()
-    tab.until("bode.curves.measured?.frame.quantity === 'open loop' && bode.drawn.measured")
-    tab.page.keyboard.press("Escape")
-
-
-def test_what_if_keeps_the_turn_of_the_measured_phase_and_adds_that_of_the_filter(tab: Tab) -> None:
-    """Also beyond −180°, and beside values that cannot be distinguished from zero."""
-    deg = np.linspace(-700.0, 100.0, len(F))
-    curve = {"hz": F.tolist(), "db": [0.0] * len(F), "deg": deg.tolist(), "reach": [0.1, 2.0] * (len(F) // 2 + 1)}
-    found = tab.page.evaluate(
-        "async ([curve, filter]) => (await import('/static/whatif.js')).tried(curve, 'open loop', filter).deg",
-        [curve | {"frame": None, "noise": [], "coherence": []}, TRIED],
-    )
-    own = np.degrees(np.angle(filtered(F) * np.exp(2j * np.pi * F * 1e-3))) - 360 * F * 1e-3
-    assert np.allclose(found, deg + own, atol=1e-6)
 
 
 def test_margins_of_a_known_loop(tab: Tab) -> None:

@@ -80,7 +80,8 @@ def run_targets(
         if alone is not None and alone.output_only is not None:
             _run_output_only(alone, directory, force, as_json, serve, send)
             return
-        with served(serve, _serving(axes), port, names, stays=not live) as subscribers_of:
+        matrices = {name or target.stem: entries for name, axis in axes.items() if (entries := _entries(axis))}
+        with served(serve, _serving(axes), port, names, stays=not live, matrices=matrices) as subscribers_of:
             publishing = published(axes, directory, target.stem, edited=live and file is not None)
             with publishing as publisher:
                 if alone is not None and not live:
@@ -125,6 +126,14 @@ def _output_only(target: Location, chosen: bool, outputs: list[str], band: str |
             options=["--band"],
         )
     return {}
+
+
+def _entries(axis: Axis) -> list[tuple[str, str]]:
+    """Output and input of each entry of a matrix of responses; none of an axis with one."""
+    if not axis.signals.is_matrix:
+        return []
+    columns = axis.signals.listed("excitation" if axis.tracking.estimator == "indirect" else "input")
+    return [(output, column) for output in axis.signals.listed("output") for column in columns]
 
 
 def _serving(axes: Axes) -> ServeSection:

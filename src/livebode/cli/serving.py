@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from livebode.runtime import Subscriber
 if TYPE_CHECKING:
     from livebode.dashboard import Dashboard
 
+Entries = Sequence[tuple[str, str]]
 SubscribersOf = Callable[[str], tuple[Subscriber, ...]]
 
 
@@ -34,21 +35,32 @@ def dashboard_of(section: ServeSection, port: int | None) -> Dashboard:
 
 @contextmanager
 def served(
-    required: bool, section: ServeSection, port: int | None, names: Sequence[str], stays: bool
+    required: bool,
+    section: ServeSection,
+    port: int | None,
+    names: Sequence[str],
+    stays: bool,
+    matrices: Mapping[str, Entries] | None = None,
 ) -> Iterator[SubscribersOf]:
     """A function that returns the subscribers of an axis by its name: the dashboard, or nobody.
 
-    `names` are the axes that exist from the beginning; `stays` serves the page after the run until Ctrl-C.
+    `names` are the axes that exist from the beginning; `stays` serves the page after the run until Ctrl-C; `matrices`
+    has the entries of those with a matrix of responses.
     """
     if not required:
         yield lambda _: ()
         return
     dashboard = dashboard_of(section, port)
+
+    def hub(name: str) -> Subscriber:
+        entries = (matrices or {}).get(name)
+        return dashboard.hub(name) if entries is None else dashboard.matrix_hub(name, entries)
+
     for name in names:
-        dashboard.hub(name)
+        hub(name)
     with dashboard:
         print_line(f"the dashboard is at {dashboard.url}")
-        yield lambda name: (dashboard.hub(name),)
+        yield lambda name: (hub(name),)
         if stays:
             print_line(f"the run is finished; {dashboard.url} shows it until Ctrl-C")
             wait_for_the_end()

@@ -13,7 +13,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from livebode import export
-from livebode.core import LivebodeError, Responses, ServerError
+from livebode.core import LivebodeError, RecordError, Responses, ServerError
 from livebode.dashboard import queries
 from livebode.dashboard.access import COOKIE, SESSION_S
 from livebode.dashboard.admission import serve_browser
@@ -24,6 +24,8 @@ from livebode.dashboard.fleet_pages import FleetPages
 from livebode.dashboard.fleet_view import FleetView
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
+from livebode.dashboard.loop_trial import loop_trial
+from livebode.dashboard.matrix_answer import matrix_answer
 from livebode.dashboard.past import Past
 from livebode.dashboard.runs_pages import RunsPages
 from livebode.dashboard.saved import applied, listed
@@ -31,7 +33,7 @@ from livebode.dashboard.settings import Serving
 from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
 from livebode.language import for_page, negotiated
-from livebode.records.saved_curves import change_saved, read_saved
+from livebode.records.saved_curves import SavedCurves, change_saved, read_saved
 
 _HERE = Path(__file__).parent
 _FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
@@ -74,6 +76,8 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
         Route("/api/past", pages.past),
         Route("/api/moment", pages.moment),
         Route("/api/signals", pages.signals),
+        Route("/api/loop", pages.loop),
+        Route("/api/matrix", pages.matrix),
         Route("/api/export", pages.export),
         Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
         Route("/api/shelve", pages.shelve, methods=["POST"]),
@@ -153,6 +157,25 @@ class _Pages:
         found = await signals(self._board, self._begun(asked.axis), asked)
         return Response(found, media_type="application/octet-stream")
 
+    async def loop(self, request: Request) -> Response:
+        """The controllers and the plant with its bounds, from which the page computes other gains and filters."""
+        if (state := self._asked_state(request)) is None:
+            return _unknown()
+        assert state.quantities is not None
+        found = await self._board.elsewhere(loop_trial, Past.of(state), state.quantities, dict(state.summary))
+        return JSONResponse(found)
+
+    async def matrix(self, request: Request) -> Response:
+        """The newest matrix of the run that an axis is an entry of, or the one nearest to a time."""
+        if (state := self._asked_state(request)) is None:
+            return _unknown()
+        group, time_s = state.group, queries.moment(request.query_params)
+        if group is None:
+            raise RecordError("no-matrix", "this run has one response and no matrix", "reload the page")
+        found = await self._board.elsewhere(group.at, _directory(state), state.readable, time_s)
+        units = [[_unit(self._board.states[group.axis(o, i)]) for i in group.inputs] for o in group.outputs]
+        return JSONResponse(matrix_answer(group, found, units))
+
     async def export(self, request: Request) -> Response:
         """Responses of a span of time as a file; a single response if the span has no length."""
         if (state := self._asked_state(request)) is None:
@@ -196,6 +219,8 @@ class _Pages:
         """The references and annotations that are saved with a run."""
         if (state := self._asked_state(request)) is None:
             return _unknown()
+        if state.entry is not None:
+            return JSONResponse(listed(SavedCurves()))  # the file of a run does not name entries
         return JSONResponse(listed(await self._board.elsewhere(read_saved, _directory(state))))
 
     async def change_saved(self, request: Request) -> Response:
@@ -205,6 +230,10 @@ class _Pages:
             return data
         change = queries.saved_change(data, len(self._board.states))
         state = self._begun(change.axis)
+        if state.entry is not None:
+            raise ServerError(
+                "entry-only", "nothing can be saved with one entry of a matrix run", "copy a link instead"
+            )
         job = applied(change, Past.of(state), state)
         return JSONResponse(listed(await self._board.elsewhere(change_saved, _directory(state), job)))
 
@@ -263,6 +292,10 @@ def _files() -> dict[str, tuple[bytes, str]]:
 def _as(state: State, responses: Responses, span: queries.Span) -> Responses:
     assert state.quantities is not None
     return state.quantities.of_responses(responses, span.quantity)
+
+
+def _unit(state: State) -> str:
+    return "" if state.quantities is None else state.quantities.unit
 
 
 def _directory(state: State) -> Path:

@@ -8,7 +8,7 @@ import logging
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -16,6 +16,9 @@ from livebode.core import RecordError, ServerError
 from livebode.core.installing import not_installed
 from livebode.dashboard.access import Access
 from livebode.dashboard.hub import Hub
+from livebode.dashboard.matrix_group import MatrixGroup
+from livebode.dashboard.matrix_hub import MatrixHub
+from livebode.dashboard.matrix_view import views_of
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
@@ -56,6 +59,7 @@ class Dashboard:
         self._serving, self._hears = serving, report
         self._states: list[State] = []
         self._viewed: dict[int, Viewed] = {}
+        self._matrices: list[MatrixHub] = []
         self._runs: Path | None = None
         self._fleet: FleetView | None = None
         self._server: Any = None
@@ -74,12 +78,26 @@ class Dashboard:
         self._states.append(State(name, len(self._states), hub))
         return hub
 
+    def matrix_hub(self, name: str, entries: Sequence[tuple[str, str]]) -> MatrixHub:
+        """The audience for the runs of an axis with a matrix of responses, output by output; each entry is an axis."""
+        for hub in self._matrices:
+            if hub.name == name:
+                return hub
+        hub = MatrixHub(name, list(entries))
+        outputs, inputs = (tuple(dict.fromkeys(entry[k] for entry in entries)) for k in (0, 1))
+        group = MatrixGroup(name, outputs, inputs, len(self._states), hub.newest)
+        for (output, input), one in hub.hubs.items():
+            state = State(one.name, len(self._states), one)
+            state.group, state.entry = group, f"{output}/{input}"
+            self._states.append(state)
+        self._matrices.append(hub)
+        return hub
+
     def view(self, directory: Path) -> None:
         """Show a run that was recorded, or that another process records; LivebodeError if it cannot be read."""
-        state, viewed = State(directory.resolve().name, len(self._states)), Viewed(directory)
-        viewed.fill(state)
-        self._viewed[len(self._states)] = viewed
-        self._states.append(state)
+        for state, viewed in views_of(directory, len(self._states)):
+            self._viewed[state.axis] = viewed
+            self._states.append(state)
 
     def view_all(self, directory: Path) -> None:
         """Show the list of all runs in a directory, instead of axes; each run is read when its page is opened.

@@ -15,8 +15,7 @@ from starlette.types import ASGIApp
 from livebode.core import ServerError
 from livebode.dashboard.access import Access
 from livebode.dashboard.board import Board
-from livebode.dashboard.state import State
-from livebode.dashboard.viewed import Viewed
+from livebode.dashboard.matrix_view import views_of
 
 OPEN_MAX = 8
 """Largest number of runs in memory."""
@@ -85,16 +84,9 @@ class OpenedRuns:
             found.board.close()
 
     async def _open(self, directory: Path) -> _OpenedRun:
-        state = State(directory.name, 0)
-
-        def read() -> Viewed:
-            viewed = Viewed(directory)
-            viewed.fill(state)
-            return viewed
-
         identity = _identity(directory)
-        viewed = await asyncio.get_running_loop().run_in_executor(None, read)
-        board = Board([state], {0: viewed}, self.access)
+        views = await asyncio.get_running_loop().run_in_executor(None, views_of, directory)
+        board = Board([state for state, _ in views], {state.axis: viewed for state, viewed in views}, self.access)
         return _OpenedRun(board, self.page(board), asyncio.create_task(board.run()), identity)
 
     def _make_room(self) -> None:

@@ -35,6 +35,8 @@ class Past:
         The newest responses that were sent to browsers.
     readable
         Whether the record can be read: a run in one piece can be read only after its end.
+    entry
+        Of a matrix run: output and input of the responses, such as "velocity2/u1".
     """
 
     directory: Path
@@ -44,6 +46,7 @@ class Past:
     last_s: float
     readable: bool
     shown: tuple[Responses, ...]
+    entry: str | None = None
 
     @classmethod
     def of(cls, state: State) -> Past:
@@ -58,6 +61,7 @@ class Past:
             state.last_s,
             state.readable,
             tuple(state.sent),
+            state.entry,
         )
 
     def between(self, from_s: float, to_s: float, rows: int) -> Responses:
@@ -85,8 +89,12 @@ class Past:
         behind = newest[np.flatnonzero(newest.sample > recorded.sample[-1])]  # of a segment that is being written
         return _thinned(Responses.join([recorded, replace(behind, unit=recorded.unit)]), rows)
 
+    def record(self) -> RunRecord:
+        """The record of the run, or of its entry."""
+        return RunRecord.open(self.directory, entry=self.entry)
+
     def _recorded(self, from_s: float, to_s: float, rows: int) -> Responses | None:
-        run = RunRecord.open(self.directory)
+        run = self.record()
         within = [one for one in run.segments if one.table == "responses" and from_s <= one.last_s <= to_s]
         if sum(one.size_bytes for one in within) > _READ_BYTES:
             means = thinned(run, (to_s - from_s) / max(1, rows - 1), (from_s, to_s))
@@ -101,7 +109,7 @@ class Past:
     def all_between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """All responses of a span, in parts: from the record if it can be read, otherwise those in memory."""
         if self.readable:
-            yield from RunRecord.open(self.directory).between(from_s, to_s)
+            yield from self.record().between(from_s, to_s)
         elif self.recent is None or self.overview is None:
             raise ServerError("not-begun", "there is no response yet", "wait for the first window")
         else:
@@ -112,7 +120,7 @@ class Past:
         found = [part for part in (*self.shown, self.recent, self.overview) if part is not None]
         if self.readable and self.overview is not None:
             reach_s = 2 * self.overview.lines.window / self.overview.lines.rate_hz
-            found += RunRecord.open(self.directory).between(time_s - reach_s, time_s + reach_s)
+            found += self.record().between(time_s - reach_s, time_s + reach_s)
         best = _nearest(found, time_s)
         if best is None:
             raise ServerError("not-begun", "no response has a valid line yet", "wait for the first window")

@@ -100,6 +100,15 @@ def span(query: Mapping[str, str], axes: int) -> Span:
     return Span(axis, _quantity(query.get("quantity", "plant")), from_s, to_s, rows, format)
 
 
+def moment(query: Mapping[str, str]) -> float | None:
+    """The time of a query for one moment; None for the newest.
+
+    >>> moment({"at": "2.5"}), moment({})
+    (2.5, None)
+    """
+    return _time(query["at"]) if "at" in query else None
+
+
 def signals_asked(query: Mapping[str, str], axes: int) -> SignalsAsked:
     """Parse a query for raw signals; LivebodeError if it is invalid.
 
@@ -117,7 +126,7 @@ def signals_asked(query: Mapping[str, str], axes: int) -> SignalsAsked:
             allowed=list(get_args(Picture)),
         )
     axis = whole_number(query.get("axis", "0"), 0, axes - 1, "axis")
-    return SignalsAsked(axis, cast(Picture, picture), _time(query["at"]) if "at" in query else None)
+    return SignalsAsked(axis, cast(Picture, picture), moment(query))
 
 
 def client_message(text: str, axes: int) -> ClientMessage:

@@ -14,9 +14,9 @@ from livebode.records.sample_table import channels_of
 from livebode.tables import Table
 
 
-def recorded_answer(directory: Path, at_s: float, picture: Picture) -> bytes:
+def recorded_answer(directory: Path, entry: str | None, at_s: float, picture: Picture) -> bytes:
     """The answer with the recorded samples around a time, which is in the middle of them."""
-    run = RunRecord.open(directory)
+    run = RunRecord.open(directory, entry=entry)
     block = recorded_block(run, at_s)
     if block is not None:
         return answer(block, run.lines, picture)

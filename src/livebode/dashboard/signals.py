@@ -29,7 +29,7 @@ async def signals(board: Board, state: State, asked: SignalsAsked) -> bytes:
     if not state.readable:
         return why_not("unrecorded")
     at_s = state.last_s if asked.at_s is None else asked.at_s
-    return await board.elsewhere(recorded_answer, state.directory, at_s, asked.picture)
+    return await board.elsewhere(recorded_answer, state.directory, state.entry, at_s, asked.picture)
 
 
 def _newest(tap: SignalTap, lines: Lines, picture: Picture) -> bytes:

@@ -23,6 +23,7 @@ from livebode.dashboard.alarm import AlarmShelf
 from livebode.dashboard.alarm_actions import shelving, unshelving
 from livebode.dashboard.frames import curve, frame
 from livebode.dashboard.hub import Hub, Item
+from livebode.dashboard.matrix_group import MatrixGroup
 from livebode.dashboard.notices import EventCauses
 from livebode.dashboard.overlays import FittedCurve, Healthy, grid_hz, overlays_of
 from livebode.dashboard.quantities import QUANTITIES, Quantities
@@ -49,6 +50,9 @@ class State:
     def __init__(self, name: str, axis: int, hub: Hub | None = None) -> None:
         self.name, self.axis, self.hub = name, axis, hub
         self.directory: Path | None = None
+        self.group: MatrixGroup | None = None
+        """The matrix run of which this is the `entry`; None of any other run."""
+        self.entry: str | None = None
         self.quantities: Quantities | None = None
         self.version = self.runs = 0
         self._begun: Mapping[str, Any] | None = None
@@ -102,6 +106,11 @@ class State:
         self.quantities = Quantities.of(self._summary)
         self._fitted, self._healthy, self._remark = overlays_of(self._summary, self.quantities)
 
+    @property
+    def summary(self) -> Mapping[str, Any]:
+        """The current run.json."""
+        return self._summary
+
     def refresh(self) -> None:
         """Take new data from the hub."""
         hub = self.hub
@@ -125,7 +134,7 @@ class State:
         if "record" not in self._summary or self.directory is None:
             return
         with suppress(LivebodeError):  # it has just started
-            self.take(list(RunRecord.open(self.directory).events()))
+            self.take(list(RunRecord.open(self.directory, entry=self.entry).events()))
 
     def _shelve_again(self, shelves: Mapping[str, AlarmShelf]) -> None:
         """Shelve in a run that continues another one what is shelved there."""
@@ -278,6 +287,7 @@ class State:
             "model": self._fitted.model.name if self._fitted else "",
             "baseline": self._healthy is not None,
             "remark": self._remark,
+            "matrix": None if self.group is None else self.group.plain(),
         }
 
     def span(self) -> dict[str, Any]:

@@ -23,11 +23,11 @@ _RECENT_S = 600.0
 
 
 class Viewed:
-    """Passes the responses, parameters and events of a run directory to a State."""
+    """Passes the responses, parameters and events of a run directory, or of an entry of a matrix run, to a State."""
 
-    def __init__(self, directory: Path) -> None:
-        self.directory = directory
-        self._run = RunRecord.open(directory)
+    def __init__(self, directory: Path, entry: str | None = None) -> None:
+        self.directory, self._entry = directory, entry
+        self._run = RunRecord.open(directory, entry=entry)
         self._sample = self._parameter_sample = -1
         self._last_s = -inf
         self._events = 0
@@ -40,11 +40,15 @@ class Viewed:
 
     def fill(self, state: State) -> None:
         """Pass all data to the state."""
-        state.begin(self.directory, self._run.summary)
+        self.begin(state)
         if not self._fill_from_means(state):
             for part in self._run.batches():
-                self._responses(state, part)
-        self._rest(state)
+                self.take(state, part)
+        self.rest(state)
+
+    def begin(self, state: State) -> None:
+        """Start the run of the state; its responses follow by `take`, and then everything else by `rest`."""
+        state.begin(self.directory, self._run.summary)
 
     def _fill_from_means(self, state: State) -> bool:
         """Pass the means of a long run and its newest responses; False if the run is short, or has no means."""
@@ -65,14 +69,15 @@ class Viewed:
 
     def more(self) -> tuple[list[Item], list[tuple[str, str, str, TrendRows]], dict[str, Any], bool]:
         """Pass new data: responses and events, rows of parameters, run.json, and whether the run has ended."""
-        self._run = RunRecord.open(self.directory)
+        self._run = RunRecord.open(self.directory, entry=self._entry)
         behind_s = self._last_s, inf  # earlier segments are not read again
         items: list[Item] = [new for part in self._run.between(*behind_s) if (new := self._new(part)) is not None]
         rows = list(self._parameters(behind_s))
         items += self._new_events()
         return items, rows, self._run.summary, self._run.finished
 
-    def _rest(self, state: State) -> None:
+    def rest(self, state: State) -> None:
+        """Pass parameters and events."""
         for model, name, unit, rows in self._parameters(None):
             state.trends.add(model, [name], [unit], rows)
         state.take(list(self._new_events()))
@@ -89,7 +94,8 @@ class Viewed:
         self._damages = self._run.damages
         return new
 
-    def _responses(self, state: State, part: Responses) -> None:
+    def take(self, state: State, part: Responses) -> None:
+        """Pass responses that are new."""
         if (new := self._new(part)) is not None:
             state.take([new])
 

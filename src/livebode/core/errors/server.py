@@ -22,6 +22,7 @@ class ServerError(LivebodeError):
     codes: ClassVar[Mapping[str, str]] = {
         "busy": "Too many requests wait already.",
         "cannot-listen": "The operating system does not let the dashboard listen at this address.",
+        "entry-only": "This is one entry of a matrix run, with which nothing can be saved.",
         "event-unknown": "An event with this key does not exist.",
         "no-alarm": "The event is not an alarm, so it cannot be shelved.",
         "not-begun": "The run has no samples or responses yet.",

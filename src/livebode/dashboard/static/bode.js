@@ -21,6 +21,7 @@ import { scaled, shifted, Zoom } from "./zoom.js";
 /** @import { Mode } from "./fitted.js" */
 /** @import { Mark } from "./marks.js" */
 /** @import { Annotation, Curves, Found, Frame, Quantity, Run } from "./messages.js" */
+/** @import { Factor } from "./trial.js" */
 
 const FEW_LINES = 40;
 const STEP = 0.7; // of a zoom by key or button
@@ -63,8 +64,12 @@ export class Bode {
     this.laid = [];
     /** @type {Operation | null} */
     this.operation = operationOf(chosen("bode-operation", ""));
-    /** What is tried on the loop. @type {import("./whatif.js").Filter | null} */
-    this.filter = null;
+    /** What is tried on the loop: C at the frequencies of a curve. @type {((curve: Curve) => Factor) | null} */
+    this.factor = null;
+    /** Margins of what is tried in this drawing. @type {Mark[] | null} */
+    this.triedMarks = null;
+    /** Whether the sliders are beside the plot. */
+    this.trying = false;
     /** @type {Extremum | null} */
     this.extremum = null;
     /** @type {Annotation[]} */
@@ -262,9 +267,10 @@ export class Bode {
       if (result) this.curves.result = result;
     }
     this.drop("what if");
+    this.triedMarks = null;
     const { measured: known } = this.curves;
     const other =
-      this.filter && known && !this.operation ? tried(known, known.frame?.quantity ?? null, this.filter) : null;
+      this.factor && known && !this.operation ? tried(known, known.frame?.quantity ?? null, this.factor(known)) : null;
     if (other) this.curves["what if"] = other;
     if (this.layout().join() !== this.laid.join()) this.build();
     const ratio = this.operation?.kind === "ratio";

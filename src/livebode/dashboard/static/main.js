@@ -19,6 +19,7 @@ import { Lost } from "./lost.js";
 import { byId as $, choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
 import { isMargin, Margins, marginWords } from "./margins.js";
+import { Matrix } from "./matrix.js";
 import { past } from "./past.js";
 import { readout } from "./readout.js";
 import { recognised } from "./recognition.js";
@@ -36,7 +37,7 @@ import { Trends } from "./trends.js";
 import { lamp } from "./verdict.js";
 import { viewMenu } from "./view-menu.js";
 import { Wall } from "./wall.js";
-import { whatIfMenu } from "./whatif-menu.js";
+import { WhatIfCard } from "./whatif-card.js";
 import { named } from "./words.js";
 import { zoneChoice } from "./zone.js";
 
@@ -117,10 +118,12 @@ const timeline = new Timeline(
     onMoment: (timeS) => {
       rememberMoment(timeS);
       showMoment(timeS);
+      matrix.fetch();
     },
     onLive: () => {
       rememberMoment(null);
       goLive();
+      matrix.fetch();
     },
   },
 );
@@ -287,6 +290,7 @@ function begin({ facts, axes, trends }) {
     map.begin(facts, page.schedule);
     fill();
     saved.fetch();
+    page.dirty.add("trial");
   }
   const gone = other && references.stored.size > 0;
   if (gone) references.releaseAll();
@@ -295,6 +299,8 @@ function begin({ facts, axes, trends }) {
   over.disable("position", facts.schedule ? "" : NO_POSITION);
   mapOver.disable("position", facts.schedule ? "" : NO_POSITION);
   drawLegend();
+  matrix.begin(facts);
+  whatIf.begin();
   parameters.begin(trends);
   margins.begin(trends, whyNoMargins(facts));
   marginTrends.begin(trends);
@@ -409,6 +415,7 @@ function draw(now) {
     return true;
   };
   if (due("bode", 0)) bode.draw();
+  if (due("trial", 0)) whatIf.draw();
   if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule, bode);
   if (due("rows", TRACK_MS)) drawRows(now);
   if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) {
@@ -440,12 +447,19 @@ const { over, mapOver } = controls(page, parts, { watch, fill, watchShown, clear
 const showAlarm = alarmMoment(page, timeline, { references, complain });
 tools($("bode-tools"), bode);
 viewMenu($("bode-view"), $("bode-view-panel"), bode, () => delayMs(parameters.items.values(), timeline.atS ?? NaN));
-whatIfMenu(bode);
+const matrix = new Matrix(page, timeline, {
+  choose: (axis) => {
+    axisChoice.value = String(axis);
+    axisChoice.dispatchEvent(new Event("change"));
+  },
+  complain,
+});
+const whatIf = new WhatIfCard(page, bode, { watch, complain });
 const operator = () => page.facts?.role === "operator";
 const curves = curvesMenu($("bode-curves"), $("bode-curves-panel"), { bode, references, saved, operator, complain });
 const showClock = zoneChoice($("clock", HTMLSelectElement));
 const lost = new Lost($("lost"));
 describe(page, { bode, tracking, map, trends: [parameters, marginTrends] });
 onClock(newClock);
-window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom };
+window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, whatIf, matrix };
 requestAnimationFrame(draw);

@@ -116,8 +116,11 @@ export function label({ ctx, px, u }, text, x, y, paint) {
   ctx.fillText(text, at + 4 * px, middle + 11.2 * px);
 }
 
-/** Margins of the fitted model, and those of what is tried. @param {Bode} bode */
-export const marksOf = (bode) => [...bode.known.margins(), ...triedMarks(bode)];
+/** Margins of the fitted model, and those of what is tried; alone beside the sliders, where both would hide the curves. @param {Bode} bode */
+export function marksOf(bode) {
+  const tried = triedMarks(bode);
+  return bode.trying && tried.length ? tried : [...bode.known.margins(), ...tried];
+}
 
 /** @param {Mark} mark */
 export const paintOf = ({ of }) => look(of ?? "model").ink;

@@ -68,6 +68,30 @@ export interface Run extends Axis {
   model: string;
   baseline: boolean;
   remark: string;
+  /** of an entry of a matrix run; null of any other run */
+  matrix: MatrixNames | null;
+}
+
+/** Signals of a matrix run; the axes of its entries follow the first one, output by output. */
+export interface MatrixNames {
+  name: string;
+  outputs: string[];
+  inputs: string[];
+  first_axis: number;
+}
+
+/** One matrix; see matrix_answer.py. */
+export interface MatrixAnswer extends MatrixNames {
+  frequency_hz: number[];
+  time_s: number;
+  dof: Sent;
+  /** by output and input; `reach` is 3σ/|G| */
+  entries: { db: Sent[]; reach: Sent[]; unit: string }[][];
+  /** of each input: lines at which its column is invalid, by reason */
+  reasons: Partial<Record<"incomplete" | "not excited" | "not separated", number>>[];
+  singular_db: Sent[][];
+  condition: Sent[];
+  coherence: Sent[][];
 }
 
 export type Facts = Waiting | Run;
@@ -262,6 +286,56 @@ export interface SavedCurves {
   references: { id: string; name: string; saved: string; time_s: number }[];
   annotations: Annotation[];
 }
+
+/** A curve times a parameter to a power; without a name the curve alone. See tuning/feedback_parts.py. */
+export interface LoopTerm {
+  name: string;
+  power: number;
+  re: number[];
+  im: number[];
+}
+
+/** F = gain·(sum of the terms)·(1 + outer). */
+export interface LoopParts {
+  terms: LoopTerm[];
+  outer: LoopTerm | null;
+}
+
+/** The plant on a grid of frequencies with the radius that contains it; `known` of them are not above the lines. */
+export interface LoopBand {
+  frequency_hz: number[];
+  known: number;
+  lines_hz: number[];
+  dropped: number;
+  confidence: number;
+  places: { re: number[]; im: number[]; radius: number[] }[];
+  parts: LoopParts;
+}
+
+/** What a trial of other gains and filters needs; see loop_trial.py. */
+export interface LoopFacts {
+  described: boolean;
+  /** of `livebode check-loop` */
+  verdict: "as described" | "one change" | "not explained" | "not checked";
+  sentence: string;
+  /** Key of each parameter in the configuration. */
+  tables: Record<string, string>;
+  values: Record<string, number>;
+  rate_hz: number;
+  /** Grid of the page. */
+  frequency_hz: number[];
+  parts: LoopParts;
+  band: LoopBand | null;
+  band_why_not: string;
+  /** Filters of `livebode tune`. */
+  proposed: {
+    rate_hz: number;
+    notches: { hz: number; depth_db: number; damping: number }[];
+    low_passes_hz: number[];
+  } | null;
+}
+
+export type LoopAnswer = (LoopFacts & { why_not: "" }) | { why_not: string; described?: undefined };
 
 /** What the page shows, and what is to be drawn again (`dirty`). */
 export interface Page {

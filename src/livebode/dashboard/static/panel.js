@@ -71,8 +71,8 @@ function seriesOf(bode, name, index) {
   return series;
 }
 
-/** The chart with the frequencies; on a wall there is no room for the coherence. */
-const lowest = () => PANELS.length - (letters() > 1 ? 2 : 1);
+/** The chart with the frequencies; on a wall, and above sliders on a telephone, there is no room for the coherence. @param {Bode} bode */
+const lowest = ({ hosts }) => PANELS.length - (hosts[2].offsetParent ? 1 : 2);
 
 /**
  * @param {Bode} bode
@@ -106,7 +106,7 @@ export function panel(bode, index) {
         x: { distr: bode.view.linear ? 1 : 3, time: false, range: () => bode.sight },
         y: /** @type {uPlot.Scale} */ (y.scale),
       },
-      axes: [frequencyAxis(() => bode.lines, bode.view, index === lowest()), y.axis()],
+      axes: [frequencyAxis(() => bode.lines, bode.view, index === lowest(bode)), y.axis()],
       series,
       bands,
       cursor: {

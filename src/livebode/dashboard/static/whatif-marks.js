@@ -1,5 +1,5 @@
 // @ts-check
-// The margins of L·C: in words for the menu, and marked in the plot.
+// The margins of L·C, marked in the plot.
 import { halfDeg, highDb } from "./frames.js";
 import { tr } from "./language.js";
 import { marginsOf, tried } from "./whatif.js";
@@ -7,52 +7,46 @@ import { fixed, hertz, signed } from "./words.js";
 
 /** @import { Bode } from "./bode.js" */
 /** @import { Mark } from "./marks.js" */
-/** @import { Filter, Margin } from "./whatif.js" */
+/** @import { Margin } from "./whatif.js" */
 
-/** @param {Margin} margin */
-function wordsOf({ kind, hz, value, reach }) {
+/** Short beside the sliders, where the card has the words. @param {Margin} margin @param {boolean} short */
+function wordsOf({ kind, hz, value, reach }, short) {
   const at = hertz(Number(hz.toPrecision(3)));
   if (kind === "gain") {
-    const around = reach < 1 ? ` ± ${fixed(highDb(0, reach), 2)}` : "";
-    return tr("gain may change by {value} dB at {hz} Hz", { value: signed(value, 2) + around, hz: at });
+    const around = reach < 1 ? ` ± ${fixed(highDb(0, reach), 2)}` : "",
+      shown = signed(value, 2) + around;
+    return short ? `${shown} dB` : tr("what if: gain may change by {value} dB at {hz} Hz", { value: shown, hz: at });
   }
-  const around = reach < 1 ? ` ± ${fixed(halfDeg(reach), 1)}` : "";
-  return tr("phase margin {value}° at {hz} Hz", { value: signed(value, 1) + around, hz: at });
+  const around = reach < 1 ? ` ± ${fixed(halfDeg(reach), 1)}` : "",
+    shown = signed(value, 1) + around;
+  return short ? `${shown}°` : tr("what if: phase margin {value}° at {hz} Hz", { value: shown, hz: at });
 }
 
-/** From the fitted model if it is visible, otherwise from the lines. @param {Bode} bode @param {Filter} filter */
-function found(bode, filter) {
+/** From the fitted model if it is visible, otherwise from the lines. @param {Bode} bode @returns {Margin[]} */
+function found(bode) {
   const model = bode.shown.has("model") ? bode.curves.model : undefined,
     from = model ?? bode.curves.measured;
-  const loop = from?.frame && tried(from, from.frame.quantity, filter);
-  return loop ? { model, margins: marginsOf(loop.hz, loop.db, loop.deg, loop.reach) } : null;
-}
-
-/** @param {Bode} bode @param {Filter} filter */
-export function triedWords(bode, filter) {
-  if (bode.quantity !== "open loop") return tr("Margins are shown with the open loop.");
-  const of = found(bode, filter);
-  if (!of) return "";
-  const source = of.model ? tr("From the fitted model") : tr("From the measured lines, ±3σ");
-  const none = tr("no crossing within the band");
-  return `${source}: ${of.margins.map(wordsOf).join("; ") || none}`;
+  const loop = from?.frame && bode.factor && tried(from, from.frame.quantity, bode.factor(from));
+  return loop ? marginsOf(loop.hz, loop.db, loop.deg, loop.reach) : [];
 }
 
 /**
- * Marks of the margins of L·C; none without a filter, or where its curve is hidden.
+ * Marks of the margins of L·C; none without a factor, or where its curve is hidden. Computed once for each drawing: they
+ * are needed for the scales and for each chart.
  *
  * @param {Bode} bode
  * @returns {Mark[]}
  */
 export function triedMarks(bode) {
-  if (!bode.filter || !bode.drawn["what if"] || !bode.shown.has("what if")) return [];
-  return (found(bode, bode.filter)?.margins ?? []).map((margin) => ({
+  if (!bode.factor || !bode.drawn["what if"] || !bode.shown.has("what if")) return [];
+  bode.triedMarks ??= found(bode).map((margin) => ({
     name: `what if ${margin.kind}`,
     of: "what if",
     chart: margin.kind === "gain" ? 0 : 1,
     hz: margin.hz,
     level: margin.kind === "gain" ? -margin.value : margin.value,
     value: margin.value,
-    words: tr("what if: {margin}", { margin: wordsOf(margin) }),
+    words: wordsOf(margin, bode.trying),
   }));
+  return bode.triedMarks;
 }

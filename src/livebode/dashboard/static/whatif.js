@@ -1,25 +1,11 @@
 // @ts-check
-// What the loop would be with one more filter C in it: L·C from the curve that is shown, with its bounds. A calculation
-// in the page; nothing of it is recorded or sent.
+// What the loop would be with a factor C on its controllers: L·C from the curve that is shown, with its bounds.
 import { complex } from "./curves.js";
 
 /** @import { Curve, Numbers } from "./curves.js" */
 /** @import { Quantity } from "./messages.js" */
-/**
- * Zero is without this part; the gain in dB.
- *
- * @typedef {{gainDb: number, lowpassHz: number, notchHz: number, notchDamping: number, delayMs: number}} Filter
- */
+/** @import { Factor } from "./trial.js" */
 /** @typedef {[re: number, im: number]} Complex */
-
-export const NONE = /** @type {Readonly<Filter>} */ ({
-  gainDb: 0,
-  lowpassHz: 0,
-  notchHz: 0,
-  notchDamping: 0.3,
-  delayMs: 0,
-});
-const DEPTH = 10; // of the notch at its frequency: 20 dB
 
 /** @param {Complex} a @param {Complex} b @returns {Complex} */
 const times = ([a, b], [c, d]) => [a * c - b * d, a * d + b * c];
@@ -35,39 +21,8 @@ const ONE = [1, 0];
 /** @param {Complex} a @returns {Complex} */
 const onePlus = ([a, b]) => [1 + a, b];
 
-/**
- * C at a frequency: gain, 1/(1 + jf/f₁), a notch (1 − r² + 2jζr/10)/(1 − r² + 2jζr) with r = f/f₂, and a delay.
- *
- * @param {Filter} filter
- * @param {number} hz
- * @returns {Complex}
- */
-export function filterAt({ gainDb, lowpassHz, notchHz, notchDamping, delayMs }, hz) {
-  const gain = 10 ** (gainDb / 20),
-    late = (-2 * Math.PI * hz * delayMs) / 1000;
-  let c = /** @type {Complex} */ ([gain * Math.cos(late), gain * Math.sin(late)]);
-  if (lowpassHz > 0) c = over(c, [1, hz / lowpassHz]);
-  if (notchHz > 0) {
-    const r = hz / notchHz,
-      wide = 2 * notchDamping * r;
-    c = over(times(c, [1 - r * r, wide / DEPTH]), [1 - r * r, wide]);
-  }
-  return c;
-}
-
 /** @param {number} deg @param {number} to */
 const nearest = (deg, to) => deg - 360 * Math.round((deg - to) / 360);
-
-/**
- * Phase of C along frequency, without jumps: all of it but the delay is between −180° and 180°.
- *
- * @param {Filter} filter
- * @param {number} hz
- */
-function phaseOf(filter, hz) {
-  const [re, im] = filterAt({ ...filter, delayMs: 0 }, hz);
-  return (Math.atan2(im, re) * 180) / Math.PI - 0.36 * hz * filter.delayMs;
-}
 
 /** The open loop of a value of a quantity. @param {Complex} v @param {Quantity} quantity @returns {Complex} */
 function loopOf(v, quantity) {
@@ -82,10 +37,10 @@ function loopOf(v, quantity) {
  *
  * @param {Curve} curve
  * @param {Quantity | null} quantity of the curve
- * @param {Filter} filter
+ * @param {Factor} factor C at the frequencies of the curve
  * @returns {Curve | null}
  */
-export function tried(curve, quantity, filter) {
+export function tried(curve, quantity, factor) {
   if (!quantity || quantity === "plant") return null;
   const { re, im } = complex(curve),
     count = curve.hz.length;
@@ -93,14 +48,14 @@ export function tried(curve, quantity, filter) {
   for (let i = 0; i < count; i++) {
     const v = /** @type {Complex} */ ([re[i], im[i]]),
       loop = loopOf(v, quantity),
-      c = filterAt(filter, curve.hz[i]),
+      c = /** @type {Complex} */ ([factor.re[i], factor.im[i]]),
       next = times(loop, c),
       below = onePlus(next);
     const value = quantity === "open loop" ? next : over(quantity === "sensitivity" ? ONE : next, below);
     const slope = quantity === "open loop" ? size(c) : size(c) * (size(onePlus(loop)) / size(below)) ** 2;
     db[i] = 20 * Math.log10(size(value));
     // On the branch of the curve itself: C adds its own phase, and noise adds no turn.
-    const shift = quantity === "open loop" ? phaseOf(filter, curve.hz[i]) : 0;
+    const shift = quantity === "open loop" ? factor.deg[i] : 0;
     deg[i] = nearest((Math.atan2(value[1], value[0]) * 180) / Math.PI, curve.deg[i] + shift);
     reach[i] = (curve.reach[i] * size(v) * slope) / size(value);
   }

@@ -1,0 +1,120 @@
+"""What the page needs to try other gains and filters: the controllers in parts, and the plant with its bounds.
+
+The page computes L, its margins and those of the worst plant within the bounds from these numbers alone, so that a
+slider needs no request. The definitions are those of `livebode tune`.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.analysis.checked_loop import checked_loop
+from livebode.analysis.places import by_place
+from livebode.configuration.loop_section import LoopSection
+from livebode.configuration.recorded import recorded_configuration
+from livebode.core import PID, Cascade, Gain, LivebodeError, Model, PositionPD, Responses
+from livebode.dashboard.overlays import grid_hz
+from livebode.dashboard.past import Past
+from livebode.dashboard.proposed_filters import proposed_filters
+from livebode.dashboard.quantities import Quantities
+from livebode.tuning.feedback_parts import FeedbackParts, FeedbackTerm
+from livebode.tuning.plant_band import PlantBand
+from livebode.tuning.specification import LoopSpecification
+
+Floats = NDArray[np.float64]
+
+_READ_BYTES = 16 << 20  # a longer run is averaged from its overview, every n-th response
+
+
+def loop_trial(past: Past, quantities: Quantities, summary: dict[str, Any]) -> dict[str, Any]:
+    """For the page, as plain data; `why_not` if nothing can be tried, `band_why_not` if the bounds are unknown."""
+    feedback = quantities.loop.feedback if quantities.loop is not None else None
+    if feedback is None and quantities.own != "open loop":
+        return {"why_not": quantities.why_not("open loop")}
+    section = LoopSection.model_validate(recorded_configuration(summary).get("loop", {}))
+    checked = checked_loop(past.directory, section)
+    model = feedback or Gain(1.0)  # without a description the measured L is the plant, and F is a factor
+    drawn_hz, rate_hz = grid_hz(quantities.lines), quantities.lines.rate_hz
+    parts = FeedbackParts.of(model, drawn_hz)
+    return {
+        "why_not": "",
+        "described": feedback is not None,
+        "verdict": checked.verdict,
+        "sentence": checked.sentence,
+        "tables": _tables(model),
+        "values": dict(parts.values),
+        "rate_hz": _filter_rate_hz(model, rate_hz),
+        "frequency_hz": drawn_hz.tolist(),
+        "parts": _parts(parts),
+        "proposed": proposed_filters(past.directory),
+        **_band(past, quantities, model),
+    }
+
+
+def _band(past: Past, quantities: Quantities, model: Model) -> dict[str, Any]:
+    """The plant at each place with its radius, and the parts of F on the same frequencies."""
+    limits = LoopSpecification()
+    try:
+        mean = by_place(_responses(past))
+        if quantities.loop is not None and quantities.loop.feedback is not None:
+            mean = quantities.of_responses(mean, "plant")
+        rate_hz = quantities.lines.rate_hz
+        band = PlantBand.of(mean, rate_hz, coherence=limits.coherence, confidence=limits.confidence)
+    except LivebodeError as error:
+        return {"band": None, "band_why_not": str(error)}
+    found = {
+        "frequency_hz": band.frequency_hz.tolist(),
+        "known": int(np.count_nonzero(~band.above)),
+        "lines_hz": band.lines_hz.tolist(),
+        "dropped": len(band.dropped_hz),
+        "confidence": limits.confidence,
+        "places": [
+            {**_complex(value), "radius": radius.tolist()} for value, radius in zip(band.value, band.radius)
+        ],
+        "parts": _parts(FeedbackParts.of(model, band.frequency_hz)),
+    }  # fmt: skip
+    return {"band": found, "band_why_not": ""}
+
+
+def _responses(past: Past) -> Responses:
+    """Those that `livebode tune` uses, if they can be read soon."""
+    if past.readable and _size_bytes(past.directory) <= _READ_BYTES:
+        return Responses.join(list(past.record().steady_batches()))
+    found = next(past.all_between(-inf, inf)) if past.overview is None else past.overview
+    return found[np.flatnonzero(found.ready)]
+
+
+def _size_bytes(directory: Path) -> int:
+    return sum(path.stat().st_size for path in directory.rglob("responses*.parquet"))
+
+
+def _tables(model: Model) -> dict[str, str]:
+    """The key of each parameter under [loop]."""
+    if isinstance(model, PositionPD):
+        return {"gain": "loop.position_pd.velocity_gain", "position_gain": "loop.position_pd.position_gain"}
+    if not isinstance(model, PID | Cascade):
+        return {}
+    of = {name: f"loop.velocity.{name}" for name in ("gain", "integral_time_s", "derivative_time_s")}
+    return of | {"position_gain": "loop.position.gain"}
+
+
+def _filter_rate_hz(model: Model, rate_hz: float) -> float:
+    """Of the innermost controller, with which filters are computed."""
+    inner = model.velocity if isinstance(model, Cascade) else model
+    return float(getattr(inner, "rate_hz", rate_hz))
+
+
+def _parts(parts: FeedbackParts) -> dict[str, Any]:
+    def term(one: FeedbackTerm) -> dict[str, Any]:
+        return {"name": one.name, "power": one.power, **_complex(one.curve)}
+
+    return {"terms": [term(one) for one in parts.terms], "outer": None if parts.outer is None else term(parts.outer)}
+
+
+def _complex(values: NDArray[np.complex128]) -> dict[str, list[float]]:
+    return {"re": values.real.tolist(), "im": values.imag.tolist()}
