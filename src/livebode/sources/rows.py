@@ -43,7 +43,7 @@ class RowReader:
             bytes(kinds),
             b"".join(word.encode() + b"\0" for word in sorted(EMPTY) if word.strip()),
             ROW_BYTES_MAX,
-            ord(dialect.delimiter or "\x1f"),
+            ord("\t" if dialect.spaced else dialect.delimiter or "\x1f"),
             ord(dialect.decimal),
             0 if dialect.spaced else ord('"'),
             dialect.zone is not None,
