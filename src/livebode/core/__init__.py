@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from livebode.core._frequency_response import PER_LINE, Quantity
     from livebode.core._kinds import PlotKind
     from livebode.core._loop import Loop
+    from livebode.core._matrix_responses import REASONS, MatrixResponses
     from livebode.core._plant_kinds import PlantKinds
     from livebode.core._plotting import plot_responses
     from livebode.core._response import PER_RESPONSE, Response, Responses, widened
@@ -67,6 +68,10 @@ _NAMES = {
     ),
     "_kinds": ("PlotKind",),
     "_loop": ("Loop",),
+    "_matrix_responses": (
+        "REASONS",
+        "MatrixResponses",
+    ),
     "_plant_kinds": ("PlantKinds",),
     "_plotting": ("plot_responses",),
     "_response": (
@@ -124,6 +129,7 @@ __all__ = [
     "PER_LINE",
     "PER_RESPONSE",
     "PID",
+    "REASONS",
     "SPIKE",
     "ArchiveError",
     "BaselineError",
@@ -144,6 +150,7 @@ __all__ = [
     "LivebodeError",
     "LocationError",
     "Loop",
+    "MatrixResponses",
     "MeasurementError",
     "Model",
     "OutputError",

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import Lines
+from livebode.core import Lines, MatrixResponses
 from livebode.mimo.excitation import MatrixExcitation
-from livebode.mimo.responses import MatrixResponses
 from livebode.mimo.settings import MatrixSettings
 from livebode.mimo.tracker import MatrixTracker
 from livebode.simulation import GantryLoop

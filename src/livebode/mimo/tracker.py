@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Emit, Event, SignalError, Stage, StatefulBase, hand_over, ignore
+from livebode.core import Block, Emit, Event, MatrixResponses, SignalError, Stage, StatefulBase, hand_over, ignore
 from livebode.estimation.spectra import LineSpectra, SpectraRows
 from livebode.estimation.watch import InputStatistics
 from livebode.mimo.estimate import Estimate, Windows, estimate
-from livebode.mimo.responses import MatrixResponses
 from livebode.mimo.settings import MatrixSettings
 
 Complex = NDArray[np.complex128]

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import GridError, Lines, Responses, UsageError, widened
+from livebode.core._response import Responses, widened
+from livebode.core.errors import GridError, UsageError
 from livebode.core.installing import not_installed
+from livebode.core.lines import Lines
 from livebode.core.rows import RowArrays
 
 if TYPE_CHECKING:
