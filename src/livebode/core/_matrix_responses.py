@@ -125,9 +125,9 @@ class MatrixResponses(RowArrays):
         To first order an error δ moves the singular value with the vectors u and v by the real part of u*·δ·v
         (Stewart and Sun, Matrix Perturbation Theory, 1990, section IV.4). The radius is that of the complex number
         u*·δ·v, whose variance is u*·noise·u times vᵀ·spread·v̄. Its modulus is at least its real part, so the radius
-        covers the true singular value with a probability of 1 − exp(−c²) or more while the singular values are further
-        apart than their radii, and with 1 − exp(−c²) where the true value is zero. Two equal singular values repel
-        each other: the larger is estimated too large. docs/explanation/mimo.md has the measured shares.
+        covers the true singular value with a probability of 1 − exp(−c²) or more, also where it is zero. Biased where
+        several differ by less than their radii: they repel each other, and of three the outer ones are covered less
+        often. docs/explanation/mimo.md has the measured shares.
         """
         found = np.full(self.singular_values.shape, np.nan)
         whole = self.valid.all(axis=2)
