@@ -50,6 +50,7 @@ def test_csv_is_read_exactly_by_pandas(tmp_path_factory: pytest.TempPathFactory,
             same(part["coherence"], entry.coherence.ravel())
             same(part["condition"], responses.condition.ravel())
             same(part["valid"], entry.valid.ravel())
+            assert (part["unit"].fillna("") == entry.unit).all() if entry.unit else part["unit"].isna().all()
             words = [word if isinstance(word, str) else "" for word in part["reason"]]
             assert words == [REASONS[n] for n in responses.reason[:, :, i].ravel()]
 
@@ -65,6 +66,8 @@ def test_netcdf_is_read_back_by_xarray_with_the_covariance(
         file.load()
     assert file.response_re.dims == ("time_s", "frequency_hz", "output", "input")
     assert file.output.values.tolist() == list(responses.outputs)
+    if responses.units:
+        assert file.unit.values.tolist() == [list(row) for row in responses.units]
     same(file.response_re + 1j * file.response_im, responses.value)
     covariance = (file.noise_re + 1j * file.noise_im) * (file.spread_re + 1j * file.spread_im)
     order = ("time_s", "frequency_hz", "output", "input", "other_output", "other_input")
@@ -101,6 +104,8 @@ def test_mat_has_the_shapes_that_frd_and_idfrd_take(
     same(struct["valid"].reshape(nu, lines, rows), responses.valid[:, kept].transpose(2, 1, 0))
     assert [cell[0].item() for cell in struct["InputName"]] == list(responses.inputs)
     assert [cell[0].item() for cell in struct["OutputName"]] == list(responses.outputs)
+    if responses.units:
+        assert [[cell.item() for cell in row] for row in struct["units"]] == [list(row) for row in responses.units]
     assert struct["Ts"].item() == 1 / responses.lines.rate_hz
 
 

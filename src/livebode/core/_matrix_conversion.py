@@ -48,6 +48,12 @@ def dataset(responses: MatrixResponses, reasons: tuple[str, ...]) -> Dataset:
     coords["frequency_hz"] = ("frequency_hz", responses.frequency_hz, {"long_name": "line", "units": "Hz"})
     for kind, names in (("output", responses.outputs), ("input", responses.inputs)):
         coords[kind], coords[f"other_{kind}"] = list(names), list(names)
+    if responses.units:
+        coords["unit"] = (
+            ("output", "input"),
+            [list(row) for row in responses.units],
+            {"long_name": "of response and sigma"},
+        )
     about = {"quantity": "plant", "rate_hz": responses.lines.rate_hz, "window": responses.lines.window}
     found: Dataset = xarray.Dataset(variables, coords, about)
     return found

@@ -59,6 +59,8 @@ class MatrixResponses(RowArrays):
         Numbers of the oldest sample (of the oldest window) and of the newest one, shape (rows,).
     time_s
         Effective time: mean of the centres of the windows, shape (rows,).
+    units
+        Unit of each entry, a row for each output; empty where not known.
 
     Examples
     --------
@@ -83,8 +85,9 @@ class MatrixResponses(RowArrays):
     first: NDArray[np.int64]
     sample: NDArray[np.int64]
     time_s: Floats
+    units: tuple[tuple[str, ...], ...] = ()
 
-    _SHARED = ("lines", "outputs", "inputs")
+    _SHARED = ("lines", "outputs", "inputs", "units")
 
     @property
     def frequency_hz(self) -> Floats:
@@ -163,6 +166,7 @@ class MatrixResponses(RowArrays):
             sample=self.sample,
             time_s=self.time_s,
             schedule=np.full(len(self), np.nan),
+            unit=self.units[o][i] if self.units else "",
         )
 
     def sel(
@@ -215,6 +219,7 @@ class MatrixResponses(RowArrays):
             coherence=rows.coherence[:, k][..., o],
             condition=rows.condition[:, k],
             reason=rows.reason[:, k][..., i],
+            units=tuple(tuple(self.units[m][n] for n in i) for m in o) if self.units else (),
         )
 
     def newest(self) -> MatrixResponses:
@@ -238,7 +243,8 @@ class MatrixResponses(RowArrays):
     ) -> MatrixResponses:
         """A·G·B in other coordinates, with its covariance: y' = A·y, and u = B·u'.
 
-        On a CoreXY printer, for example, both motors move both axes. The multiple coherence is not known afterwards. A
+        On a CoreXY printer, for example, both motors move both axes. The multiple coherence and the
+        units are not known afterwards. A
         column is valid where all columns were.
 
         Parameters

@@ -26,10 +26,10 @@ def write_matrix_mat(
     real and imaginary part, sigma²/2 on the diagonal because the error is circular; ``sigma`` in the shape of H;
     ``noise`` (outputs, outputs, lines, responses) and ``spread`` (inputs, inputs, lines, responses), whose Kronecker
     product is the covariance of all entries; ``coherence`` (outputs, lines, responses), ``condition`` (lines,
-    responses), ``valid`` and ``reason`` (inputs, lines, responses) with ``reasons`` as their words;
-    ``OutputName``, ``InputName``; ``f_hz`` (lines, 1), ``time_s``, ``dof``, ``first``, ``sample`` (1, responses),
-    ``Ts`` in seconds, ``window``, and ``run``, run.json as text. A single response has only lines with a valid
-    column; invalid columns are NaN.
+    responses), ``valid`` and ``reason`` (inputs, lines, responses) with ``reasons`` as their words; ``OutputName``,
+    ``InputName``, ``units`` (outputs, inputs); ``f_hz`` (lines, 1), ``time_s``, ``dof``, ``first``, ``sample``
+    (1, responses), ``Ts`` in seconds, ``window``, and ``run``, run.json as text. A single response has only lines with a
+    valid column; invalid columns are NaN.
 
     Raises
     ------
@@ -68,6 +68,7 @@ def _struct(responses: MatrixResponses) -> dict[str, Any]:
         "reasons": _cells(REASONS),
         "OutputName": _cells(responses.outputs),
         "InputName": _cells(responses.inputs),
+        "units": np.array(responses.units or [[""] * len(responses.inputs)] * len(responses.outputs), dtype=object),
         "Ts": 1 / responses.lines.rate_hz,
         "window": float(responses.lines.window),
     }

@@ -16,7 +16,18 @@ from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Event, Lines, LivebodeError, Loop, PlotKind, Response, Responses, counted, plot_responses
+from livebode.core import (
+    Event,
+    Lines,
+    LivebodeError,
+    Loop,
+    MatrixResponses,
+    PlotKind,
+    Response,
+    Responses,
+    counted,
+    plot_responses,
+)
 from livebode.core.clock import moment, moments_by
 from livebode.fitting import Fit
 from livebode.locations import Url, local_copy, location, shared_copy
@@ -38,6 +49,9 @@ class Run:
     ----------
     path
         The run directory, or its URL (docs/how-to/remote.md).
+    entry
+        Of a matrix run: the entry of which this is the view as an ordinary run, as "velocity2/u1". Without it only
+        `matrix`, `entries`, `events` and what is in run.json can be read.
 
     Attributes
     ----------
@@ -53,8 +67,8 @@ class Run:
     Raises
     ------
     RecordError
-        If the directory is not of a run, or run.json cannot be read. A damaged part of the tables is skipped with a
-        `DamageWarning`.
+        If the directory is not of a run, or run.json cannot be read, or a matrix run has no such entry. A damaged part
+        of the tables is skipped with a `DamageWarning`.
     LocationError
         If there is no complete run at the URL, or it cannot be downloaded.
 
@@ -69,11 +83,11 @@ class Run:
     (array([20., 30., 40.]), 59.4)
     """
 
-    def __init__(self, path: str | PathLike[str] | Url) -> None:
+    def __init__(self, path: str | PathLike[str] | Url, entry: str | None = None) -> None:
         place = location(path)
         self._copy = shared_copy(place) if isinstance(place, Url) else None  # exists as long as this object
         with local_copy(place) as self.path:
-            self._record = RunRecord.open(self.path)
+            self._record = RunRecord.open(self.path, matrix=True, entry=entry)
         self.summary: Mapping[str, Any] = self._record.summary
         self.lines: Lines = self._record.lines
         self.finished = self._record.finished
@@ -82,6 +96,22 @@ class Run:
     def machine(self) -> str:
         """The machine as a path, such as "Graz/line 2/press 4/X", from [machine]; empty without one."""
         return MachineSection(**self.summary.get("machine", {})).path
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Names of the entries of a matrix run, "output/input"; none of an ordinary run."""
+        return tuple(self._record.entries)
+
+    @cached_property
+    def matrix(self) -> MatrixResponses:
+        """All matrices of a matrix run with their covariance, as written.
+
+        Raises
+        ------
+        RecordError
+            If it is not a matrix run.
+        """
+        return self._record.matrix()
 
     @cached_property
     def responses(self) -> Responses:
@@ -264,9 +294,9 @@ class Run:
 
     def _facts(self) -> list[str]:
         signals = self.summary.get("configuration", {}).get("signals") or {}
-        names = f"{signals.get('output', 'response')}"
-        names += f" from {signals['input']}" if signals.get("input") else ""
-        names += f", excited by {signals['excitation']}" if signals.get("excitation") else ""
+        names = f"{_listed(signals.get('output', 'response'))}"
+        names += f" from {_listed(signals['input'])}" if signals.get("input") else ""
+        names += f", excited by {_listed(signals['excitation'])}" if signals.get("excitation") else ""
         f: np.ndarray = self.lines.frequency_hz
         facts = [names, f"{counted(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz", self._extent()]
         try:
@@ -283,3 +313,8 @@ class Run:
             return f"not finished{start}"
         duration_s = self.summary["counts"]["samples"] / self.lines.rate_hz
         return f"{counted(self.summary['counts']['responses'])} in {duration_s:.4g} s{start}"
+
+
+def _listed(names: str | list[str]) -> str:
+    """One name, or several of a matrix run."""
+    return names if isinstance(names, str) else ", ".join(names)

@@ -21,7 +21,7 @@ with needing("PyArrow", "query", "a query"):
     import pyarrow.dataset as ds
     from pyarrow.fs import LocalFileSystem
 
-_TABLES = ("responses", "parameters", "samples", *TIERS)
+_TABLES = ("responses", "covariance", "parameters", "samples", *TIERS)
 _SINGLE_EVENTS = pa.schema(
     [
         ("kind", pa.string()),
@@ -55,7 +55,7 @@ class QueryResult:
 
 
 def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
-    """The first rows of a query on the tables responses, parameters, samples, events, single_events and the tiers.
+    """The first rows of a query on the tables responses, covariance, parameters, samples, events, single_events and the tiers.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ import os
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 from os import PathLike
 from pathlib import Path
@@ -20,6 +20,7 @@ from livebode.core import (
     Event,
     Lines,
     LivebodeError,
+    MatrixResponses,
     PlantKinds,
     RecordError,
     Responses,
@@ -28,6 +29,16 @@ from livebode.core.clock import RunClock
 from livebode.locations import original
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
+from livebode.records.matrix_run import (
+    entries_of,
+    entry_missing,
+    entry_named,
+    entry_summary,
+    is_matrix,
+    matrix_shape,
+)
+from livebode.records.matrix_table import COVARIANCE_SCHEMA, entry_rows, matrices
+from livebode.records.matrix_table import SCHEMA as MATRIX_SCHEMA
 from livebode.records.piece import StoredTable
 from livebode.records.response_table import EARLIER, SCHEMA, responses_in
 from livebode.records.segments import reading
@@ -84,23 +95,36 @@ class RunRecord:
         Damage found so far, as events of kind "record-damaged"; everything else is read.
     on_damage
         Called once with each of them; a `DamageWarning` by default.
+    selected
+        Output and input of the entry of a matrix run of which this is a view; it reads as an ordinary run.
     """
 
     path: Path
     summary: dict[str, Any]
     damages: list[Event] = field(default_factory=list, compare=False)
     on_damage: Callable[[Event], None] | None = field(default=None, compare=False)
+    selected: tuple[str, str] | None = None
 
     @classmethod
     def open(
-        cls, path: str | PathLike[str], on_damage: Callable[[Event], None] | None = None, *, output_only: bool = False
+        cls,
+        path: str | PathLike[str],
+        on_damage: Callable[[Event], None] | None = None,
+        *,
+        output_only: bool = False,
+        matrix: bool = False,
+        entry: str | None = None,
     ) -> RunRecord:
         """The run in this directory; with `output_only` also one without responses, of which `lines` raises KeyError.
+
+        With `matrix` it may be a matrix run. With `entry`, such as "velocity2/u1", it must be one, and the result is the
+        view of that entry.
 
         Raises
         ------
         RecordError
-            If it is not from a run, or run.json or the responses cannot be read, or it has no responses.
+            If it is not from a run, or run.json or the responses cannot be read, or it has no responses; if it is a
+            matrix run and no entry is named, or has no such entry.
         GridError
             If the lines in run.json are not a valid grid.
         """
@@ -128,6 +152,10 @@ class RunRecord:
             raise error.at(str(path / RUN)) from None
         if damaged:
             run.report(Event(KIND, 0, 0.0, damaged, {"file": RUN}))
+        if entry is not None:
+            return run.entry(*entry_named(str(path), summary, entry))
+        if run.is_matrix and not matrix:
+            raise entry_missing(str(path), summary)
         return run
 
     def report(self, damage: Event) -> None:
@@ -156,6 +184,53 @@ class RunRecord:
         return bool(self.summary.get("output_only", False))
 
     @property
+    def is_matrix(self) -> bool:
+        """Whether it has matrices of responses; a view of one entry has none."""
+        return is_matrix(self.summary)
+
+    @property
+    def entries(self) -> dict[str, tuple[str, str]]:
+        """Output and input of each entry of a matrix run, by its name "output/input"; none of an ordinary run."""
+        return entries_of(self.summary)
+
+    def entry(self, output: str, input: str) -> RunRecord:
+        """The view of one entry of a matrix run as an ordinary run.
+
+        Raises
+        ------
+        RecordError
+            If it is not a matrix run, or has no such entry.
+        """
+        chosen = entry_named(str(self.path), self.summary, f"{output}/{input}")
+        return replace(self, summary=entry_summary(self.summary, *chosen), selected=chosen)
+
+    def matrix(self) -> MatrixResponses:
+        """All matrices of a matrix run, as written; no rows before the first."""
+        shape = matrix_shape(self.summary, self.lines)
+        none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
+        return MatrixResponses.join(list(self.matrix_batches()) or list(none))
+
+    def matrix_batches(self) -> Iterator[MatrixResponses]:
+        """All readable matrices in order, in parts of bounded size.
+
+        Raises
+        ------
+        RecordError
+            If it is not a matrix run.
+        """
+        if not self.is_matrix:
+            raise RecordError(
+                "no-matrix",
+                f"{str(self.path)!r} has one response, and no matrix of them",
+                "read its responses",
+                path=str(self.path),
+            )
+        shape = matrix_shape(self.summary, self.lines)
+        responses = self._whole(self.tables("responses"), shape.response_rows, (MATRIX_SCHEMA.names,))
+        covariance = self._whole(self.tables("covariance"), shape.covariance_rows, (COVARIANCE_SCHEMA.names,))
+        yield from matrices(responses, covariance, shape)
+
+    @property
     def lines(self) -> Lines:
         """Source of the measurement."""
         return lines_in(self.found)
@@ -180,7 +255,7 @@ class RunRecord:
         return bool(self.summary.get("record", {}).get("finished", True))
 
     def responses(self) -> Responses:
-        """All responses, as written; an empty batch before the first."""
+        """All responses, as written; an empty batch before the first. RecordError of a matrix run."""
         return Responses.join(list(self.batches()) or [responses_in(Table.empty(SCHEMA), self.lines, self.found)])
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
@@ -201,24 +276,24 @@ class RunRecord:
                 yield within
 
     def _in_parts(self, tables: Iterator[Table]) -> Iterator[Responses]:
+        if self.is_matrix:
+            raise entry_missing(str(self.path), self.summary)
         lines = self.lines
+        for table in self._whole(tables, len(lines), (SCHEMA.names, EARLIER)):
+            yield responses_in(table, lines, self.found)
+
+    def _whole(self, tables: Iterator[Table], rows: int, columns: Collection[list[str]]) -> Iterator[Table]:
+        """The rows of whole responses, `rows` each, in parts of bounded size; RecordError if they are of no run."""
         rest: Table | None = None
         for part in tables:
-            if part.schema.names not in (SCHEMA.names, EARLIER):
-                raise RecordError(
-                    "unexpected-content",
-                    f"the responses in {str(self.path)!r} have unexpected columns",
-                    "run the recording again",
-                    path=str(self.path),
-                    columns=part.schema.names,
-                )
+            self._check_columns(part, columns)
             for start in range(0, part.num_rows, _ROWS):
                 piece = part.slice(start, _ROWS)
                 table = piece if rest is None else Table.join([rest, piece])
-                whole = table.num_rows // len(lines) * len(lines)
+                whole = table.num_rows // rows * rows
                 rest = table.slice(whole)
                 if whole:
-                    yield responses_in(table.slice(0, whole), lines, self.found)
+                    yield table.slice(0, whole)
         if rest is not None and rest.num_rows:
             raise RecordError(
                 "unexpected-content",
@@ -227,12 +302,22 @@ class RunRecord:
                 path=str(self.path),
             )
 
+    def _check_columns(self, table: Table, columns: Collection[list[str]]) -> None:
+        if table.schema.names not in columns:
+            raise RecordError(
+                "unexpected-content",
+                f"the responses in {str(self.path)!r} have unexpected columns",
+                "run the recording again",
+                path=str(self.path),
+                columns=table.schema.names,
+            )
+
     def tables(
         self, name: str, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
     ) -> Iterator[Table]:
         """The rows of "responses", "parameters" or "samples" in order, part by part; none if it was not recorded.
 
-        With `span_s`, segments completely outside of that time are skipped.
+        A matrix run also has "covariance". With `span_s`, segments completely outside of that time are skipped.
 
         Raises
         ------
@@ -240,6 +325,17 @@ class RunRecord:
             While iterating, if nothing can be read, or the content is not from a run. A damaged part is skipped and
             reported in `damages`.
         """
+        rows = self._recorded_tables(name, size_bytes_max, span_s)
+        if self.selected is None or name != "responses":
+            yield from rows
+            return
+        for table in rows:
+            self._check_columns(table, (MATRIX_SCHEMA.names,))
+            yield entry_rows(table, *self.selected)
+
+    def _recorded_tables(
+        self, name: str, size_bytes_max: int | None, span_s: tuple[float, float] | None
+    ) -> Iterator[Table]:
         file = self.path / name
         try:
             if reading.in_segments(self.path):

@@ -9,9 +9,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from livebode.core import Event, Parameters, RecordError, Responses
+from livebode.core import Event, MatrixResponses, Parameters, RecordError, Responses
 from livebode.core.files import whole_directory
 from livebode.core.writing import writing
+from livebode.records.matrix_table import COVARIANCE, MATRIX_RESPONSES, covariance_rows, matrix_rows
 from livebode.records.parameter_table import PARAMETERS, parameter_rows
 from livebode.records.removal import check_removable, remove
 from livebode.records.response_table import RESPONSES, as_batch
@@ -38,6 +39,8 @@ class RunDirectory:
         Whether to replace an existing directory. Only the directory of a run is replaced.
     responses
         Whether the run has responses; an output-only run has only parameters.
+    matrix
+        Whether these are matrices; their covariance is then in ``covariance.parquet``.
 
     Raises
     ------
@@ -45,9 +48,10 @@ class RunDirectory:
         If the path exists and must not be replaced, or the disk reports an error.
     """
 
-    def __init__(self, path: Path, *, force: bool = False, responses: bool = True) -> None:
+    def __init__(self, path: Path, *, force: bool = False, responses: bool = True, matrix: bool = False) -> None:
         self.path = path
         self._force = force
+        self._has_matrices = matrix
         self._has_responses = responses
 
     def __enter__(self) -> RunDirectory:
@@ -57,7 +61,11 @@ class RunDirectory:
             self._events = (self.partial / "events.jsonl").open("wb")
             self._responses: TableFile | None = None
             if self._has_responses:
-                self._responses = TableFile(self.partial / "responses.parquet", RESPONSES)
+                table = MATRIX_RESPONSES if self._has_matrices else RESPONSES
+                self._responses = TableFile(self.partial / "responses.parquet", table)
+            self._covariance: TableFile | None = None
+            if self._has_matrices:
+                self._covariance = TableFile(self.partial / "covariance.parquet", COVARIANCE)
             self._parameters: TableFile | None = None
             self._place = undo.pop_all()
         _logger.info("%s: the record begins", self.path)
@@ -83,6 +91,14 @@ class RunDirectory:
         with writing(self.path, RecordError):
             self._responses.write(as_batch(responses))
 
+    def write_matrices(self, responses: MatrixResponses) -> None:
+        """Append matrices of responses with their covariance."""
+        assert self._responses is not None
+        assert self._covariance is not None
+        with writing(self.path, RecordError):
+            self._responses.write(matrix_rows(responses))
+            self._covariance.write(covariance_rows(responses))
+
     def write_parameters(self, *parts: Parameters) -> None:
         """Append fitted parameters and derived quantities; the first ones create ``parameters.parquet``."""
         with writing(self.path, RecordError):
@@ -107,7 +123,11 @@ class RunDirectory:
     def _close(self) -> dict[str, Any]:
         """Close the files; the parts of the tables, for run.json."""
         self._events.close()
-        tables = {"parameters.parquet": self._parameters, "responses.parquet": self._responses}
+        tables = {
+            "covariance.parquet": self._covariance,
+            "parameters.parquet": self._parameters,
+            "responses.parquet": self._responses,
+        }
         return {name: table.close() for name, table in tables.items() if table is not None}
 
     def _check_free(self) -> None:

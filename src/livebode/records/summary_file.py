@@ -32,7 +32,9 @@ def to_document(summary: dict[str, Any], name: str = "run") -> bytes:
       "crc32": "d477367d"
     }
     """
-    text = to_json(format_of(name) | summary, indent=2)
+    # Earlier versions of livebode read every run but a matrix run.
+    version = 1 if name == "run" and not summary.get("matrix") else None
+    text = to_json(format_of(name, version) | summary, indent=2)
     return f'{text[:-2]},\n  "crc32": "{zlib.crc32(text.encode()):08x}"\n}}\n'.encode()
 
 

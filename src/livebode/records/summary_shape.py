@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from livebode.core import QuantityKind
 from livebode.core.clock import ClockKind
@@ -57,6 +57,25 @@ class _Found(_Part):
     part: _Samples | None = None
     recordings: list[_Recording] = []
     realisations: bool = False
+
+
+Names = Annotated[list[Text], Field(min_length=1, max_length=8)]
+
+
+class _MatrixFound(_Found):
+    outputs: Names
+    inputs: Names
+    units: list[list[Text]]
+    kinds_of_entries: list[list[_Kinds]]
+
+    @model_validator(mode="after")
+    def _has_all_entries(self) -> _MatrixFound:
+        for name, rows in (("units", self.units), ("kinds_of_entries", self.kinds_of_entries)):
+            if [len(row) for row in rows] != [len(self.inputs)] * len(self.outputs):
+                raise ValueError(f"{name} has not one element for each entry")
+        if len({*self.outputs}) != len(self.outputs) or len({*self.inputs}) != len(self.inputs):
+            raise ValueError("a signal is duplicated")
+        return self
 
 
 class _OutputOnlyFound(_Part):
@@ -138,6 +157,20 @@ class _AnySummary(_Part):
 class _Summary(_AnySummary):
     found: _Found
     output_only: Literal[False] = False
+    matrix: Literal[False] = False
+
+
+class _MatrixColumn(_Part):
+    input: Text
+    valid: Count
+    reasons: dict[Text, Count] = {}
+
+
+class _MatrixSummary(_AnySummary):
+    found: _MatrixFound
+    output_only: Literal[False] = False
+    matrix: Literal[True]
+    columns: list[_MatrixColumn] = []
 
 
 class _OutputOnlySummary(_AnySummary):
@@ -154,9 +187,14 @@ def what_is_wrong(summary: dict[str, Any]) -> str:
     'found.rate_hz: Input should be a valid number'
     """
     try:
-        shape = _OutputOnlySummary if summary.get("output_only") is True else _Summary
-        shape.model_validate(summary)
+        _shape_of(summary).model_validate(summary)
     except ValidationError as error:
         first = error.errors()[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
     return ""
+
+
+def _shape_of(summary: dict[str, Any]) -> type[_AnySummary]:
+    if summary.get("output_only") is True:
+        return _OutputOnlySummary
+    return _MatrixSummary if summary.get("matrix") is True else _Summary

@@ -7,18 +7,18 @@ from typing import Any
 
 from livebode.core import RecordError
 
-VERSIONS = {"run": 1, "manifest": 2, "journal": 1, "references": 1, "notes": 1, "loop check": 1}
+VERSIONS = {"run": 2, "manifest": 2, "journal": 1, "references": 1, "notes": 1, "loop check": 1}
 """Newest readable versions: layout of a run directory, manifest.jsonl, journal, references.json, notes.json and
 loop-check.json."""
 
 
-def format_of(name: str) -> dict[str, Any]:
-    """What a file of this format begins with.
+def format_of(name: str, version: int | None = None) -> dict[str, Any]:
+    """What a file of this format begins with, by default of the newest version.
 
-    >>> format_of("run")
-    {'format': 'livebode run', 'version': 1}
+    >>> format_of("manifest")
+    {'format': 'livebode manifest', 'version': 2}
     """
-    return {"format": f"livebode {name}", "version": VERSIONS[name]}
+    return {"format": f"livebode {name}", "version": version or VERSIONS[name]}
 
 
 def check_version(path: Path, name: str, found: Any) -> None:

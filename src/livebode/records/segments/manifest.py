@@ -20,7 +20,7 @@ from livebode.records.versions import VERSIONS, check_version, format_of
 
 NAME = "manifest.jsonl"
 TIERS = ("responses_1s", "responses_1min", "responses_1h")
-TABLES = ("responses", "parameters", "samples", *TIERS)
+TABLES = ("responses", "covariance", "parameters", "samples", *TIERS)
 _SHA256 = re.compile("[0-9a-f]{64}")
 SEGMENT_NAME = re.compile(r"[a-z0-9_]+/(\d{6,9})(?:-(\d{6,9}))?\.parquet")
 _COUNTS = ("rows", "first_sample", "last_sample", "size_bytes")

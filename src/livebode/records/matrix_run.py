@@ -1,0 +1,79 @@
+"""What run.json of a matrix run contains: its entries, and the view of one of them as an ordinary run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from livebode.core import Lines, RecordError
+from livebode.records.matrix_table import MatrixShape
+
+_OF_THE_MATRIX = ("outputs", "inputs", "units", "kinds_of_entries", "experiments")
+
+
+def is_matrix(summary: Mapping[str, Any]) -> bool:
+    """Whether the run has matrices of responses."""
+    return bool(summary.get("matrix", False))
+
+
+def matrix_shape(summary: Mapping[str, Any], lines: Lines) -> MatrixShape:
+    """Signals and lines of a matrix run."""
+    found = summary["found"]
+    return MatrixShape(lines, tuple(found["outputs"]), tuple(found["inputs"]))
+
+
+def entries_of(summary: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """Output and input of each entry, by its name "output/input"; none of an ordinary run."""
+    if not is_matrix(summary):
+        return {}
+    found = summary["found"]
+    return {f"{o}/{i}": (o, i) for o in found["outputs"] for i in found["inputs"]}
+
+
+def entry_named(path: str, summary: Mapping[str, Any], name: str) -> tuple[str, str]:
+    """Output and input of the entry of this name; RecordError if there is none."""
+    entries = entries_of(summary)
+    if not entries:
+        raise RecordError(
+            "no-matrix",
+            f"{path!r} has one response, so it has no entry {name!r}",
+            "remove the entry",
+            path=path,
+            entry=name,
+        )
+    if name not in entries:
+        raise RecordError(
+            "entry-unknown",
+            f"{path!r} has no entry {name!r}",
+            f"choose one of {', '.join(entries)}",
+            path=path,
+            entry=name,
+            allowed=list(entries),
+        )
+    return entries[name]
+
+
+def entry_missing(path: str, summary: Mapping[str, Any]) -> RecordError:
+    """The error where one entry is needed, and none was named."""
+    entries = list(entries_of(summary))
+    return RecordError(
+        "entry-missing",
+        f"{path!r} has a matrix of {len(entries)} responses, and one of them is needed",
+        f"choose an entry: {', '.join(entries)}",
+        path=path,
+        allowed=entries,
+    )
+
+
+def entry_summary(summary: Mapping[str, Any], output: str, input: str) -> dict[str, Any]:
+    """run.json as that of a run with one output and one input."""
+    found = dict(summary["found"])
+    o, i = found["outputs"].index(output), found["inputs"].index(input)
+    own = {"unit": found["units"][o][i], "kinds": found["kinds_of_entries"][o][i]}
+    found = {name: value for name, value in found.items() if name not in _OF_THE_MATRIX} | own
+    configuration = dict(summary.get("configuration", {}))
+    signals = dict(configuration.get("signals", {}))
+    signals.pop("excitation", None)  # all of them belong to every entry
+    configuration["signals"] = signals | {"output": output, "input": input}
+    rest = {name: value for name, value in summary.items() if name not in ("matrix", "columns")}
+    return rest | {"configuration": configuration, "found": found, "entry": f"{output}/{input}"}
