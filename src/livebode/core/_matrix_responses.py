@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from importlib import import_module
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.core._line_selection import ends, position, within
+from livebode.core._matrix_conversion import dataset, frd
 from livebode.core._response import Responses, widened
 from livebode.core.errors import GridError, UsageError
-from livebode.core.installing import not_installed
 from livebode.core.lines import Lines
 from livebode.core.rows import RowArrays
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Names = str | int | Sequence[str | int] | None
 
 CHANNELS_MAX = 8
 """Largest number of inputs, and of outputs."""
@@ -61,6 +63,8 @@ class MatrixResponses(RowArrays):
         Numbers of the oldest sample (of the oldest window) and of the newest one, shape (rows,).
     time_s
         Effective time: mean of the centres of the windows, shape (rows,).
+    units
+        Unit of each entry, a row for each output; empty where not known.
 
     Examples
     --------
@@ -85,8 +89,9 @@ class MatrixResponses(RowArrays):
     first: NDArray[np.int64]
     sample: NDArray[np.int64]
     time_s: Floats
+    units: tuple[tuple[str, ...], ...] = ()
 
-    _SHARED = ("lines", "outputs", "inputs")
+    _SHARED = ("lines", "outputs", "inputs", "units")
 
     @property
     def frequency_hz(self) -> Floats:
@@ -121,6 +126,24 @@ class MatrixResponses(RowArrays):
         found[whole] = np.linalg.svd(self.value[whole], compute_uv=False)
         return found
 
+    def singular_value_bound(self, c: float = 2.0) -> Floats:
+        """Radius around each singular value, shape of `singular_values`.
+
+        To first order an error δ moves the singular value with the vectors u and v by the real part of u*·δ·v
+        (Stewart and Sun, Matrix Perturbation Theory, 1990, section IV.4). The radius is that of the complex number
+        u*·δ·v, whose variance is u*·noise·u times vᵀ·spread·v̄. Its modulus is at least its real part, so the radius
+        covers the true singular value with a probability of 1 − exp(−c²) or more, also where it is zero. Biased where
+        several differ by less than their radii: they repel each other, and of three the outer ones are covered less
+        often. docs/explanation/mimo.md has the measured shares.
+        """
+        found = np.full(self.singular_values.shape, np.nan)
+        whole = self.valid.all(axis=2)
+        left, _, right = np.linalg.svd(self.value[whole], full_matrices=False)
+        noise = np.einsum("nok,nop,npk->nk", left.conj(), self.noise[whole], left).real
+        spread = np.einsum("nki,nij,nkj->nk", right.conj(), self.spread[whole], right).real
+        found[whole] = np.sqrt(np.maximum(noise * spread, 0.0))
+        return widened(found, self.dof[:, np.newaxis, np.newaxis], c)
+
     def bound(self, c: float = 2.0) -> Floats:
         """Radius that covers the truth with probability 1 − exp(−c²), for each entry alone, shape of `value`."""
         return widened(self.sigma, self.dof[:, np.newaxis, np.newaxis, np.newaxis], c)
@@ -147,7 +170,66 @@ class MatrixResponses(RowArrays):
             sample=self.sample,
             time_s=self.time_s,
             schedule=np.full(len(self), np.nan),
+            unit=self.units[o][i] if self.units else "",
         )
+
+    def sel(
+        self,
+        *,
+        output: Names = None,
+        input: Names = None,
+        frequency_hz: slice | ArrayLike = slice(None),
+        time_s: slice = slice(None),
+    ) -> MatrixResponses:
+        """The part of some outputs, inputs, lines and times.
+
+        Names and rules are those of xarray and of the dimensions in `to_xarray`.
+
+        Parameters
+        ----------
+        output, input
+            A name or number, or several; None for all.
+        frequency_hz, time_s
+            As in `Responses.sel`.
+
+        Raises
+        ------
+        UsageError
+            If there is no such signal.
+        GridError
+            If no line is within the slice, or a frequency of the list is not a measured line.
+
+        Examples
+        --------
+        >>> from livebode.mimo import example_matrix_responses
+        >>> example_matrix_responses().sel(output="velocity2", frequency_hz=slice(20, 30))
+        <MatrixResponses: 3 rows, 3 lines, 1 outputs × 2 inputs>
+        """
+        o, i = _several(output, self.outputs, "output"), _several(input, self.inputs, "input")
+        if isinstance(frequency_hz, slice):
+            k = within(self.lines, frequency_hz)
+        else:
+            k = np.unique(position(self.lines, frequency_hz))
+        low, high = ends(time_s, "time_s")
+        rows = self[np.flatnonzero((self.time_s >= low) & (self.time_s <= high))]
+        return replace(
+            rows,
+            lines=self.lines.take(k),
+            outputs=tuple(self.outputs[n] for n in o),
+            inputs=tuple(self.inputs[n] for n in i),
+            value=rows.value[:, k][:, :, o][..., i],
+            noise=rows.noise[:, k][:, :, o][..., o],
+            spread=rows.spread[:, k][:, :, i][..., i],
+            coherence=rows.coherence[:, k][..., o],
+            condition=rows.condition[:, k],
+            reason=rows.reason[:, k][..., i],
+            units=tuple(tuple(self.units[m][n] for n in i) for m in o) if self.units else (),
+        )
+
+    def newest(self) -> MatrixResponses:
+        """The last row with a valid column; no row if there is none."""
+        rows = np.flatnonzero(self.valid.any(axis=(1, 2)))
+        return self[rows[-1:]]
 
     def why(self, row: int = -1) -> list[str]:
         """Sentences about the columns that are invalid in a row: which, at how many lines, and the reason."""
@@ -165,7 +247,8 @@ class MatrixResponses(RowArrays):
     ) -> MatrixResponses:
         """A·G·B in other coordinates, with its covariance: y' = A·y, and u = B·u'.
 
-        On a CoreXY printer, for example, both motors move both axes. The multiple coherence is not known afterwards. A
+        On a CoreXY printer, for example, both motors move both axes. The multiple coherence and the
+        units are not known afterwards. A
         column is valid where all columns were.
 
         Parameters
@@ -218,48 +301,80 @@ class MatrixResponses(RowArrays):
             self.time_s,
         )
 
+    def plot(
+        self, *, axes: Any = None, bounds: bool = True, c: float = 2.0, label: str | None = None, color: Any = None
+    ) -> Any:
+        """Draw each entry as a Bode plot: outputs down, inputs across, each with magnitude above phase.
+
+        As `Responses.plot`: the newest valid values, and behind them the range of 5–95 % of the others. Use `sel` for
+        some of the entries, and `entry(…).plot` for a Nyquist plot or a Nichols chart of one.
+
+        Parameters
+        ----------
+        axes
+            Matplotlib Axes to draw on, an array of shape (2 · outputs, inputs). Default: a new figure of pyplot.
+        bounds, c, label, color
+            As in `Responses.plot`.
+
+        Returns
+        -------
+        numpy.ndarray of Axes
+            Shape (2 · outputs, inputs).
+
+        Raises
+        ------
+        UsageError
+            If `axes` have another shape.
+
+        Examples
+        --------
+        >>> from livebode.mimo import example_matrix_responses
+        >>> axes = example_matrix_responses().plot()
+        >>> axes.shape, axes[0, 1].get_title()
+        ((4, 2), 'u2 → velocity1')
+        """
+        from livebode.core._matrix_plotting import plot_matrix
+
+        return plot_matrix(self, axes=axes, c=c if bounds else None, label=label, color=color)
+
     def to_xarray(self) -> Dataset:
-        """A Dataset with the dimensions time_s, frequency_hz, output and input (extra `xarray`).
+        """A labelled Dataset (extra `xarray`).
+
+        Dimensions ``time_s``, ``frequency_hz``, ``output`` and ``input``; ``first`` and ``sample`` are coordinates
+        along time. Variables ``response`` (complex) and ``sigma`` over all four, ``noise`` and ``spread`` with a
+        further dimension ``other_output`` and ``other_input``: their product is the covariance of all entries. Also
+        ``coherence``, ``condition``, ``valid``, ``reason`` and ``dof``.
 
         Raises
         ------
         ExtraError
             If xarray is not installed.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from livebode.mimo import example_matrix_responses
+        >>> responses = example_matrix_responses()[-1:]
+        >>> dataset = responses.to_xarray()
+        >>> covariance = (dataset.noise * dataset.spread).transpose(
+        ...     "time_s", "frequency_hz", "output", "input", "other_output", "other_input"
+        ... )
+        >>> bool(np.allclose(covariance, responses.covariance))
+        True
         """
-        four = ("time_s", "frequency_hz", "output", "input")
-        variables: dict[str, Any] = {
-            "response": (four, self.value),
-            "sigma": (four, self.sigma),
-            "coherence": (four[:3], self.coherence),
-            "condition": (four[:2], self.condition),
-            "valid": (("time_s", "frequency_hz", "input"), self.valid),
-            "dof": (four[:1], self.dof),
-        }
-        coords = {
-            "time_s": self.time_s,
-            "frequency_hz": self.frequency_hz,
-            "output": list(self.outputs),
-            "input": list(self.inputs),
-        }
-        found: Dataset = _optional("xarray", "xarray").Dataset(variables, coords)
-        return found
+        return dataset(self, REASONS)
 
     def to_frd(self, row: int = -1) -> Any:
         """python-control's FrequencyResponseData of one row, in rad/s, at lines where all columns are valid.
 
+        Its `frdata` has the shape (outputs, inputs, lines); it has no bounds (extra `control`).
+
         Raises
         ------
         ExtraError
-            If python-control is not installed (extra `control`).
+            If python-control is not installed.
         """
-        control = _optional("control", "python-control")
-        whole = self.valid[row].all(axis=1)
-        return control.frd(
-            np.moveaxis(self.value[row, whole], 0, 2),
-            2 * np.pi * self.frequency_hz[whole],
-            inputs=list(self.inputs),
-            outputs=list(self.outputs),
-        )
+        return frd(self, row)
 
     def __repr__(self) -> str:
         return (
@@ -284,14 +399,6 @@ _SENTENCES = {
 }
 
 
-def _optional(package: str, shown: str) -> Any:
-    """The package of the extra with its name; ExtraError where it is not installed."""
-    try:
-        return import_module(package)
-    except ImportError:
-        raise not_installed(f"{shown} is not installed", package=package, extra=package) from None
-
-
 def _at(which: str | int, names: tuple[str, ...], kind: str) -> int:
     if isinstance(which, str) and which in names:
         return names.index(which)
@@ -305,3 +412,9 @@ def _at(which: str | int, names: tuple[str, ...], kind: str) -> int:
         value=which,
         allowed=list(names),
     )
+
+
+def _several(which: Names, names: tuple[str, ...], kind: str) -> list[int]:
+    if which is None:
+        return list(range(len(names)))
+    return [_at(one, names, kind) for one in ([which] if isinstance(which, str | int) else which)]

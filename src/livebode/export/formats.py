@@ -6,12 +6,16 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from livebode.core import OutputError, Responses
+from livebode.core import MatrixResponses, OutputError, Responses
 from livebode.core.files import whole_file
 from livebode.core.writing import writing
 from livebode.export.delimited import write_csv
 from livebode.export.labelled import write_netcdf
 from livebode.export.matlab import write_mat
+from livebode.export.matrix_delimited import write_matrix_csv
+from livebode.export.matrix_labelled import write_matrix_netcdf
+from livebode.export.matrix_matlab import write_matrix_mat
+from livebode.export.matrix_universal import write_matrix_uff
 from livebode.export.parameters import write_parameters_csv, write_parameters_mat
 from livebode.export.result import WriteResult
 from livebode.export.universal import write_uff
@@ -24,6 +28,14 @@ FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], W
     "uff": write_uff,
 }
 """Functions that write responses, by the name of the format."""
+
+MATRIX_FORMATS: Mapping[str, Callable[[Path, Iterable[MatrixResponses], Mapping[str, Any]], WriteResult]] = {
+    "csv": write_matrix_csv,
+    "mat": write_matrix_mat,
+    "netcdf": write_matrix_netcdf,
+    "uff": write_matrix_uff,
+}
+"""Functions that write matrices of responses, by the name of the format."""
 
 TABLES: Mapping[str, Callable[[Path, Iterable[Table]], WriteResult]] = {
     "csv": write_parameters_csv,

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
-from livebode.core import OutputError, RecordError, Responses
+from livebode.core import MatrixResponses, OutputError, RecordError, Responses
+
+Rows = TypeVar("Rows", Responses, MatrixResponses)
 
 VALUES_MAX = 1 << 23
-"""Most values (responses times lines) of a format that is not written in parts: about 2 GB of memory."""
+"""Most values (responses times lines, times entries of a matrix) of a format that is not written in parts: about 2 GB
+of memory."""
 
 
 class WriteResult(NamedTuple):
@@ -18,7 +21,7 @@ class WriteResult(NamedTuple):
     left_out: int = 0
 
 
-def whole(parts: Iterable[Responses], format: str) -> Responses:
+def whole(parts: Iterable[Rows], format: str) -> Rows:
     """All parts as one, if their size is allowed.
 
     Raises
@@ -28,7 +31,8 @@ def whole(parts: Iterable[Responses], format: str) -> Responses:
     OutputError
         If they have more than `VALUES_MAX` values.
     """
-    kept, values = [], 0
+    kept: list[Rows] = []
+    values = 0
     for part in parts:
         values += part.value.size
         if values > VALUES_MAX:
@@ -42,4 +46,4 @@ def whole(parts: Iterable[Responses], format: str) -> Responses:
         kept.append(part)
     if not values:
         raise RecordError("no-responses", "the run has no responses to export", "see its events")
-    return Responses.join(kept)
+    return type(kept[0]).join(kept)

@@ -40,32 +40,45 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
     SignalError
         If no response has two valid lines.
     """
+    channels = _channels(about or {})
+    return write_functions(path, ((response, channels, {}) for part in parts for response in part))
+
+
+def write_functions(path: Path, functions: Iterable[tuple[Response, str, Mapping[str, Any]]]) -> WriteResult:
+    """Write datasets 58 of responses, each with the words for its channels, and fields other than those of node 1.
+
+    Raises
+    ------
+    ExtraError, SignalError
+        As `write_uff`.
+    """
     try:
         import pyuff
     except ImportError:
         raise not_installed("pyuff is not installed", package="pyuff", extra="uff") from None
-    functions = left_out = 0
+    written = left_out = 0
     with path.open("wb") as file, TemporaryDirectory(prefix=f"{path.name}-", dir=path.parent) as folder:
         # pyuff reads the file again after each set that it appends; sets can simply be concatenated.
         scratch = os.path.join(folder, "set")
-        for response in (response for part in parts for response in part):
+        for response, channels, fields in functions:
             if np.count_nonzero(response.valid) < _LINES_MIN:
                 left_out += 1
                 continue
-            functions += 1
+            written += 1
             try:
-                pyuff.UFF(scratch).write_sets(_dataset(response, functions, about or {}), mode="overwrite")
+                dataset = {**_dataset(response, written, channels), **fields}
+                pyuff.UFF(scratch).write_sets(dataset, mode="overwrite")
             except Exception as error:
                 raise _cause(error) from None
             file.write(Path(scratch).read_bytes())
-    if not functions:
+    if not written:
         raise SignalError(
             "too-few-lines",
             f"no response has {_LINES_MIN} valid lines, which UFF 58 needs",
             "export csv or mat, which accept a response with fewer",
             lines_min=_LINES_MIN,
         )
-    return WriteResult(functions, left_out)
+    return WriteResult(written, left_out)
 
 
 def _cause(error: BaseException) -> BaseException:
@@ -75,15 +88,15 @@ def _cause(error: BaseException) -> BaseException:
     return error
 
 
-def _dataset(response: Response, number: int, about: Mapping[str, Any]) -> dict[str, Any]:
+def _dataset(response: Response, number: int, channels: str) -> dict[str, Any]:
     valid = response.valid
     frequency_hz = response.lines.frequency_hz[valid]
     return {
         "type": 58,
         "binary": 0,
-        "id1": _text(f"{response.quantity} {_channels(about)}".strip(), _ID),
-        "id2": _text(response.unit, _ID),
-        "id4": _text(_moment(response), _ID),
+        "id1": text(f"{response.quantity} {channels}".strip(), _ID),
+        "id2": text(response.unit, _ID),
+        "id4": text(_moment(response), _ID),
         "func_type": _FRF,
         "func_id": number,
         "rsp_node": 1,
@@ -95,8 +108,8 @@ def _dataset(response: Response, number: int, about: Mapping[str, Any]) -> dict[
         "abscissa_axis_lab": "Frequency",
         "abscissa_axis_units_lab": "Hz",
         "ordinate_spec_data_type": _UNKNOWN,
-        "ordinate_axis_lab": _text(response.quantity, _LABEL),
-        "ordinate_axis_units_lab": _text(response.unit, _LABEL),
+        "ordinate_axis_lab": text(response.quantity, _LABEL),
+        "ordinate_axis_units_lab": text(response.unit, _LABEL),
         "orddenom_spec_data_type": _UNKNOWN,
         "z_axis_spec_data_type": _TIME,
         "z_axis_axis_lab": "Time",
@@ -126,7 +139,7 @@ def _moment(response: Response) -> str:
     return f"{response.time_s:.9g} s{schedule} samples {response.first} to {response.sample}"
 
 
-def _text(text: str, length: int) -> str:
+def text(words: str, length: int) -> str:
     """Text that a line of the format can contain: ASCII, no line breaks, not blank."""
-    plain = text.replace("µ", "u").replace("μ", "u").replace("°", "deg").encode("ascii", "replace").decode()
+    plain = words.replace("µ", "u").replace("μ", "u").replace("°", "deg").encode("ascii", "replace").decode()
     return "".join(c if c.isprintable() else "?" for c in plain).strip()[:length] or "NONE"

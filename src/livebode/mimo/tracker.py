@@ -148,6 +148,7 @@ class MatrixTracker(StatefulBase):
             first=sample - s.lines.window + 1 - s.cycle * (used - 1) - s.span * (s.count - 1),
             sample=sample,
             time_s=np.asarray(block.origin_s + middle / block.rate_hz, dtype=np.float64),
+            units=(),
         )
 
     def _estimate(self, rows: SpectraRows, settled: NDArray[np.intp]) -> tuple[Estimate, NDArray[np.int64]]:
