@@ -94,3 +94,18 @@ def test_design_takes_the_missing_lines_and_with_them_the_axis_is_tuned(tmp_path
     fine = recorded(tmp_path / "fine", lines["frequencies"], lines["window"])
     tuned = livebode("tune", fine, "--loop-checked")
     assert tuned.code == 0, tuned.err
+
+
+def test_input_shapers_are_proposed_for_the_load_of_a_stiff_drive(run: Path) -> None:
+    """The load of the true belt swings at 43.48 Hz with a damping of 0.0355 while the motor is held."""
+    done = livebode("shaper", run, "--axis", "y", "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert found["mode"]["low_hz"] < 43.48 < found["mode"]["high_hz"]
+    assert found["mode"]["low_damping"] < 0.0355 < found["mode"]["high_damping"]
+    best = next(one for one in found["shapers"] if one["kind"] == found["chosen"])
+    assert best["worst"] <= 0.05
+    assert "shaper_freq_y: 43" in (run / "shaper.cfg").read_text(encoding="utf-8")
+    assert "LIVEBODE_SHAPER" in (run / "shaper.h").read_text(encoding="utf-8")
+    assert "proposed" in livebode("shaper", run).out
+    assert "no parameter 'wobble'" in livebode("shaper", run, "--mode", "wobble").err

@@ -29,6 +29,7 @@ SUMMARIES: Mapping[str, str] = {
     "margins": "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter "
     "if needed.",
     "tune": "Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.",
+    "shaper": "Propose input shapers for a mode of the fitted model, over its bounds at every place of the run.",
     "friction": "Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with "
     "bounds.",
     "orders": "Find torque that repeats with the angle: cogging, eccentricity, gears; write a feedforward table.",
