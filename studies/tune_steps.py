@@ -75,6 +75,7 @@ def axes(seed: int) -> Iterator[BeltAxis]:
             ),
             drive=Drive(
                 position_rate_hz=RATE_HZ,
+                position_gain_per_s=10.0,  # settled before the samples that are used
                 delay_ticks=int(rng.integers(0, 5)),
                 torque_ripple_n_m=rng.uniform(0, 0.03),
                 torque_noise_n_m=0.02,
@@ -180,7 +181,7 @@ def main(count: int = 50) -> None:
     )  # fmt: skip
     show(Table("Steps in the non-linear axis", header, [row]))
     print(f"variation before the step: {100 * np.median(variation):.2g} % (median)")
-    why = "the band has the noise of the lines only, not the friction's slope nor the stiffness beside the place"
+    why = "the band has the noise of the lines only, not friction, nor the stiffness beside the place"
     print(Verdict("share of samples within the band", float(inside.mean()), _INSIDE, at_least=True, why=why))
     print(Verdict("median of the largest deviation", float(np.median(deviation)), _DEVIATION, why="measured"))
 

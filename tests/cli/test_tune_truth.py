@@ -47,6 +47,9 @@ def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
     assert done.code == 0, done.err
     assert "velocity.gain" in done.out
     assert "is promised" in done.out
+    inertia, bound = map(float, re.search(r"inertia +(\S+) ± (\S+)", done.out).groups())  # type: ignore[union-attr]
+    assert abs(inertia - (0.0028 + 6.7 * 0.019**2)) < bound < 0.1 * inertia
+    assert "--strokes" in done.out  # the axis was at standstill
     assert (run / "tune.png").stat().st_size > 20_000
     assert "LIVEBODE_FILTERS" in (run / "filters.h").read_text(encoding="utf-8")
 

@@ -6,12 +6,16 @@ from pathlib import Path
 
 from livebode.analysis.checked_loop import checked_loop
 from livebode.analysis.places import by_place
+from livebode.analysis.strokes import read_strokes
 from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Responses, TuneError
+from livebode.core import PID, Cascade, LivebodeError, PositionPD, Responses, SignalError, TuneError
+from livebode.locations import Location
+from livebode.motion.friction_curve import FrictionCurve, friction_curve
 from livebode.records import RunRecord
 from livebode.tuning import ControllerProposal, LoopSpecification, tune
+from livebode.tuning.feedforward import Feedforward
 
 _CONTRADICTED = ("one change", "not explained")
 
@@ -48,6 +52,35 @@ def tune_run(
     responses = Responses.join(list(run.steady_batches()))
     checked = _confirmed(directory, section) or loop_checked
     return tune(by_place(responses), section.build(responses.lines.rate_hz), specification, loop_checked=checked)
+
+
+def feedforward_of(
+    directory: Path, controller: PID | Cascade | PositionPD, strokes: Location | None = None
+) -> Feedforward | None:
+    """Feedforward for a run: inertia from its responses, friction from `strokes` or else the run's own recording.
+
+    None where the lines do not show the inertia, or it is not known whether the output is a position or a velocity.
+    Without friction where the run's own recording has no strokes in both directions.
+    """
+    run = RunRecord.open(directory)
+    kind = run.kinds.output or {PositionPD: "position", Cascade: "velocity"}.get(type(controller))
+    if kind not in ("position", "velocity"):
+        return None
+    try:
+        friction = _friction(directory if strokes is None else strokes, kind)
+    except LivebodeError:
+        if strokes is not None:
+            raise
+        friction = None
+    try:
+        return Feedforward.of(by_place(Responses.join(list(run.steady_batches()))), kind, friction)
+    except SignalError:
+        return None
+
+
+def _friction(target: Location, kind: str) -> FrictionCurve:
+    found = read_strokes(target)
+    return friction_curve(found.block, input=found.input, output=found.output, kind=kind)
 
 
 def _confirmed(directory: Path, section: LoopSection) -> bool:

@@ -78,8 +78,8 @@ def show_shapers(where: ModeRange, found: tuple[InputShaper, ...], best: InputSh
         )
     if best.worst > tolerance:
         print(
-            f"no shaper leaves {100 * tolerance:.3g} % or less: the mode differs too much between the places, or its bounds "
-            "are too wide"
+            f"no shaper leaves {100 * tolerance:.3g} % or less: the mode differs too much between the places, "
+            "or its bounds are too wide"
         )
     pairs = ", ".join(f"{a:.4f} at {1e3 * t:.3f} ms" for a, t in zip(best.amplitudes, best.times_s))
     print(f"{best.kind}: {pairs}")

@@ -15,6 +15,7 @@ from livebode.locations import location
 
 if TYPE_CHECKING:
     from livebode.tuning import ControllerProposal
+    from livebode.tuning.feedforward import Feedforward
 
 
 def tune_command(
@@ -38,6 +39,13 @@ def tune_command(
     loop_checked: Annotated[
         bool, typer.Option("--loop-checked", help="The description of the loop was compared with the machine.")
     ] = False,
+    strokes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RUN|LOG|AXIS.toml",
+            help="Usual strokes in both directions, for the feedforward of friction. \\[default: the run's recording]",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
@@ -45,7 +53,7 @@ def tune_command(
     Writes tune.png, and the filters as filters.h and filters.st, to the run directory; nothing to a machine. The exit
     code is 2 if no controller meets the specification.
     """
-    from livebode.analysis.tune_report import tune_run
+    from livebode.analysis.tune_report import feedforward_of, tune_run
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.configuration import Axis
     from livebode.records import to_json
@@ -65,6 +73,7 @@ def tune_command(
     )
     other = None if axis is None else Axis.read(axis)
     found = tune_run(directory, specification, other, loop_checked=loop_checked)
+    forward = feedforward_of(directory, found.feedback.controller, None if strokes is None else location(strokes))
     into = results_directory(directory)
     with writing(into, RecordError):
         if can_draw():
@@ -74,9 +83,10 @@ def tune_command(
         (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
         (into / "filters.st").write_text(structured_text(found.feedback.biquads), encoding="utf-8")
     if as_json:
-        print(to_json(found.plain()))
+        print(to_json(found.plain() | {"feedforward": None if forward is None else forward.plain()}))
     else:
         show_proposal(found)
+        show_feedforward(forward)
         written = ["filters.h", "filters.st", *(["tune.png"] if can_draw() else [])]
         print(f"\n{into}: {', '.join(written)}")
         tell_how_to_draw()
@@ -103,6 +113,19 @@ def show_proposal(found: ControllerProposal) -> None:
         print(f"    at {biquad.rate_hz:g} Hz: b = {b}   a = 1, {a}")
     _show_margins(found)
     print(found.sentence)
+
+
+def show_feedforward(found: Feedforward | None) -> None:
+    """Print inertia and friction with their bounds, in the units of the recording."""
+    if found is None:
+        print("feedforward: the lines do not show the inertia")
+        return
+    print("feedforward (95 %, units of the recording)")
+    for name in ("inertia", "viscous", "coulomb", "offset"):
+        if (value := getattr(found, name)) is not None:
+            print(f"  {name:32}{value:>12.5g} ± {getattr(found, f'{name}_bound'):.2g}")
+    if found.coulomb is None:
+        print("  friction: the recording has no strokes in both directions; name some: --strokes")
 
 
 def _show_parameters(found: ControllerProposal) -> None:
