@@ -13,6 +13,7 @@ from livebode.configuration.recorded import recorded_configuration
 from livebode.core import PID, Cascade, LivebodeError, PositionPD, Responses, SignalError, TuneError
 from livebode.locations import Location
 from livebode.motion.friction_curve import FrictionCurve, friction_curve
+from livebode.motion.smooth_motion import OutputKind
 from livebode.records import RunRecord
 from livebode.tuning import ControllerProposal, LoopSpecification, tune
 from livebode.tuning.feedforward import Feedforward
@@ -63,8 +64,8 @@ def feedforward_of(
     Without friction where the run's own recording has no strokes in both directions.
     """
     run = RunRecord.open(directory)
-    kind = run.kinds.output or {PositionPD: "position", Cascade: "velocity"}.get(type(controller))
-    if kind not in ("position", "velocity"):
+    kind = _kind(run.kinds.output, controller)
+    if kind is None:
         return None
     try:
         friction = _friction(directory if strokes is None else strokes, kind)
@@ -78,7 +79,16 @@ def feedforward_of(
         return None
 
 
-def _friction(target: Location, kind: str) -> FrictionCurve:
+def _kind(recorded: str | None, controller: PID | Cascade | PositionPD) -> OutputKind | None:
+    """Quantity of the output: as recorded; without a unit, by the controller."""
+    if recorded == "velocity" or (recorded is None and isinstance(controller, Cascade)):
+        return "velocity"
+    if recorded == "position" or (recorded is None and isinstance(controller, PositionPD)):
+        return "position"
+    return None
+
+
+def _friction(target: Location, kind: OutputKind) -> FrictionCurve:
     found = read_strokes(target)
     return friction_curve(found.block, input=found.input, output=found.output, kind=kind)
 

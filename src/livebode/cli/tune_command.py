@@ -33,6 +33,12 @@ def tune_command(
     noise_gain: Annotated[
         float | None, typer.Option(help="Largest rms of the input for white noise of 1 at the output.")
     ] = None,
+    encoder_step: Annotated[
+        float | None, typer.Option(metavar="STEP", help="Step of the encoder: rad for rad/s, or the position's unit.")
+    ] = None,
+    input_noise: Annotated[
+        float | None, typer.Option(help="Largest rms of the input, in its unit, due to the rounding of the encoder.")
+    ] = None,
     notches: Annotated[int, typer.Option(help="Most notches, 0 … 4.")] = 2,
     low_pass: Annotated[bool, typer.Option(help="Permit a low-pass of second order.")] = True,
     coherence: Annotated[float, typer.Option(help="Do not use lines with a lower coherence.")] = 0.5,
@@ -67,6 +73,8 @@ def tune_command(
         max_sensitivity=max_sensitivity,
         disk_margin=disk_margin,
         noise_gain=noise_gain,
+        encoder_step=encoder_step,
+        input_noise=input_noise,
         notches=notches,
         low_pass=low_pass,
         coherence=coherence,
@@ -165,6 +173,8 @@ def _show_margins(found: ControllerProposal) -> None:
             for one, two in ((found.before, found.before_worst), (found.after, found.promised))
         ]
         print(f"  {word:18}{cells[0]:>24}{cells[1]:>24}")
+    word = "noise gain" if found.specification.encoder_step is None else "input noise, rms"
+    print(f"  {word:18}{found.noise[0]:>24.4g}{found.noise[1]:>24.4g}")
     places = f"{rows} places, " if rows > 1 else ""
     print(
         f"  {places}{found.plant.lines_hz.size} lines, {found.plant.lines_hz[0]:g} … {found.plant.lines_hz[-1]:g} Hz; "

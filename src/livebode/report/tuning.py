@@ -148,7 +148,7 @@ def _nichols(axes: Axes, look: Style, found: ControllerProposal) -> None:
                 disc = 1 + share[near, np.newaxis] * turn
                 edge = [deg[near, np.newaxis] + np.degrees(np.angle(disc)), db[near, np.newaxis] + _db(disc)]
                 words: dict[str, Any] = {"facecolor": look.newest, "alpha": 0.18, "linewidth": 0}
-                axes.add_collection(PolyCollection(np.stack(edge, axis=-1), **words), autolim=False)
+                axes.add_collection(PolyCollection(list(np.stack(edge, axis=-1)), **words), autolim=False)
     ms = found.specification.max_sensitivity
     around = 1 - turn / ms  # −L
     axes.plot(np.degrees(np.angle(around)) - 180, _db(around), color=look.ink, linewidth=1.2, zorder=4)

@@ -256,7 +256,7 @@ def _program(mode: ModeRange, steps: int, step_s: float) -> InputShaper:
     """Amplitudes at times up to `steps`·step with the least largest residual."""
     from scipy.optimize import linprog
 
-    times_s = step_s * np.arange(steps + 1)
+    times_s = np.asarray(step_s * np.arange(steps + 1), dtype=np.float64)
     phasors = _phasors(times_s, *mode.grid)
     turns = np.exp(1j * np.pi * np.arange(_TURNS) * 2 / _TURNS)
     rows = np.real(phasors[np.newaxis] * turns[:, np.newaxis, np.newaxis]).reshape(-1, times_s.size)
@@ -268,8 +268,8 @@ def _program(mode: ModeRange, steps: int, step_s: float) -> InputShaper:
         b_eq=[1.0],
         method="highs",
     )
-    use = found.x[:-1] > _NEGLIGIBLE
-    use[-1] = True  # the phasors refer to the last time
-    amplitudes = found.x[:-1][use] / found.x[:-1][use].sum()
+    every = np.asarray(found.x, dtype=np.float64)[:-1]
+    use = every > _NEGLIGIBLE
+    amplitudes = every[use] / every[use].sum()
     at = times_s[use] - times_s[use][0]
     return _largest(InputShaper("optimised", tuple(at.tolist()), tuple(amplitudes.tolist()), *mode.middle), mode)
