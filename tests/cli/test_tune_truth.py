@@ -12,6 +12,7 @@ import pytest
 
 from livebode.core import Lines
 from livebode.excitation import multisine
+from livebode.simulation import BeltAxis, Drive, SimulatedAxis, Strokes
 from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from tests.support.command import livebode, write_parquet
 from tests.support.loop_runs import AXIS
@@ -97,6 +98,36 @@ def test_design_takes_the_missing_lines_and_with_them_the_axis_is_tuned(tmp_path
     fine = recorded(tmp_path / "fine", lines["frequencies"], lines["window"])
     tuned = livebode("tune", fine, "--loop-checked")
     assert tuned.code == 0, tuned.err
+
+
+def test_the_model_over_the_position_is_exported_from_a_slow_stroke(tmp_path: Path) -> None:
+    """From 0.4 to 1.4 m at 0.1 m/s; the true stiffness follows the cart."""
+    axis = BeltAxis(
+        drive=Drive(position_rate_hz=RATE_HZ, position_gain_per_s=10.0),
+        motion=Strokes(start_m=0.4, end_m=1.4, speed_m_per_s=0.1, dwell_s=0.0),
+        excitation_n_m=0.05 * multisine(Lines.parse("4:400:8", RATE_HZ, 1000)),
+        seconds=10.0,
+    )
+    block, _ = SimulatedAxis(axis).run()
+    write_parquet(tmp_path / "log.parquet", {n: block[n] for n in ("w", "u", "velocity", "x")})
+    words = (
+        AXIS.format(gain=0.2308, delay=0).replace('"20:140:10"', '"4:400:8"').replace("window = 400", "window = 1000")
+    )
+    words = words.replace('output = "y"', 'output = "velocity"\nschedule = "x"')
+    (tmp_path / "axis.toml").write_text(words, encoding="utf-8")
+    assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run").code == 0
+    done = livebode("export", tmp_path / "run", "--lpv", "--to", "json")
+    assert done.code == 0, done.err
+    found = json.loads((tmp_path / "run-lpv.json").read_text(encoding="utf-8"))
+    at = found["names"].index("Keff")
+    stiffness, place = np.array(found["value"])[:, at], np.array(found["position"])
+    assert place.size >= 10
+    # The axis starts to move in the first place.
+    np.testing.assert_allclose(stiffness[1:], axis.mechanics.stiffness_at(place)[1:], rtol=0.01)
+    for to, ending in (("c", "h"), ("mat", "mat"), ("netcdf", "nc")):
+        assert livebode("export", tmp_path / "run", "--lpv", "--to", to).code == 0
+        assert (tmp_path / f"run-lpv.{ending}").is_file()
+    assert livebode("export", tmp_path / "run", "--lpv", "--mean", "--to", "c").code == 2
 
 
 def test_input_shapers_are_proposed_for_the_load_of_a_stiff_drive(run: Path) -> None:

@@ -11,6 +11,7 @@ from livebode.configuration.fit_section import FitSection
 from livebode.configuration.fit_settings import fitter_of
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Parameters, Responses, TuneError
+from livebode.export import LpvModel
 from livebode.fitting import PhysicalModel
 from livebode.records import RunRecord
 
@@ -47,3 +48,14 @@ def modes_by_place(directory: Path) -> Parameters:
     """Frequency in Hz, damping ratio and quality factor of each mode at each place, as for `fits_by_place`."""
     model, found = fits_by_place(directory)
     return found.derived(model.derived_names, model.derived_units, model.derived)
+
+
+def lpv_model(directory: Path) -> LpvModel:
+    """The two-mass model of a run over its schedule; errors as of `fits_by_place` and `LpvModel`."""
+    model, found = fits_by_place(directory)
+    return LpvModel(
+        found,
+        getattr(model, "output", "velocity"),
+        getattr(model, "side", "motor"),
+        getattr(model, "radius_m", None),
+    )

@@ -3,6 +3,7 @@
 from livebode.export.delimited import write_csv
 from livebode.export.formats import ENDINGS, FORMATS, TABLES, save
 from livebode.export.labelled import write_netcdf
+from livebode.export.lpv import MODELS, LpvModel
 from livebode.export.matlab import write_mat
 from livebode.export.parameters import ParameterTable, write_parameters_csv, write_parameters_mat
 from livebode.export.result import WriteResult
@@ -12,7 +13,9 @@ from livebode.export.universal import write_uff
 __all__ = [
     "ENDINGS",
     "FORMATS",
+    "MODELS",
     "TABLES",
+    "LpvModel",
     "ParameterTable",
     "WriteResult",
     "at",
