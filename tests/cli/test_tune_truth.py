@@ -55,6 +55,16 @@ def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
     assert "LIVEBODE_FILTERS" in (run / "filters.h").read_text(encoding="utf-8")
 
 
+def test_gains_for_odrive_count_turns_and_have_no_filters(run: Path) -> None:
+    done = livebode("tune", run, "--loop-checked", "--odrive", "--notches", 0, "--no-low-pass", "--json")
+    assert done.code == 0, done.err
+    velocity = json.loads(done.out)["controller"]["velocity"]
+    written = (run / "odrive.txt").read_text(encoding="utf-8")
+    values = [float(line.split(" = ")[1]) for line in written.splitlines()]
+    gain = 2 * np.pi * velocity["gain"]
+    np.testing.assert_allclose(values[1:], [gain, gain / velocity["integral_time_s"]], rtol=1e-5)
+
+
 def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path) -> None:
     done = livebode("tune", run, "--loop-checked", "--bandwidth-hz", 300, "--json")
     assert done.code == 2

@@ -45,6 +45,10 @@ def tune_command(
     loop_checked: Annotated[
         bool, typer.Option("--loop-checked", help="The description of the loop was compared with the machine.")
     ] = False,
+    odrive: Annotated[
+        bool,
+        typer.Option("--odrive", help="Also write odrive.txt, the gains for odrivetool (firmware from 0.5)."),
+    ] = False,
     strokes: Annotated[
         str | None,
         typer.Option(
@@ -64,7 +68,7 @@ def tune_command(
     from livebode.configuration import Axis
     from livebode.records import to_json
     from livebode.tuning import LoopSpecification
-    from livebode.tuning.code_text import c_header, structured_text
+    from livebode.tuning.code_text import c_header, odrive_text, structured_text
 
     specification = LoopSpecification(
         bandwidth_hz=bandwidth_hz,
@@ -89,13 +93,15 @@ def tune_command(
 
             save_tuning_picture(found, into, title=directory.name)
         (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
+        if odrive:
+            (into / "odrive.txt").write_text(odrive_text(found.feedback), encoding="utf-8")
         (into / "filters.st").write_text(structured_text(found.feedback.biquads), encoding="utf-8")
     if as_json:
         print(to_json(found.plain() | {"feedforward": None if forward is None else forward.plain()}))
     else:
         show_proposal(found)
         show_feedforward(forward)
-        written = ["filters.h", "filters.st", *(["tune.png"] if can_draw() else [])]
+        written = ["filters.h", "filters.st", *["odrive.txt"] * odrive, *(["tune.png"] if can_draw() else [])]
         print(f"\n{into}: {', '.join(written)}")
         tell_how_to_draw()
     if not found.met:
