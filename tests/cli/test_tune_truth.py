@@ -12,7 +12,7 @@ import pytest
 
 from livebode.core import Lines
 from livebode.excitation import multisine
-from livebode.simulation import BeltAxis, Drive, SimulatedAxis, Strokes
+from livebode.simulation import BeltAxis, Drive, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
 from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from tests.support.command import livebode, write_parquet
 from tests.support.loop_runs import AXIS
@@ -138,6 +138,35 @@ def test_the_model_over_the_position_is_exported_from_a_slow_stroke(tmp_path: Pa
         assert livebode("export", tmp_path / "run", "--lpv", "--to", to).code == 0
         assert (tmp_path / f"run-lpv.{ending}").is_file()
     assert livebode("export", tmp_path / "run", "--lpv", "--mean", "--to", "c").code == 2
+
+
+def test_gains_over_the_schedule_are_proposed_from_stops_at_places(tmp_path: Path) -> None:
+    """Three stops, with a missing sample between them."""
+    parts = []
+    for place in (0.4, 0.95, 1.4):
+        axis = BeltAxis(
+            mechanics=Mechanics(damping_n_s_per_m=400.0),
+            motion=Standstill(position_m=place),
+            excitation_n_m=0.05 * multisine(Lines.parse("4:400:4", RATE_HZ, 1000)),
+            sensor=Sensor(noise_rad_per_s=0.002),
+            run_in_s=2.0,
+            seconds=3.0,
+        )
+        block, _ = SimulatedAxis(axis).run()
+        parts.append(np.array([block[n] for n in ("w", "u", "velocity", "x")]))
+        parts[-1][2, 0] = np.nan
+    write_parquet(tmp_path / "log.parquet", dict(zip(("w", "u", "velocity", "x"), np.concatenate(parts, axis=1))))
+    words = AXIS.format(gain=0.2308, delay=0).replace('"20:140:10"', '"4:400:4"')
+    words = words.replace("window = 400", "window = 1000").replace("hop = 200", "hop = 1000")
+    words = words.replace('output = "y"', 'output = "velocity"\nschedule = "x"')
+    (tmp_path / "axis.toml").write_text(words, encoding="utf-8")
+    assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run").code == 0
+    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule")
+    assert done.code == 0, done.err
+    assert "gains over the schedule" in done.out
+    lines = (tmp_path / "run" / "gains.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "position,gain,integral_time,position_gain"
+    np.testing.assert_allclose([float(line.split(",")[0]) for line in lines[1:]], [0.4, 0.95, 1.4], atol=0.01)
 
 
 def test_input_shapers_are_proposed_for_the_load_of_a_stiff_drive(run: Path) -> None:

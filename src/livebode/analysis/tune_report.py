@@ -10,13 +10,14 @@ from livebode.analysis.strokes import read_strokes
 from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import PID, Cascade, LivebodeError, PositionPD, Responses, SignalError, TuneError
+from livebode.core import PID, Cascade, LivebodeError, Loop, PositionPD, Responses, SignalError, TuneError
 from livebode.locations import Location
 from livebode.motion.friction_curve import FrictionCurve, friction_curve
 from livebode.motion.smooth_motion import OutputKind
 from livebode.records import RunRecord
 from livebode.tuning import ControllerProposal, LoopSpecification, tune
 from livebode.tuning.feedforward import Feedforward
+from livebode.tuning.gain_schedule import GainSchedule, gain_schedule
 
 _CONTRADICTED = ("one change", "not explained")
 
@@ -46,13 +47,27 @@ def tune_run(
     UsageError
         If the loop's feedback is missing.
     """
+    responses, loop, checked = _inputs(directory, axis, loop_checked)
+    return tune(responses, loop, specification, loop_checked=checked)
+
+
+def schedule_run(
+    directory: Path, specification: LoopSpecification, axis: Axis | None = None, *, loop_checked: bool = False
+) -> GainSchedule:
+    """The same with gains that follow the schedule of the run, without filters; errors as of `gain_schedule`."""
+    responses, loop, checked = _inputs(directory, axis, loop_checked)
+    return gain_schedule(responses, loop, specification, loop_checked=checked)
+
+
+def _inputs(directory: Path, axis: Axis | None, loop_checked: bool) -> tuple[Responses, Loop, bool]:
+    """Mean responses by place, the loop, and whether its description was checked."""
     run = RunRecord.open(directory)
     section = axis.loop if axis is not None else None
     if section is None:
         section = LoopSection.model_validate(recorded_configuration(run.summary).get("loop", {}))
     responses = Responses.join(list(run.steady_batches()))
     checked = _confirmed(directory, section) or loop_checked
-    return tune(by_place(responses), section.build(responses.lines.rate_hz), specification, loop_checked=checked)
+    return by_place(responses), section.build(responses.lines.rate_hz), checked
 
 
 def feedforward_of(

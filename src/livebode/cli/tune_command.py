@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import exp
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,7 @@ from livebode.locations import location
 if TYPE_CHECKING:
     from livebode.tuning import ControllerProposal
     from livebode.tuning.feedforward import Feedforward
+    from livebode.tuning.gain_schedule import GainSchedule
 
 
 def tune_command(
@@ -45,6 +47,9 @@ def tune_command(
     loop_checked: Annotated[
         bool, typer.Option("--loop-checked", help="The description of the loop was compared with the machine.")
     ] = False,
+    schedule: Annotated[
+        bool, typer.Option("--schedule", help="Also propose gains over the schedule, without filters, as gains.csv.")
+    ] = False,
     odrive: Annotated[
         bool,
         typer.Option("--odrive", help="Also write odrive.txt, the gains for odrivetool (firmware from 0.5)."),
@@ -63,7 +68,7 @@ def tune_command(
     Writes tune.png, and the filters as filters.h and filters.st, to the run directory; nothing to a machine. The exit
     code is 2 if no controller meets the specification.
     """
-    from livebode.analysis.tune_report import feedforward_of, tune_run
+    from livebode.analysis.tune_report import feedforward_of, schedule_run, tune_run
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.configuration import Axis
     from livebode.records import to_json
@@ -86,6 +91,7 @@ def tune_command(
     other = None if axis is None else Axis.read(axis)
     found = tune_run(directory, specification, other, loop_checked=loop_checked)
     forward = feedforward_of(directory, found.feedback.controller, None if strokes is None else location(strokes))
+    gains = schedule_run(directory, specification, other, loop_checked=loop_checked) if schedule else None
     into = results_directory(directory)
     with writing(into, RecordError):
         if can_draw():
@@ -95,13 +101,19 @@ def tune_command(
         (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
         if odrive:
             (into / "odrive.txt").write_text(odrive_text(found.feedback), encoding="utf-8")
+        if gains is not None:
+            (into / "gains.csv").write_text(gains.csv(), encoding="utf-8")
         (into / "filters.st").write_text(structured_text(found.feedback.biquads), encoding="utf-8")
     if as_json:
-        print(to_json(found.plain() | {"feedforward": None if forward is None else forward.plain()}))
+        more = {"feedforward": forward, "schedule": gains}
+        print(to_json(found.plain() | {name: None if one is None else one.plain() for name, one in more.items()}))
     else:
         show_proposal(found)
         show_feedforward(forward)
-        written = ["filters.h", "filters.st", *["odrive.txt"] * odrive, *(["tune.png"] if can_draw() else [])]
+        if gains is not None:
+            show_schedule(gains)
+        also = {"odrive.txt": odrive, "gains.csv": schedule, "tune.png": can_draw()}
+        written = ["filters.h", "filters.st", *(name for name, use in also.items() if use)]
         print(f"\n{into}: {', '.join(written)}")
         tell_how_to_draw()
     if not found.met:
@@ -127,6 +139,18 @@ def show_proposal(found: ControllerProposal) -> None:
         print(f"    at {biquad.rate_hz:g} Hz: b = {b}   a = 1, {a}")
     _show_margins(found)
     print(found.sentence)
+
+
+def show_schedule(found: GainSchedule) -> None:
+    """Print the gains and the promised bandwidth of each place."""
+    common = found.common.promised.bandwidth_hz
+    print(f"gains over the schedule, without filters (one controller for all places: {common:.4g} Hz)")
+    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz")))
+    for place, row, promised in zip(found.position, found.logarithms, found.promised):
+        numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz)
+        print("  " + "".join(f"{x:>16.5g}" for x in numbers))
+    if not found.share:
+        print("  no other gains keep the limits between the places")
 
 
 def show_feedforward(found: Feedforward | None) -> None:

@@ -173,13 +173,13 @@ def tune(
     structure = best.problem.structure
     feedback = structure.feedback(best.x)
     check_coverage(plant, plant.value * structure.response(best.x)[0], responses.lines)
-    promised = _margins_of(plant, feedback.model, 1.0)
+    promised = margins_of(plant, feedback.model, 1.0)
     required = asked.bandwidth_hz
     return ControllerProposal(
         feedback=feedback,
         before=_stable_margins(plant, loop, 0.0),
         before_worst=_stable_margins(plant, loop, 1.0),
-        after=_margins_of(plant, feedback.model, 0.0),
+        after=margins_of(plant, feedback.model, 0.0),
         promised=promised,
         noise=_input_noise(best.problem, loop, best.x),
         specification=asked,
@@ -202,10 +202,10 @@ def _best(controller: Model | None, plant: PlantBand, asked: LoopSpecification) 
 
 def _promises(found: SearchResult, plant: PlantBand, bandwidth_hz: float) -> bool:
     feedback = found.problem.structure.feedback(found.x)
-    return _margins_of(plant, feedback.model, 1.0).bandwidth_hz >= _REACHED * bandwidth_hz
+    return margins_of(plant, feedback.model, 1.0).bandwidth_hz >= _REACHED * bandwidth_hz
 
 
-def _margins_of(plant: PlantBand, feedback: Model, share: float) -> PredictedMargins:
+def margins_of(plant: PlantBand, feedback: Model, share: float) -> PredictedMargins:
     """Margins with this share of the band's radius, over the lines and between them."""
     at = ~plant.above
     behind = feedback.response(plant.frequency_hz[at])
@@ -219,7 +219,7 @@ def _stable_margins(plant: PlantBand, loop: Loop, share: float) -> PredictedMarg
     feedback = loop.feedback
     assert feedback is not None
     around = plant.value * loop.feedback_at(plant.frequency_hz)
-    return _margins_of(plant, feedback, share) if stable(around, plant.frequency_hz).all() else None
+    return margins_of(plant, feedback, share) if stable(around, plant.frequency_hz).all() else None
 
 
 def _input_noise(problem: TuningProblem, loop: Loop, x: Floats) -> tuple[float, float]:
