@@ -12,12 +12,13 @@ import pytest
 import scipy.io
 import xarray as xr
 
-from livebode.core import Responses, UsageError
+from livebode.core import Lines, Responses, UsageError
 from livebode.export import MODELS, LpvModel
 from livebode.fitting import Fitter, TwoMass
 from livebode.simulation import BeltAxis
-from studies.tune_steps import LINES, RATE_HZ
 
+RATE_HZ = 4000.0
+LINES = Lines.parse("2:520:2", RATE_HZ, 2000)
 PLACES_M = np.array([0.4, 0.7, 1.0, 1.4])
 
 
