@@ -12,6 +12,7 @@ import pytest
 
 from livebode.core import Lines
 from livebode.excitation import multisine
+from livebode.simulation import BeltAxis, Drive, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
 from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from tests.support.command import livebode, write_parquet
 from tests.support.loop_runs import AXIS
@@ -47,8 +48,21 @@ def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
     assert done.code == 0, done.err
     assert "velocity.gain" in done.out
     assert "is promised" in done.out
+    inertia, bound = map(float, re.search(r"inertia +(\S+) ± (\S+)", done.out).groups())  # type: ignore[union-attr]
+    assert abs(inertia - (0.0028 + 6.7 * 0.019**2)) < bound < 0.1 * inertia
+    assert "--strokes" in done.out  # the axis was at standstill
     assert (run / "tune.png").stat().st_size > 20_000
     assert "LIVEBODE_FILTERS" in (run / "filters.h").read_text(encoding="utf-8")
+
+
+def test_gains_for_odrive_count_turns_and_have_no_filters(run: Path) -> None:
+    done = livebode("tune", run, "--loop-checked", "--odrive", "--notches", 0, "--no-low-pass", "--json")
+    assert done.code == 0, done.err
+    velocity = json.loads(done.out)["controller"]["velocity"]
+    written = (run / "odrive.txt").read_text(encoding="utf-8")
+    values = [float(line.split(" = ")[1]) for line in written.splitlines()]
+    gain = 2 * np.pi * velocity["gain"]
+    np.testing.assert_allclose(values[1:], [gain, gain / velocity["integral_time_s"]], rtol=1e-5)
 
 
 def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path) -> None:
@@ -94,3 +108,77 @@ def test_design_takes_the_missing_lines_and_with_them_the_axis_is_tuned(tmp_path
     fine = recorded(tmp_path / "fine", lines["frequencies"], lines["window"])
     tuned = livebode("tune", fine, "--loop-checked")
     assert tuned.code == 0, tuned.err
+
+
+def test_the_model_over_the_position_is_exported_from_a_slow_stroke(tmp_path: Path) -> None:
+    """From 0.4 to 1.4 m at 0.1 m/s; the true stiffness follows the cart."""
+    axis = BeltAxis(
+        drive=Drive(position_rate_hz=RATE_HZ, position_gain_per_s=10.0),
+        motion=Strokes(start_m=0.4, end_m=1.4, speed_m_per_s=0.1, dwell_s=0.0),
+        excitation_n_m=0.05 * multisine(Lines.parse("4:400:8", RATE_HZ, 1000)),
+        seconds=10.0,
+    )
+    block, _ = SimulatedAxis(axis).run()
+    write_parquet(tmp_path / "log.parquet", {n: block[n] for n in ("w", "u", "velocity", "x")})
+    words = (
+        AXIS.format(gain=0.2308, delay=0).replace('"20:140:10"', '"4:400:8"').replace("window = 400", "window = 1000")
+    )
+    words = words.replace('output = "y"', 'output = "velocity"\nschedule = "x"')
+    (tmp_path / "axis.toml").write_text(words, encoding="utf-8")
+    assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run").code == 0
+    done = livebode("export", tmp_path / "run", "--lpv", "--to", "json")
+    assert done.code == 0, done.err
+    found = json.loads((tmp_path / "run-lpv.json").read_text(encoding="utf-8"))
+    at = found["names"].index("Keff")
+    stiffness, place = np.array(found["value"])[:, at], np.array(found["position"])
+    assert place.size >= 10
+    # The axis starts to move in the first place.
+    np.testing.assert_allclose(stiffness[1:], axis.mechanics.stiffness_at(place)[1:], rtol=0.01)
+    for to, ending in (("c", "h"), ("mat", "mat"), ("netcdf", "nc")):
+        assert livebode("export", tmp_path / "run", "--lpv", "--to", to).code == 0
+        assert (tmp_path / f"run-lpv.{ending}").is_file()
+    assert livebode("export", tmp_path / "run", "--lpv", "--mean", "--to", "c").code == 2
+
+
+def test_gains_over_the_schedule_are_proposed_from_stops_at_places(tmp_path: Path) -> None:
+    """Three stops, with a missing sample between them."""
+    parts = []
+    for place in (0.4, 0.95, 1.4):
+        axis = BeltAxis(
+            mechanics=Mechanics(damping_n_s_per_m=400.0),
+            motion=Standstill(position_m=place),
+            excitation_n_m=0.05 * multisine(Lines.parse("4:400:4", RATE_HZ, 1000)),
+            sensor=Sensor(noise_rad_per_s=0.002),
+            run_in_s=2.0,
+            seconds=3.0,
+        )
+        block, _ = SimulatedAxis(axis).run()
+        parts.append(np.array([block[n] for n in ("w", "u", "velocity", "x")]))
+        parts[-1][2, 0] = np.nan
+    write_parquet(tmp_path / "log.parquet", dict(zip(("w", "u", "velocity", "x"), np.concatenate(parts, axis=1))))
+    words = AXIS.format(gain=0.2308, delay=0).replace('"20:140:10"', '"4:400:4"')
+    words = words.replace("window = 400", "window = 1000").replace("hop = 200", "hop = 1000")
+    words = words.replace('output = "y"', 'output = "velocity"\nschedule = "x"')
+    (tmp_path / "axis.toml").write_text(words, encoding="utf-8")
+    assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run").code == 0
+    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule")
+    assert done.code == 0, done.err
+    assert "gains over the schedule" in done.out
+    lines = (tmp_path / "run" / "gains.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "position,gain,integral_time,position_gain"
+    np.testing.assert_allclose([float(line.split(",")[0]) for line in lines[1:]], [0.4, 0.95, 1.4], atol=0.01)
+
+
+def test_input_shapers_are_proposed_for_the_load_of_a_stiff_drive(run: Path) -> None:
+    """The load of the true belt swings at 43.48 Hz with a damping of 0.0355 while the motor is held."""
+    done = livebode("shaper", run, "--axis", "y", "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert found["mode"]["low_hz"] < 43.48 < found["mode"]["high_hz"]
+    assert found["mode"]["low_damping"] < 0.0355 < found["mode"]["high_damping"]
+    best = next(one for one in found["shapers"] if one["kind"] == found["chosen"])
+    assert best["worst"] <= 0.05
+    assert "shaper_freq_y: 43" in (run / "shaper.cfg").read_text(encoding="utf-8")
+    assert "LIVEBODE_SHAPER" in (run / "shaper.h").read_text(encoding="utf-8")
+    assert "proposed" in livebode("shaper", run).out
+    assert "no parameter 'wobble'" in livebode("shaper", run, "--mode", "wobble").err

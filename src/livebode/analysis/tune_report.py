@@ -6,12 +6,18 @@ from pathlib import Path
 
 from livebode.analysis.checked_loop import checked_loop
 from livebode.analysis.places import by_place
+from livebode.analysis.strokes import read_strokes
 from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Responses, TuneError
+from livebode.core import PID, Cascade, LivebodeError, Loop, PositionPD, Responses, SignalError, TuneError
+from livebode.locations import Location
+from livebode.motion.friction_curve import FrictionCurve, friction_curve
+from livebode.motion.smooth_motion import OutputKind
 from livebode.records import RunRecord
 from livebode.tuning import ControllerProposal, LoopSpecification, tune
+from livebode.tuning.feedforward import Feedforward
+from livebode.tuning.gain_schedule import GainSchedule, gain_schedule
 
 _CONTRADICTED = ("one change", "not explained")
 
@@ -41,13 +47,65 @@ def tune_run(
     UsageError
         If the loop's feedback is missing.
     """
+    responses, loop, checked = _inputs(directory, axis, loop_checked)
+    return tune(responses, loop, specification, loop_checked=checked)
+
+
+def schedule_run(
+    directory: Path, specification: LoopSpecification, axis: Axis | None = None, *, loop_checked: bool = False
+) -> GainSchedule:
+    """The same with gains that follow the schedule of the run, without filters; errors as of `gain_schedule`."""
+    responses, loop, checked = _inputs(directory, axis, loop_checked)
+    return gain_schedule(responses, loop, specification, loop_checked=checked)
+
+
+def _inputs(directory: Path, axis: Axis | None, loop_checked: bool) -> tuple[Responses, Loop, bool]:
+    """Mean responses by place, the loop, and whether its description was checked."""
     run = RunRecord.open(directory)
     section = axis.loop if axis is not None else None
     if section is None:
         section = LoopSection.model_validate(recorded_configuration(run.summary).get("loop", {}))
     responses = Responses.join(list(run.steady_batches()))
     checked = _confirmed(directory, section) or loop_checked
-    return tune(by_place(responses), section.build(responses.lines.rate_hz), specification, loop_checked=checked)
+    return by_place(responses), section.build(responses.lines.rate_hz), checked
+
+
+def feedforward_of(
+    directory: Path, controller: PID | Cascade | PositionPD, strokes: Location | None = None
+) -> Feedforward | None:
+    """Feedforward for a run: inertia from its responses, friction from `strokes` or else the run's own recording.
+
+    None where the lines do not show the inertia, or it is not known whether the output is a position or a velocity.
+    Without friction where the run's own recording has no strokes in both directions.
+    """
+    run = RunRecord.open(directory)
+    kind = _kind(run.kinds.output, controller)
+    if kind is None:
+        return None
+    try:
+        friction = _friction(directory if strokes is None else strokes, kind)
+    except LivebodeError:
+        if strokes is not None:
+            raise
+        friction = None
+    try:
+        return Feedforward.of(by_place(Responses.join(list(run.steady_batches()))), kind, friction)
+    except SignalError:
+        return None
+
+
+def _kind(recorded: str | None, controller: PID | Cascade | PositionPD) -> OutputKind | None:
+    """Quantity of the output: as recorded; without a unit, by the controller."""
+    if recorded == "velocity" or (recorded is None and isinstance(controller, Cascade)):
+        return "velocity"
+    if recorded == "position" or (recorded is None and isinstance(controller, PositionPD)):
+        return "position"
+    return None
+
+
+def _friction(target: Location, kind: OutputKind) -> FrictionCurve:
+    found = read_strokes(target)
+    return friction_curve(found.block, input=found.input, output=found.output, kind=kind)
 
 
 def _confirmed(directory: Path, section: LoopSection) -> bool:

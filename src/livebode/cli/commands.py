@@ -23,12 +23,14 @@ SUMMARIES: Mapping[str, str] = {
     "axis.toml.",
     "measure": "Design an excitation, play it on the controller, record, and track the response; Ctrl-C ramps it down.",
     "query": "Query the tables of a run with SQL (DuckDB).",
-    "export": "Write the responses or the fitted parameters of a run in a format of other programs.",
+    "export": "Write the responses, the fitted parameters or the model over the position in a format of other "
+    "programs.",
     "check-loop": "Compare the described controllers with the recorded signals: as described, or the change that "
     "explains them.",
     "margins": "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter "
     "if needed.",
     "tune": "Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.",
+    "shaper": "Propose input shapers for a mode of the fitted model, over its bounds at every place of the run.",
     "friction": "Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with "
     "bounds.",
     "orders": "Find torque that repeats with the angle: cogging, eccentricity, gears; write a feedforward table.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import exp
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,8 @@ from livebode.locations import location
 
 if TYPE_CHECKING:
     from livebode.tuning import ControllerProposal
+    from livebode.tuning.feedforward import Feedforward
+    from livebode.tuning.gain_schedule import GainSchedule
 
 
 def tune_command(
@@ -32,12 +35,32 @@ def tune_command(
     noise_gain: Annotated[
         float | None, typer.Option(help="Largest rms of the input for white noise of 1 at the output.")
     ] = None,
+    encoder_step: Annotated[
+        float | None, typer.Option(metavar="STEP", help="Step of the encoder: rad for rad/s, or the position's unit.")
+    ] = None,
+    input_noise: Annotated[
+        float | None, typer.Option(help="Largest rms of the input, in its unit, due to the rounding of the encoder.")
+    ] = None,
     notches: Annotated[int, typer.Option(help="Most notches, 0 … 4.")] = 2,
     low_pass: Annotated[bool, typer.Option(help="Permit a low-pass of second order.")] = True,
     coherence: Annotated[float, typer.Option(help="Do not use lines with a lower coherence.")] = 0.5,
     loop_checked: Annotated[
         bool, typer.Option("--loop-checked", help="The description of the loop was compared with the machine.")
     ] = False,
+    schedule: Annotated[
+        bool, typer.Option("--schedule", help="Also propose gains over the schedule, without filters, as gains.csv.")
+    ] = False,
+    odrive: Annotated[
+        bool,
+        typer.Option("--odrive", help="Also write odrive.txt, the gains for odrivetool (firmware from 0.5)."),
+    ] = False,
+    strokes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RUN|LOG|AXIS.toml",
+            help="Usual strokes in both directions, for the feedforward of friction. \\[default: the run's recording]",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
@@ -45,12 +68,12 @@ def tune_command(
     Writes tune.png, and the filters as filters.h and filters.st, to the run directory; nothing to a machine. The exit
     code is 2 if no controller meets the specification.
     """
-    from livebode.analysis.tune_report import tune_run
+    from livebode.analysis.tune_report import feedforward_of, schedule_run, tune_run
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.configuration import Axis
     from livebode.records import to_json
     from livebode.tuning import LoopSpecification
-    from livebode.tuning.code_text import c_header, structured_text
+    from livebode.tuning.code_text import c_header, odrive_text, structured_text
 
     specification = LoopSpecification(
         bandwidth_hz=bandwidth_hz,
@@ -59,12 +82,16 @@ def tune_command(
         max_sensitivity=max_sensitivity,
         disk_margin=disk_margin,
         noise_gain=noise_gain,
+        encoder_step=encoder_step,
+        input_noise=input_noise,
         notches=notches,
         low_pass=low_pass,
         coherence=coherence,
     )
     other = None if axis is None else Axis.read(axis)
     found = tune_run(directory, specification, other, loop_checked=loop_checked)
+    forward = feedforward_of(directory, found.feedback.controller, None if strokes is None else location(strokes))
+    gains = schedule_run(directory, specification, other, loop_checked=loop_checked) if schedule else None
     into = results_directory(directory)
     with writing(into, RecordError):
         if can_draw():
@@ -72,12 +99,21 @@ def tune_command(
 
             save_tuning_picture(found, into, title=directory.name)
         (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
+        if odrive:
+            (into / "odrive.txt").write_text(odrive_text(found.feedback), encoding="utf-8")
+        if gains is not None:
+            (into / "gains.csv").write_text(gains.csv(), encoding="utf-8")
         (into / "filters.st").write_text(structured_text(found.feedback.biquads), encoding="utf-8")
     if as_json:
-        print(to_json(found.plain()))
+        more = {"feedforward": forward, "schedule": gains}
+        print(to_json(found.plain() | {name: None if one is None else one.plain() for name, one in more.items()}))
     else:
         show_proposal(found)
-        written = ["filters.h", "filters.st", *(["tune.png"] if can_draw() else [])]
+        show_feedforward(forward)
+        if gains is not None:
+            show_schedule(gains)
+        also = {"odrive.txt": odrive, "gains.csv": schedule, "tune.png": can_draw()}
+        written = ["filters.h", "filters.st", *(name for name, use in also.items() if use)]
         print(f"\n{into}: {', '.join(written)}")
         tell_how_to_draw()
     if not found.met:
@@ -103,6 +139,31 @@ def show_proposal(found: ControllerProposal) -> None:
         print(f"    at {biquad.rate_hz:g} Hz: b = {b}   a = 1, {a}")
     _show_margins(found)
     print(found.sentence)
+
+
+def show_schedule(found: GainSchedule) -> None:
+    """Print the gains and the promised bandwidth of each place."""
+    common = found.common.promised.bandwidth_hz
+    print(f"gains over the schedule, without filters (one controller for all places: {common:.4g} Hz)")
+    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz")))
+    for place, row, promised in zip(found.position, found.logarithms, found.promised):
+        numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz)
+        print("  " + "".join(f"{x:>16.5g}" for x in numbers))
+    if not found.share:
+        print("  no other gains keep the limits between the places")
+
+
+def show_feedforward(found: Feedforward | None) -> None:
+    """Print inertia and friction with their bounds, in the units of the recording."""
+    if found is None:
+        print("feedforward: the lines do not show the inertia")
+        return
+    print("feedforward (95 %, units of the recording)")
+    for name in ("inertia", "viscous", "coulomb", "offset"):
+        if (value := getattr(found, name)) is not None:
+            print(f"  {name:32}{value:>12.5g} ± {getattr(found, f'{name}_bound'):.2g}")
+    if found.coulomb is None:
+        print("  friction: the recording has no strokes in both directions; name some: --strokes")
 
 
 def _show_parameters(found: ControllerProposal) -> None:
@@ -142,6 +203,8 @@ def _show_margins(found: ControllerProposal) -> None:
             for one, two in ((found.before, found.before_worst), (found.after, found.promised))
         ]
         print(f"  {word:18}{cells[0]:>24}{cells[1]:>24}")
+    word = "noise gain" if found.specification.encoder_step is None else "input noise, rms"
+    print(f"  {word:18}{found.noise[0]:>24.4g}{found.noise[1]:>24.4g}")
     places = f"{rows} places, " if rows > 1 else ""
     print(
         f"  {places}{found.plant.lines_hz.size} lines, {found.plant.lines_hz[0]:g} … {found.plant.lines_hz[-1]:g} Hz; "

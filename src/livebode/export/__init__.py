@@ -3,6 +3,7 @@
 from livebode.export.delimited import write_csv
 from livebode.export.formats import ENDINGS, FORMATS, MATRIX_FORMATS, TABLES, save
 from livebode.export.labelled import write_netcdf
+from livebode.export.lpv import MODELS, LpvModel
 from livebode.export.matlab import write_mat
 from livebode.export.matrix_delimited import write_matrix_csv
 from livebode.export.matrix_labelled import write_matrix_netcdf
@@ -17,7 +18,9 @@ __all__ = [
     "ENDINGS",
     "FORMATS",
     "MATRIX_FORMATS",
+    "MODELS",
     "TABLES",
+    "LpvModel",
     "ParameterTable",
     "WriteResult",
     "at",

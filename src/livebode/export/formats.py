@@ -43,7 +43,9 @@ TABLES: Mapping[str, Callable[[Path, Iterable[Table]], WriteResult]] = {
 }
 """Functions that write parameters, by the name of the format."""
 
-ENDINGS: Mapping[str, str] = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc", "uff": ".uff"}
+ENDINGS: Mapping[str, str] = {
+    "csv": ".csv", "mat": ".mat", "netcdf": ".nc", "uff": ".uff", "json": ".json", "c": ".h",
+}  # fmt: skip
 
 Done = TypeVar("Done")
 

@@ -1,4 +1,4 @@
-"""The picture of a proposed controller: L, Nyquist plot and steps, before and after, with bands."""
+"""The picture of a proposed controller: L, Nyquist and Nichols plot and steps, before and after, with bands."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from livebode.report.loop import round_numbers
 from livebode.report.pictures import save
 from livebode.report.style import Style, drawing, heading, new_figure, plain, style
 from livebode.tuning import ControllerProposal
-from livebode.tuning.step_response import step_response
+from livebode.tuning.predicted_steps import predicted_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_DRAWS = 100  # of the plant, for the bands of the steps
 _REACH = 2.2
 _LOWEST_DEG = -460.0
 _TIMES = 400
@@ -38,23 +37,24 @@ def save_tuning_picture(
 
 
 def tuning_figure(found: ControllerProposal, *, title: str = "", dark: bool = False) -> Figure:
-    """|L| and its phase, the Nyquist plot with the limits, and the responses to steps of reference and disturbance.
+    """|L| and its phase, Nyquist and Nichols plot with the limits, the responses to steps of reference and disturbance.
 
     Bands of L are the discs of all lines together. Bands of the steps are the middle 95 % of 100 plants drawn with the
     noise of the lines. Dashed: before. Beyond the lines nothing is drawn.
     """
     look = style(dark)
     with drawing(look):
-        figure = new_figure(14.0, 6.4)
+        figure = new_figure(18.0, 6.4)
         grid = figure.add_gridspec(
-            2, 3, width_ratios=[1.15, 1, 1], left=0.06, right=0.985, top=0.82, bottom=0.09, hspace=0.28, wspace=0.2
+            2, 4, width_ratios=[1.15, 1, 1, 1], left=0.05, right=0.985, top=0.82, bottom=0.09, hspace=0.28, wspace=0.2
         )
-        heading(figure, look, title or tr("Loop"), _facts(found), 0.06)
+        heading(figure, look, title or tr("Loop"), _facts(found), 0.05)
         magnitude = figure.add_subplot(grid[0, 0])
         phase = figure.add_subplot(grid[1, 0], sharex=magnitude)
         _bode(magnitude, phase, look, found)
         _nyquist(figure.add_subplot(grid[:, 1]), look, found)
-        _steps(figure.add_subplot(grid[0, 2]), figure.add_subplot(grid[1, 2]), look, found)
+        _nichols(figure.add_subplot(grid[:, 2]), look, found)
+        _steps(figure.add_subplot(grid[0, 3]), figure.add_subplot(grid[1, 3]), look, found)
         _legend(figure, look)
     return figure
 
@@ -75,9 +75,7 @@ def _bode(magnitude: Axes, phase: Axes, look: Style, found: ControllerProposal) 
     for feedback, proposed in _curves(found):
         colour, dashes = (look.run, (1, 0)) if proposed else (look.muted, (4, 2))
         for loop, radius in zip(found.open_loop(feedback)[:, at], plant.radius[:, at] / np.abs(plant.value[:, at])):
-            db = 20 * np.log10(np.abs(loop))
-            deg = np.degrees(np.unwrap(np.angle(loop)))
-            deg -= 360 * np.ceil((deg[0] - 90) / 360)
+            deg, db = _nichols_of(loop)
             inside = np.clip(radius, 0, 0.999)
             if proposed:
                 spread = np.degrees(np.arcsin(inside))
@@ -129,40 +127,66 @@ def _nyquist(axes: Axes, look: Style, found: ControllerProposal) -> None:
     plain(axes)
 
 
+def _nichols(axes: Axes, look: Style, found: ControllerProposal) -> None:
+    """|L| in dB over the phase of L, both of −1 at (−180, 0); with the curve of the largest |S| and the discs."""
+    from matplotlib.collections import PolyCollection
+
+    plant = found.plant
+    at = ~plant.above & (plant.frequency_hz >= plant.lines_hz[0])
+    axes.axhline(0, color=look.muted, linewidth=0.8)
+    axes.axvline(-180, color=look.muted, linewidth=0.8)
+    turn = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
+    for feedback, proposed in _curves(found):
+        behind = np.abs(feedback.response(plant.frequency_hz))
+        colour, dashes = (look.run, (1, 0)) if proposed else (look.muted, (4, 2))
+        for loop, radius in zip(found.open_loop(feedback), plant.radius * behind):
+            deg, db = _nichols_of(loop[at])
+            axes.plot(deg, db, color=colour, linewidth=1.5, dashes=dashes, zorder=3)
+            share = radius[at] / np.abs(loop[at])
+            near = plant.measured[at] & (share < 1)  # a disc around 0 has every phase
+            if proposed:
+                disc = 1 + share[near, np.newaxis] * turn
+                edge = [deg[near, np.newaxis] + np.degrees(np.angle(disc)), db[near, np.newaxis] + _db(disc)]
+                words: dict[str, Any] = {"facecolor": look.newest, "alpha": 0.18, "linewidth": 0}
+                axes.add_collection(PolyCollection(list(np.stack(edge, axis=-1)), **words), autolim=False)
+    ms = found.specification.max_sensitivity
+    around = 1 - turn / ms  # −L
+    axes.plot(np.degrees(np.angle(around)) - 180, _db(around), color=look.ink, linewidth=1.2, zorder=4)
+    axes.plot([-180], [0], "+", markersize=12, markeredgewidth=2.0, color=look.ink, zorder=6)
+    axes.set_xlim(-270, 90)
+    axes.set_xticks(range(-270, 91, 90))
+    axes.set_ylim(-30, 30)
+    axes.set_xlabel(tr("phase of L in degrees"))
+    axes.set_ylabel(tr("|L| in dB"))
+    plain(axes)
+
+
+def _nichols_of(loop: Complex) -> tuple[Floats, Floats]:
+    """Phase, deg, unwrapped from between −270 and 90 on, and size, dB."""
+    deg = np.degrees(np.unwrap(np.angle(loop)))
+    return deg - 360 * np.ceil((deg[0] - 90) / 360), _db(loop)
+
+
+def _db(value: Complex) -> Floats:
+    return np.asarray(20 * np.log10(np.abs(value)))
+
+
 def _steps(reference: Axes, disturbance: Axes, look: Style, found: ControllerProposal) -> None:
     """T and G·S of the first place."""
-    plant = found.plant
-    at = ~plant.above
-    f = plant.frequency_hz[at]
-    until = 3 / found.promised.bandwidth_hz
-    time_s = np.linspace(0, until, _TIMES)
-    plants = plant.value[:1, at] + plant.sigma[:1, at] * _noise(f, plant.lines_hz)
+    time_s = np.linspace(0, 3 / found.promised.bandwidth_hz, _TIMES)
     for feedback, proposed in _curves(found):
         if not proposed and found.before is None:
             continue
         colour, dashes = (look.run, (1, 0)) if proposed else (look.muted, (4, 2))
-        behind = feedback.response(f)
-        for axes, top in ((reference, behind), (disturbance, np.ones(f.size))):
-            middle = plant.value[:1, at] / (1 + plant.value[:1, at] * behind)
-            around = plants / (1 + plants * behind)
+        for axes, step in zip((reference, disturbance), predicted_steps(found.plant, feedback, time_s)):
             if proposed:
-                low, high = np.quantile(step_response(f, around * top, time_s), [0.025, 0.975], axis=0)
-                axes.fill_between(1e3 * time_s, low, high, color=colour, alpha=0.25, linewidth=0)
-            axes.plot(
-                1e3 * time_s, step_response(f, middle * top, time_s)[0], color=colour, dashes=dashes, linewidth=1.5
-            )
+                axes.fill_between(1e3 * time_s, step.low, step.high, color=colour, alpha=0.25, linewidth=0)
+            axes.plot(1e3 * time_s, step.value, color=colour, dashes=dashes, linewidth=1.5)
     reference.set_title(tr("step of the reference"), fontsize=10)
     disturbance.set_title(tr("step of the disturbance at the plant input"), fontsize=10)
     disturbance.set_xlabel(tr("time in ms"))
     for axes in (reference, disturbance):
         plain(axes)
-
-
-def _noise(frequency_hz: Floats, lines_hz: Floats) -> Complex:
-    """Circular noise of the lines, interpolated between them, shape (draws, frequencies)."""
-    drawn = np.random.default_rng(0).standard_normal((2 * _DRAWS, lines_hz.size)) / np.sqrt(2)
-    between = np.stack([np.interp(frequency_hz, lines_hz, row) for row in drawn])
-    return np.asarray(between[:_DRAWS] + 1j * between[_DRAWS:])
 
 
 def _facts(found: ControllerProposal) -> str:
@@ -190,4 +214,4 @@ def _legend(figure: Figure, look: Style) -> None:
         Patch(facecolor=look.run, alpha=0.25),
     ]
     texts = [tr("before"), tr("proposed"), tr("95 % band")]
-    figure.legend(handles, texts, loc="upper left", bbox_to_anchor=(0.06, 0.89), ncols=3, borderpad=0.0)
+    figure.legend(handles, texts, loc="upper left", bbox_to_anchor=(0.05, 0.89), ncols=3, borderpad=0.0)

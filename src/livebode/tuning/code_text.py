@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite, pi
 
+from livebode.core import PID, Cascade, UsageError
 from livebode.margins import Biquad
+from livebode.tuning.structure import TunedFeedback
 
 
 def c_header(biquads: Sequence[Biquad]) -> str:
@@ -60,3 +63,37 @@ def structured_text(biquads: Sequence[Biquad]) -> str:
             "",
         ]
     )
+
+
+def odrive_text(feedback: TunedFeedback) -> str:
+    """The gains as commands for odrivetool, in the units of ODrive's firmware from 0.5 on, which count turns.
+
+    For a loop from rad/s to N m: pos_gain in (turn/s)/turn, vel_gain in N m/(turn/s), vel_integrator_gain in
+    N m/(turn/s · s). ODrive's firmware 0.4 has other units.
+
+    Raises
+    ------
+    UsageError
+        If the controller is not a cascade of P and PI, or has filters, which ODrive does not compute.
+
+    Examples
+    --------
+    >>> loop = Cascade(PID(gain=0.1, integral_time_s=0.1, rate_hz=8000), PID(gain=20.0, rate_hz=8000))
+    >>> print(odrive_text(TunedFeedback(loop)))
+    odrv0.axis0.controller.config.pos_gain = 20
+    odrv0.axis0.controller.config.vel_gain = 0.628319
+    odrv0.axis0.controller.config.vel_integrator_gain = 6.28319
+    <BLANKLINE>
+    """
+    loop = feedback.controller
+    if feedback.biquads or not (isinstance(loop, Cascade) and isinstance(loop.position, PID)):
+        raise UsageError(
+            "not-one-of",
+            "the proposal has filters, or is not a cascade of position and velocity, and ODrive has no such terms",
+            "describe both loops, and permit no filters (notches 0, no low-pass)",
+            argument="feedback",
+        )
+    gain = 2 * pi * loop.velocity.gain
+    per_second = 1 / loop.velocity.integral_time_s if isfinite(loop.velocity.integral_time_s) else 0.0
+    rows = {"pos_gain": loop.position.gain, "vel_gain": gain, "vel_integrator_gain": gain * per_second}
+    return "".join(f"odrv0.axis0.controller.config.{name} = {value:.6g}\n" for name, value in rows.items())

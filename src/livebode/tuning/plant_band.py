@@ -16,6 +16,7 @@ _BETWEEN = 3  # points between neighbouring lines
 _LOWEST = 1e-4  # of the lowest line
 _PER_DECADE, _ABOVE = 6, 24
 _LINES_MIN = 8
+_TO_95 = float(np.sqrt(np.log(20.0)))  # bound over sigma of circular normal noise
 _BEYOND = np.pi / 2  # a sampled integrator at half the rate, compared with 1/f
 
 
@@ -45,7 +46,8 @@ class PlantBand:
     spread
         Share of the radius that is due to interpolation, shape (places, frequencies).
     sigma
-        Standard deviation without confidence, shape (places, frequencies).
+        Standard deviation, so large that 95 % of normal noise are within the 95 % bound of few degrees of freedom;
+        shape (places, frequencies).
     lines_hz, dropped_hz
         The used lines, and those that were measured but are not valid or have too little coherence.
     """
@@ -81,7 +83,8 @@ class PlantBand:
                 lines=int(lines.size),
                 dropped_hz=responses.lines.frequency_hz[~use].tolist(),
             )
-        value, sigma = responses.value[:, use], responses.sigma[:, use]
+        value = responses.value[:, use]
+        sigma = responses.bound(_TO_95)[:, use] / _TO_95
         c = float(np.sqrt(np.log(value.size / (1 - confidence))))
         radius = responses.bound(c)[:, use]
         dropped = responses.lines.frequency_hz[~use]

@@ -69,20 +69,28 @@ class TuningProblem:
         return value[place, column] / weight, derivative.T
 
     def noise_gain(self, x: Floats) -> tuple[float, Floats]:
-        """Rms of the plant input for unit white noise at the output, worst place, and its logarithmic derivative."""
+        """Rms of the plant input for the noise at the output, worst place, and its logarithmic derivative.
+
+        The noise is that of the encoder's rounding, else white with an rms of 1.
+        """
         f, slopes = self.structure.response(x)
         sensitivity = 1 / (1 + self.plant.value * f)
-        power = np.abs(f * sensitivity) ** 2 * self._share
+        power = self.noise_powers(f)
         total = power.sum(axis=1)
         worst = int(np.argmax(total))
         slope = (slopes * sensitivity[worst]).real @ power[worst] / total[worst]
         return float(np.sqrt(total[worst])), slope
 
+    def noise_powers(self, feedback: Complex) -> Floats:
+        """Power of the plant input due to the noise at the output, shape (places, frequencies)."""
+        return np.asarray(np.abs(feedback / (1 + self.plant.value * feedback)) ** 2 * self._noise)
+
     @cached_property
-    def _share(self) -> Floats:
-        """Share of the frequencies that each point of the grid stands for."""
+    def _noise(self) -> Floats:
+        """Power of the noise at the output that each point of the grid stands for."""
         f = self.plant.frequency_hz
-        return np.asarray(np.gradient(f) / f[-1])
+        edges = np.concatenate([f[:1], (f[1:] + f[:-1]) / 2, f[-1:]])
+        return np.asarray(np.diff(edges) / f[-1] * noise_power(f, self.specification.encoder_step, self.structure))
 
     def tracking(self, x: Floats) -> tuple[Floats, Floats]:
         """How far |T| of the worst plant is from −3 dB up to the required bandwidth, positive above; with derivatives.
@@ -121,5 +129,18 @@ class TuningProblem:
         """Whether every limit is kept, and the loop is stable, for every plant within the band."""
         if float(np.min(self.clearances(x)[0])) < -tolerance or not self.stable(x) or not self._between_points(x):
             return False
-        limit = self.specification.noise_gain
+        limit = self.specification.noise_limit
         return limit is None or self.noise_gain(x)[0] <= limit * (1 + tolerance)
+
+
+def noise_power(frequency_hz: Floats, encoder_step: float | None, structure: FeedbackStructure) -> Floats:
+    """Power of the noise at the output over that of white noise of 1, up to half the rate.
+
+    Rounding to steps q has the variance q²/12 and is white while the axis moves by more than a step in a tick (Widrow
+    and Kollár, Quantization noise, 2008); of a velocity, the differences times the rate count.
+    """
+    if encoder_step is None:
+        return np.ones(frequency_hz.shape)
+    rate_hz = 2 * frequency_hz[-1]
+    differences = 2 * rate_hz * np.sin(np.pi * frequency_hz / rate_hz)
+    return np.asarray(encoder_step**2 / 12 * (1.0 if structure.of_position else differences**2))

@@ -13,6 +13,7 @@ from livebode.core import Lines, Loop, Model, Responses, TuneError
 from livebode.tuning.coverage import check_coverage, missing_resonances
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.predicted import PredictedMargins, predicted
+from livebode.tuning.problem import TuningProblem
 from livebode.tuning.search import SearchResult, search
 from livebode.tuning.specification import LoopSpecification
 from livebode.tuning.structure import TunedFeedback
@@ -37,6 +38,9 @@ class ControllerProposal:
         None where the described loop would be unstable.
     before_worst, promised
         The same for the worst plant within the band.
+    noise
+        Rms of the plant input, before and after, worst place: for the rounding to `encoder_step` in the unit of the
+        input, else for white noise of 1 at the output. NaN before where the described loop would be unstable.
     specification
         What was asked.
     met
@@ -54,6 +58,7 @@ class ControllerProposal:
     before_worst: PredictedMargins | None
     after: PredictedMargins
     promised: PredictedMargins
+    noise: tuple[float, float]
     specification: LoopSpecification
     met: bool
     limited_by: tuple[str, ...]
@@ -96,6 +101,7 @@ class ControllerProposal:
             "before_worst": _margins(self.before_worst),
             "after": _margins(self.after),
             "promised": _margins(self.promised),
+            "noise": {"before": self.noise[0] if self.noise[0] == self.noise[0] else None, "after": self.noise[1]},
         }
 
 
@@ -167,14 +173,15 @@ def tune(
     structure = best.problem.structure
     feedback = structure.feedback(best.x)
     check_coverage(plant, plant.value * structure.response(best.x)[0], responses.lines)
-    promised = _margins_of(plant, feedback.model, 1.0)
+    promised = margins_of(plant, feedback.model, 1.0)
     required = asked.bandwidth_hz
     return ControllerProposal(
         feedback=feedback,
         before=_stable_margins(plant, loop, 0.0),
         before_worst=_stable_margins(plant, loop, 1.0),
-        after=_margins_of(plant, feedback.model, 0.0),
+        after=margins_of(plant, feedback.model, 0.0),
         promised=promised,
+        noise=_input_noise(best.problem, loop, best.x),
         specification=asked,
         met=required is None or promised.bandwidth_hz >= _REACHED * required,
         limited_by=_limits(best),
@@ -195,10 +202,10 @@ def _best(controller: Model | None, plant: PlantBand, asked: LoopSpecification) 
 
 def _promises(found: SearchResult, plant: PlantBand, bandwidth_hz: float) -> bool:
     feedback = found.problem.structure.feedback(found.x)
-    return _margins_of(plant, feedback.model, 1.0).bandwidth_hz >= _REACHED * bandwidth_hz
+    return margins_of(plant, feedback.model, 1.0).bandwidth_hz >= _REACHED * bandwidth_hz
 
 
-def _margins_of(plant: PlantBand, feedback: Model, share: float) -> PredictedMargins:
+def margins_of(plant: PlantBand, feedback: Model, share: float) -> PredictedMargins:
     """Margins with this share of the band's radius, over the lines and between them."""
     at = ~plant.above
     behind = feedback.response(plant.frequency_hz[at])
@@ -212,7 +219,16 @@ def _stable_margins(plant: PlantBand, loop: Loop, share: float) -> PredictedMarg
     feedback = loop.feedback
     assert feedback is not None
     around = plant.value * loop.feedback_at(plant.frequency_hz)
-    return _margins_of(plant, feedback, share) if stable(around, plant.frequency_hz).all() else None
+    return margins_of(plant, feedback, share) if stable(around, plant.frequency_hz).all() else None
+
+
+def _input_noise(problem: TuningProblem, loop: Loop, x: Floats) -> tuple[float, float]:
+    """Rms of the plant input, before and after."""
+    before = np.nan
+    if _stable_margins(problem.plant, loop, 0.0) is not None:
+        behind = loop.feedback_at(problem.plant.frequency_hz)
+        before = float(np.sqrt(problem.noise_powers(behind).sum(axis=1).max()))
+    return before, problem.noise_gain(x)[0]
 
 
 def _limits(best: SearchResult) -> tuple[str, ...]:
@@ -232,9 +248,10 @@ def _limits(best: SearchResult) -> tuple[str, ...]:
             words = f"the {name} at {f:.4g} Hz (bound there ± {100 * share:.2g} %)"
         if name not in found or distance < found[name][0]:
             found[name] = distance, words
-    limit = problem.specification.noise_gain
+    limit = problem.specification.noise_limit
     if limit is not None and problem.noise_gain(x)[0] > 0.99 * limit:
-        found["noise"] = 0.0, f"the noise gain of {limit:g}"
+        what = "noise gain" if problem.specification.encoder_step is None else "input noise"
+        found["noise"] = 0.0, f"the {what} of {limit:g}"
     return tuple(words for _, words in sorted(found.values()))
 
 

@@ -172,7 +172,7 @@ def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
         parts = [problem.clearances(z[:size], at)[0] - (z[-1] if required else 1e-4)]
         if required:
             parts.append(problem.tracking(z[:size])[0])
-        if (limit := problem.specification.noise_gain) is not None:
+        if (limit := problem.specification.noise_limit) is not None:
             parts.append(np.array([np.log(limit / problem.noise_gain(z[:size])[0])]))
         return np.concatenate(parts)
 
@@ -183,7 +183,7 @@ def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
         if required:
             part = problem.tracking(z[:size])[1]
             rows.append(np.column_stack([part, np.zeros(len(part))]))
-        if problem.specification.noise_gain is not None:
+        if problem.specification.noise_limit is not None:
             one = -problem.noise_gain(z[:size])[1]
             rows.append(np.append(one, np.zeros(len(z) - size))[np.newaxis])
         return np.concatenate(rows)

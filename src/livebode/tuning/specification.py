@@ -28,6 +28,10 @@ class LoopSpecification:
         0 for none.
     noise_gain
         Largest rms of the plant input for white noise with an rms of 1 at the output; None for no limit.
+    encoder_step
+        Step of the encoder, in rad for a velocity in rad/s (2π/counts per turn), else in the unit of the position.
+    input_noise
+        Largest rms of the plant input, in its unit, that the rounding to `encoder_step` causes; None for no limit.
     notches
         Most notches in series with the controller, 0 … 4.
     low_pass
@@ -49,6 +53,8 @@ class LoopSpecification:
     max_sensitivity: float = 2.0
     disk_margin: float = 0.0
     noise_gain: float | None = None
+    encoder_step: float | None = None
+    input_noise: float | None = None
     notches: int = 2
     low_pass: bool = True
     coherence: float = 0.5
@@ -61,10 +67,25 @@ class LoopSpecification:
         self._check("phase_margin_deg", 0.0, 90.0, "30 … 60 is usual")
         self._check("max_sensitivity", 1.0, inf, "1.4 … 2 is usual")
         self._check("noise_gain", 0.0, inf, "a positive limit")
+        self._check("encoder_step", 0.0, inf, "a positive step")
+        self._check("input_noise", 0.0, inf, "a positive limit")
+        if self.input_noise is not None and (self.encoder_step is None or self.noise_gain is not None):
+            raise UsageError(
+                "conflict",
+                "input_noise is a limit for the rounding of an encoder",
+                "specify encoder_step with it, and no noise_gain",
+                argument="input_noise",
+                value=self.input_noise,
+            )
         self._check("confidence", 0.0, 1.0, "0.95 is usual")
         self._check("disk_margin", -1e-300, 2.0, "0.5 … 0.8 is usual")
         self._check("coherence", -1e-300, 1.0, "0.5 is usual")
         self._check("notches", -1, 5, "0 … 4")
+
+    @property
+    def noise_limit(self) -> float | None:
+        """Largest rms of the plant input, for the noise of `encoder_step`, else for white noise of 1."""
+        return self.noise_gain if self.encoder_step is None else self.input_noise
 
     def _check(self, name: str, low: float, high: float, usual: str) -> None:
         """UsageError if the value is not between the two."""

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_PER_OCTAVE = 60
+_PER_OCTAVE = 20
 
 
 def step_response(frequency_hz: Floats, response: Complex, time_s: Floats) -> Floats:
     """The response of a stable system to a unit step at 0: (2/π)·∫ Re G(ω)·sin(ωt)/ω dω; shape (rows, times).
 
-    Biased above the highest frequency, where the system is taken as zero.
+    Exact for a real part that is linear between the frequencies (with the sine integral), constant below the first and
+    zero above the last.
 
     Parameters
     ----------
@@ -23,7 +24,7 @@ def step_response(frequency_hz: Floats, response: Complex, time_s: Floats) -> Fl
     response
         Shape (rows, frequencies).
     time_s
-        Shape (times,).
+        Positive times, shape (times,).
 
     Examples
     --------
@@ -32,10 +33,21 @@ def step_response(frequency_hz: Floats, response: Complex, time_s: Floats) -> Fl
     >>> step_response(f, lag, np.array([0.1, 0.3])).round(2)
     array([[0.63, 0.95]])
     """
-    count = int(np.log2(frequency_hz[-1] / frequency_hz[0]) * _PER_OCTAVE)
-    f = np.geomspace(frequency_hz[0], frequency_hz[-1], count)
+    from scipy.special import sici
+
+    f = np.union1d(frequency_hz, _even(frequency_hz))
     real = np.stack([np.interp(np.log(f), np.log(frequency_hz), row.real) for row in response])
-    # Integrated by parts of ln f; the sine integral of what is below the first frequency is small.
-    kernel = np.sin(2 * np.pi * np.outer(f, time_s))
-    step = np.gradient(np.log(f))
-    return np.asarray(2 / np.pi * (real * step) @ kernel)
+    omega = 2 * np.pi * f
+    slope = np.diff(real) / np.diff(omega)
+    start = real[:, :-1] - slope * omega[:-1]
+    turned = np.outer(omega, time_s)
+    sine = sici(turned)[0]
+    cosine = np.cos(turned) / np.maximum(time_s, 1e-300)
+    area = real[:, :1] * sine[0] + start @ np.diff(sine, axis=0) - slope @ np.diff(cosine, axis=0)
+    return np.asarray(2 / np.pi * area)
+
+
+def _even(frequency_hz: Floats) -> Floats:
+    """Frequencies of an even logarithmic grid over the same range."""
+    count = int(np.log2(frequency_hz[-1] / frequency_hz[0]) * _PER_OCTAVE)
+    return np.geomspace(frequency_hz[0], frequency_hz[-1], count)[1:-1]

@@ -144,6 +144,11 @@ class FeedbackStructure:
             numbers = np.log(np.array([row[1:] for row in rows]))
         return tuple(row[0] for row in rows), numbers[:, 0], numbers[:, 1], numbers[:, 2]
 
+    @property
+    def of_position(self) -> bool:
+        """Whether the measured output is a position."""
+        return isinstance(self.controller, PositionPD)
+
     def index(self, name: str) -> int | None:
         """Column of a parameter; None where the structure does not have it."""
         return self.names.index(name) if name in self.names else None

@@ -1,0 +1,137 @@
+"""Feedforward of inertia and friction: the torque of a reference motion, with bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import Responses, SignalError
+from livebode.core.distributions import t_quantile
+from livebode.motion.friction_curve import FrictionCurve
+
+Floats = NDArray[np.float64]
+
+_OF_ANTIRESONANCE = 0.5
+_LINES_MIN = 4
+
+
+@dataclass(frozen=True)
+class Feedforward:
+    """Torque of a reference motion: inertia·a + viscous·v + coulomb·sign(v) + offset, in the units of the recording.
+
+    Bounds are half-widths of 95 %. Friction is None where no strokes show it.
+    """
+
+    inertia: float
+    inertia_bound: float
+    viscous: float | None = None
+    viscous_bound: float | None = None
+    coulomb: float | None = None
+    coulomb_bound: float | None = None
+    offset: float | None = None
+    offset_bound: float | None = None
+
+    @classmethod
+    def of(cls, responses: Responses, kind: str, friction: FrictionCurve | None = None) -> Feedforward:
+        """From the response at low lines, and from the friction of strokes.
+
+        The inertia of the strokes is not used: it contains the swing of the load, and is less sure.
+
+        Parameters
+        ----------
+        responses
+            Of the plant, a row for each place.
+        kind
+            "velocity" or "position", of the output.
+        friction
+            With one Coulomb friction, without places.
+
+        Raises
+        ------
+        SignalError
+            If fewer than four lines are below 0.4 of the antiresonance.
+        """
+        inertia, bound = rigid_inertia(responses, kind)
+        if friction is None:
+            return cls(inertia, bound)
+        wide = dict(zip(friction.names, friction.bound()))
+        names = ("viscous", "coulomb", "offset")
+        found = {name: friction[name] for name in names} | {f"{name}_bound": float(wide[name]) for name in names}
+        return cls(inertia, bound, **found)
+
+    def torque(self, velocity: Floats, acceleration: Floats) -> Floats:
+        """Of the reference at these velocities and accelerations."""
+        friction = (self.viscous or 0.0) * velocity + (self.coulomb or 0.0) * np.sign(velocity) + (self.offset or 0.0)
+        return np.asarray(self.inertia * acceleration + friction)
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return dict(vars(self))
+
+
+def rigid_inertia(responses: Responses, kind: str) -> tuple[float, float]:
+    """Total inertia M + L and its 95 % bound: Im 1/G = M·ω + L·ω/(1 − (ω/ωₐ)²) − S/ω at the lines up to ωₐ/2.
+
+    M and L are motor and load, ωₐ is the antiresonance of each place, and S the spring of cogging and of friction
+    before it slides. Weighted by the noise of the lines; the bound, by Student's t, is widened by what the model does
+    not explain.
+
+    Biased by friction that the excitation does not linearise: measure while the axis moves in one direction.
+
+    Parameters
+    ----------
+    responses
+        Torque to velocity or position, a row for each place.
+    kind
+        "velocity" or "position".
+
+    Raises
+    ------
+    SignalError
+        If fewer than four valid lines are below half the antiresonance.
+    """
+    f = responses.lines.frequency_hz
+    omega = 2 * np.pi * f
+    value, sigma = responses.value, responses.sigma
+    if kind == "position":
+        value, sigma = value * 1j * omega, sigma * omega
+    known = responses.valid & np.isfinite(sigma)
+    dips = [_antiresonance_hz(f, row) for row in np.where(known, np.abs(value) * f, np.nan)]
+    rows, goals = [], []
+    for place, dip in enumerate(dips):
+        use = known[place] & (f <= _OF_ANTIRESONANCE * dip)
+        weight = np.abs(value[place, use]) ** 2 / np.maximum(sigma[place, use], 1e-12 * np.abs(value[place, use]))
+        columns = [omega[use], omega[use] / (1 - (f[use] / dip) ** 2), 1 / omega[use]]
+        rows.append(np.stack(columns, axis=1) * weight[:, np.newaxis])
+        goals.append((1 / value[place, use]).imag * weight)
+    matrix, goal = np.concatenate(rows), np.concatenate(goals)
+    if goal.size < _LINES_MIN * len(dips):
+        raise SignalError(
+            "too-few-lines",
+            f"{goal.size} valid lines are below half the antiresonance, but {_LINES_MIN} at each place are needed to "
+            "find the inertia",
+            "excite lower lines",
+            lines=int(goal.size),
+        )
+    scale = np.linalg.norm(matrix, axis=0)
+    found, covariance = _least_squares(matrix / scale, goal)
+    total = np.array([1.0, 1.0, 0.0]) / scale
+    wide = t_quantile(0.975, goal.size - 3) * np.sqrt(total @ covariance @ total)
+    return float(total @ found), float(wide)
+
+
+def _antiresonance_hz(frequency_hz: Floats, size: Floats) -> float:
+    """The lowest point of |G|·f before its highest; the last line where there is none."""
+    top = int(np.nanargmax(size))
+    return float(frequency_hz[int(np.nanargmin(size[:top]))]) if top > 1 else float(frequency_hz[-1])
+
+
+def _least_squares(matrix: Floats, goal: Floats) -> tuple[Floats, Floats]:
+    """Solution and covariance, which is never less than that of a weight of one over sigma."""
+    inverse = np.linalg.inv(matrix.T @ matrix)
+    found = inverse @ matrix.T @ goal
+    spread = float(np.sum((goal - matrix @ found) ** 2)) / (goal.size - matrix.shape[1])
+    return found, inverse * max(spread, 0.5)  # sigma is of a circular error, half of which is in the imaginary part

@@ -1,0 +1,155 @@
+"""Gains that follow the position, safe at the places and between them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import PID, Cascade, Loop, PositionPD, Responses, UsageError
+from livebode.tuning.plant_band import PlantBand
+from livebode.tuning.predicted import PredictedMargins
+from livebode.tuning.problem import TuningProblem
+from livebode.tuning.proposal import ControllerProposal, margins_of, tune
+from livebode.tuning.search import search
+from livebode.tuning.specification import LoopSpecification
+from livebode.tuning.structure import FeedbackStructure
+
+Floats = NDArray[np.float64]
+
+_BETWEEN = np.linspace(0, 1, 5)
+_BACK = 5  # steps of the way back to one controller for all places
+_DOWN = (0.0, 0.02, 0.05, 0.1)  # of the logarithm of the gain
+
+
+@dataclass(frozen=True, eq=False)
+class GainSchedule:
+    """Gains at each place; between two places their logarithms are interpolated linearly over the position.
+
+    Attributes
+    ----------
+    common
+        The proposal of one controller for all places.
+    position
+        Of the places, ascending, shape (places,).
+    share
+        Part of the way from the common gains to those of each place alone; 0: the common gains everywhere.
+    names
+        Of the gains and times.
+    logarithms
+        Shape (places, names).
+    promised
+        Margins at each place, of the worst plant within the band.
+    """
+
+    common: ControllerProposal
+    position: Floats
+    share: float
+    names: tuple[str, ...]
+    logarithms: Floats
+    promised: tuple[PredictedMargins, ...]
+
+    def at(self, position: float) -> PID | Cascade | PositionPD:
+        """The controller at a position; beyond the places that of the nearest one."""
+        x = np.array([np.interp(position, self.position, column) for column in self.logarithms.T])
+        return FeedbackStructure(self.common.feedback.controller, self.common.plant.frequency_hz).feedback(x).controller
+
+    def csv(self) -> str:
+        """A line for each place: position, gains and times."""
+        rows = np.column_stack([self.position, np.exp(self.logarithms)]).tolist()
+        return "\n".join([",".join(("position", *self.names)), *(",".join(map(repr, row)) for row in rows), ""])
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "share": self.share,
+            "position": self.position.tolist(),
+            **{name: np.exp(column).tolist() for name, column in zip(self.names, self.logarithms.T)},
+            "promised": [
+                {name: value if np.isfinite(value) else None for name, value in asdict(one).items()}
+                for one in self.promised
+            ],
+        }
+
+
+def gain_schedule(
+    responses: Responses, loop: Loop, specification: LoopSpecification, *, loop_checked: bool
+) -> GainSchedule:
+    """Gains for each place that keep the limits also with the plants of its neighbours; without filters.
+
+    Between two places, the interpolated gains keep the limits with every plant within the bounds of either place,
+    tested at five points. Where they do not, the gains are lowered by up to 10 %,
+    and all move towards the common ones, until they do. The position is
+    taken as constant while the loop settles.
+
+    Parameters
+    ----------
+    responses
+        Of the plant, a row for each place, with a schedule.
+    loop, specification, loop_checked
+        As of `tune`; no filters are added.
+
+    Raises
+    ------
+    TuneError
+        As `tune`, for one controller for all places.
+    UsageError
+        If there are fewer than two places.
+    """
+    responses = responses[np.argsort(responses.schedule, kind="stable")]
+    position = responses.schedule
+    if position.size < 2 or not np.all(np.diff(position) > 0):
+        raise UsageError(
+            "missing",
+            f"gains over the position need two places or more, and the run has {int(np.isfinite(position).sum())}",
+            "set signals.schedule to the position, and move the axis",
+            argument="responses",
+        )
+    plain = replace(specification, notches=0, low_pass=False)
+    common = tune(responses, loop, plain, loop_checked=loop_checked)
+    structure = FeedbackStructure(common.feedback.controller, common.plant.frequency_hz)
+    whole = structure.start
+    alone = np.stack([_alone(loop, common.plant, plain, place, whole) for place in range(position.size)])
+    share, x = _safest(structure, common.plant, plain, whole, alone)
+    promised = tuple(_promised(structure, common.plant, row, place) for place, row in enumerate(x))
+    return GainSchedule(common, position, share, structure.names, x, promised)
+
+
+def _alone(loop: Loop, plant: PlantBand, specification: LoopSpecification, place: int, common: Floats) -> Floats:
+    """Logarithms of the gains for a place and its neighbours; the common ones where nothing is found for these."""
+    near = [i for i in (place - 1, place, place + 1) if 0 <= i < len(plant.value)]
+    found = search(loop.feedback, _rows(plant, near), specification)
+    return common if found is None else found.x
+
+
+def _safest(
+    structure: FeedbackStructure, plant: PlantBand, specification: LoopSpecification, common: Floats, alone: Floats
+) -> tuple[float, Floats]:
+    """The largest part of the way to the gains of each place, and these gains, reduced until the limits are kept."""
+    for share in np.linspace(1, 0, _BACK, endpoint=False):
+        for down in _DOWN:
+            x = common + share * (alone - common)
+            x[:, 0] -= down
+            if _safe(structure, plant, specification, x):
+                return float(share), x
+    return 0.0, np.broadcast_to(common, alone.shape)
+
+
+def _safe(structure: FeedbackStructure, plant: PlantBand, specification: LoopSpecification, x: Floats) -> bool:
+    """Whether the gains keep the limits at every place and between neighbours, with the plants of both."""
+    for i in range(len(x) - 1):
+        problem = TuningProblem(structure, _rows(plant, [i, i + 1]), specification)
+        if not all(problem.feasible(x[i] + part * (x[i + 1] - x[i])) for part in _BETWEEN):
+            return False
+    return True
+
+
+def _rows(plant: PlantBand, rows: list[int]) -> PlantBand:
+    """The band of some places."""
+    return replace(plant, **{name: getattr(plant, name)[rows] for name in ("value", "radius", "spread", "sigma")})
+
+
+def _promised(structure: FeedbackStructure, plant: PlantBand, x: Floats, place: int) -> PredictedMargins:
+    return margins_of(_rows(plant, [place]), structure.feedback(x).model, 1.0)
