@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 
 from livebode.analysis.strokes import MotionSamples
 from livebode.core import SignalError, UsageError
-from livebode.motion.angle_orders import Shaft, ShaftOrders, angle_windows, shaft_orders, strokes_of
+from livebode.motion.angle_orders import Shaft, ShaftOrders, Stroke, angle_windows, shaft_orders, strokes_of
 from livebode.motion.friction_curve import FrictionCurve, friction_curve
+from livebode.motion.order_changes import OrderChange, order_changes
 from livebode.motion.smooth_motion import SmoothKernel
+from livebode.motion.time_lines import TimeLine, time_lines
 
 Floats = NDArray[np.float64]
 
 _SHARPEST = 2.01  # samples: σ of the kernel
+_SAME_LINE = 0.02  # of a frequency, within which a line is one that was specified
 _KEPT = 0.2  # of an amplitude, that the kernel must leave
 
 
@@ -36,7 +39,9 @@ class OrderReport:
     speed_hz
         Slowest and fastest turns of the motor in a window, per second.
     lines_hz
-        Lines of the time that were left out.
+        Lines of the time that were left out because they were specified.
+    found_lines
+        Lines of the time that nobody specified, and that were found and left out.
     motion
         The samples.
     unit
@@ -48,8 +53,19 @@ class OrderReport:
     strokes: int
     speed_hz: tuple[float, float]
     lines_hz: Floats
+    found_lines: list[TimeLine]
     motion: MotionSamples
     unit: str
+
+    @property
+    def zero_known(self) -> bool:
+        """Whether phases count from the zero of a measured angle; else from the first sample."""
+        return self.motion.angle is not None or self.motion.kind == "position"
+
+    def changes_from(self, baseline: OrderReport, *, phases: bool = True) -> list[OrderChange]:
+        """Each order compared with that of an earlier recording; phases only if both angles have the same zero."""
+        same_zero = phases and self.zero_known and baseline.zero_known
+        return order_changes(baseline.shafts, self.shafts, phases=same_zero)
 
     def plain(self) -> dict[str, Any]:
         """As plain data, for JSON."""
@@ -59,6 +75,7 @@ class OrderReport:
             "strokes": self.strokes,
             "turns_per_s": list(self.speed_hz),
             "lines_hz": self.lines_hz.tolist(),
+            "found_lines": [{"frequency_hz": one.frequency_hz, "amplitude": one.amplitude} for one in self.found_lines],
             "inertia": self.friction["inertia"],
             "inertia_bound": float(self.friction.bound()[self.friction.index("inertia")]),
             "input": self.motion.input,
@@ -119,18 +136,41 @@ def orders_of(
     slowest = _slowest(speed)
     strokes = strokes_of(turned, speed, signals, motion.block.rate_hz, slowest)
     limit = min(highest_hz, _most_hz(kernel))
-    known = np.zeros(0) if lines_hz is None else lines_hz
+    known = np.zeros(0) if lines_hz is None else np.asarray(lines_hz, dtype=np.float64)
     sigma_j = float(curve.sigma[curve.index("inertia")])
-    found, speeds = [], list[float]()
-    for shaft in shafts:
+
+    def shaft_found(shaft: Shaft, lines: Floats) -> tuple[ShaftOrders, list[float]]:
         windows = angle_windows(strokes, shaft)
-        speeds += [float(windows.slowest.min()) / shaft.turns, float(windows.fastest.max()) / shaft.turns]
         middle = (windows.slowest + windows.fastest)[:, np.newaxis] / 2 * np.array(shaft.orders)
         value = windows.value / _left(kernel, middle)
         extra = sigma_j * np.abs(np.nanmean(value[1], axis=0))
-        found.append(shaft_orders(windows, shaft, value[0], extra, known, limit))
+        speeds = [float(windows.slowest.min()) / shaft.turns, float(windows.fastest.max()) / shaft.turns]
+        return shaft_orders(windows, shaft, value[0], extra, lines, limit), speeds
+
+    found = [shaft_found(shaft, known) for shaft in shafts]
+    lines = _unknown_lines(strokes, [one for one, _ in found], known, limit, kernel)
+    if lines:
+        away = np.concatenate([known, [line.frequency_hz for line in lines]])
+        found = [shaft_found(shaft, away) for shaft in shafts]
+    speeds = [speed for _, both in found for speed in both]
     unit = motion.block.channels[motion.block.index(motion.input)].unit
-    return OrderReport(found, curve, len(strokes), (min(speeds), max(speeds)), known, motion, unit)
+    turns_per_s = (min(speeds), max(speeds))
+    return OrderReport([one for one, _ in found], curve, len(strokes), turns_per_s, known, lines, motion, unit)
+
+
+def _unknown_lines(
+    strokes: list[Stroke], found: list[ShaftOrders], known: Floats, highest_hz: float, kernel: SmoothKernel
+) -> list[TimeLine]:
+    """Lines of the time in what the orders leave, without those that are known."""
+    rests = [
+        replace(one, torque=one.torque[:1] - sum(shaft.torque(one.angle * shaft.shaft.turns) for shaft in found))
+        for one in strokes
+    ]
+    return [
+        TimeLine(line.frequency_hz, line.amplitude / float(_left(kernel, np.array(line.frequency_hz))))
+        for line in time_lines(rests, highest_hz)
+        if not np.any(np.abs(known - line.frequency_hz) < _SAME_LINE * line.frequency_hz)
+    ]
 
 
 def _slowest(speed: Floats) -> float:
