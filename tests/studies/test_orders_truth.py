@@ -19,7 +19,7 @@ from livebode.experiment_design.files.angle_table import write_angle_table
 from livebode.interface.example_recordings import write_examples
 from livebode.motion import Shaft, ShaftOrders, order_changes, time_lines
 from livebode.motion.angle_orders import Complex, Stroke
-from studies.orders import CASES, SHAFT, measured, truth
+from studies.orders import CASES, ECCENTRIC, SHAFT, measured, truth
 from tests.support.command import livebode
 from tools.structured_text import Machine
 
@@ -155,6 +155,29 @@ def test_ripple_of_the_simulated_axis_is_found_at_three_speeds() -> None:
     found = measured(CASES["three speeds"], seed=3).shafts[0]
     assert np.all(np.abs(found.value - truth()) <= found.bound(2.5))
     assert [order for order, seen in zip(SHAFT.orders, found.seen) if seen] == [24]
+
+
+def test_an_eccentric_encoder_is_told_from_a_torque_ripple() -> None:
+    """The simulated encoder reads φ + e·sin φ: the error of order 1 is seen, and the ripple is no error."""
+    found = measured(ECCENTRIC, seed=1).errors[0]
+    assert [order for order, seen in zip(SHAFT.orders, found.seen) if seen] == [1]
+    assert abs(found.value[0] + 1j * ECCENTRIC.eccentricity_rad) <= found.bound(2.5)[0]
+
+
+def test_position_errors_of_a_torque_ripple_are_not_seen_and_within_their_bounds() -> None:
+    errors, bounds, seen = [], [], []
+    for seed in range(20):
+        for one in _report(seed, (1.0, 1.4, 2.0)).errors:
+            errors.append(np.abs(one.value))
+            bounds.append([one.bound(1), one.bound(2)])
+            seen.append(one.seen)
+    error = np.concatenate(errors)
+    for c, low in ((0, 0.5), (1, 0.92)):
+        share = np.mean(error <= np.concatenate([both[c] for both in bounds]))
+        print(f"{100 * share:.1f} % within bound({c + 1})")
+        assert share >= low
+    assert not np.concatenate(seen).any()
+    assert np.isnan(_report(0, (1.0, 1.0, 1.0)).errors[0].value).all()
 
 
 def test_strokes_shorter_than_a_window_and_wrong_shafts_are_refused() -> None:

@@ -11,15 +11,25 @@ from numpy.typing import NDArray
 
 from livebode.analysis.strokes import MotionSamples
 from livebode.core import SignalError, UsageError
-from livebode.motion.angle_orders import Shaft, ShaftOrders, Stroke, angle_windows, shaft_orders, strokes_of
+from livebode.motion.angle_orders import (
+    Shaft,
+    ShaftOrders,
+    Stroke,
+    angle_windows,
+    shaft_orders,
+    strokes_of,
+    usable_windows,
+)
 from livebode.motion.friction_curve import FrictionCurve, friction_curve
 from livebode.motion.order_changes import OrderChange, order_changes
+from livebode.motion.position_errors import PositionErrors, position_errors
 from livebode.motion.smooth_motion import SmoothKernel
 from livebode.motion.time_lines import TimeLine, time_lines
 
 Floats = NDArray[np.float64]
 
 _SHARPEST = 2.01  # samples: σ of the kernel
+_BANDS_HZ = (5.0, 2.5, 1.25)  # of the kernel that finds friction and inertia
 _SAME_LINE = 0.02  # of a frequency, within which a line is one that was specified
 _KEPT = 0.2  # of an amplitude, that the kernel must leave
 
@@ -32,6 +42,8 @@ class OrderReport:
     ----------
     shafts
         The orders of each shaft.
+    errors
+        Errors of the measured angle, of each shaft.
     friction
         The friction and the inertia with which the torque was computed.
     strokes
@@ -49,6 +61,7 @@ class OrderReport:
     """
 
     shafts: list[ShaftOrders]
+    errors: list[PositionErrors]
     friction: FrictionCurve
     strokes: int
     speed_hz: tuple[float, float]
@@ -71,6 +84,7 @@ class OrderReport:
         """As plain data, for JSON."""
         return {
             "shafts": [one.plain() for one in self.shafts],
+            "position_errors": [row for one in self.errors for row in one.plain()],
             "unit": self.unit,
             "strokes": self.strokes,
             "turns_per_s": list(self.speed_hz),
@@ -126,7 +140,7 @@ def orders_of(
             "out-of-range", f"{turn=} is not a positive number", "give the units of the angle in one turn",
             argument="turn", value=turn,
         )  # fmt: skip
-    curve = friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind)
+    curve = _friction(motion)
     kernel = SmoothKernel(_band(motion.block.rate_hz), motion.block.rate_hz)
     rest, acceleration, speed = _torque(motion, curve, kernel)
     scale = 2 * np.pi / per_turn
@@ -139,23 +153,49 @@ def orders_of(
     known = np.zeros(0) if lines_hz is None else np.asarray(lines_hz, dtype=np.float64)
     sigma_j = float(curve.sigma[curve.index("inertia")])
 
-    def shaft_found(shaft: Shaft, lines: Floats) -> tuple[ShaftOrders, list[float]]:
+    def shaft_found(shaft: Shaft, lines: Floats) -> tuple[ShaftOrders, PositionErrors, list[float]]:
         windows = angle_windows(strokes, shaft)
         middle = (windows.slowest + windows.fastest)[:, np.newaxis] / 2 * np.array(shaft.orders)
         value = windows.value / _left(kernel, middle)
         extra = sigma_j * np.abs(np.nanmean(value[1], axis=0))
         speeds = [float(windows.slowest.min()) / shaft.turns, float(windows.fastest.max()) / shaft.turns]
-        return shaft_orders(windows, shaft, value[0], extra, lines, limit), speeds
+        use, _ = usable_windows(windows, shaft, lines, limit)
+        errors = position_errors(windows, shaft, value[0], use, curve["inertia"])
+        return shaft_orders(windows, shaft, value[0], extra, lines, limit), errors, speeds
 
     found = [shaft_found(shaft, known) for shaft in shafts]
-    lines = _unknown_lines(strokes, [one for one, _ in found], known, limit, kernel)
+    lines = _unknown_lines(strokes, [one for one, _, _ in found], known, limit, kernel)
     if lines:
         away = np.concatenate([known, [line.frequency_hz for line in lines]])
         found = [shaft_found(shaft, away) for shaft in shafts]
-    speeds = [speed for _, both in found for speed in both]
+    speeds = [speed for _, _, both in found for speed in both]
     unit = motion.block.channels[motion.block.index(motion.input)].unit
     turns_per_s = (min(speeds), max(speeds))
-    return OrderReport([one for one, _ in found], curve, len(strokes), turns_per_s, known, lines, motion, unit)
+    orders, errors = [one for one, _, _ in found], [one for _, one, _ in found]
+    return OrderReport(orders, errors, curve, len(strokes), turns_per_s, known, lines, motion, unit)
+
+
+def _friction(motion: MotionSamples) -> FrictionCurve:
+    """Friction with the widest band that a ripple does not disturb.
+
+    A ripple in slow strokes moves the axis within the band, which makes the inertia too small. A lower band decides:
+    where the inertia differs by more than its bound there, the wider one is disturbed.
+    """
+    curves = [_curve_of(motion, _BANDS_HZ[0])]
+    for band_hz in _BANDS_HZ[1:]:
+        try:
+            curves.append(_curve_of(motion, band_hz))
+        except SignalError:  # the strokes are too short for a lower band
+            break
+    at = curves[0].index("inertia")
+    for i, curve in enumerate(curves):
+        if all(abs(curve.value[at] - other.value[at]) <= other.bound()[at] for other in curves[i + 1 :]):
+            return curve
+    return curves[-1]
+
+
+def _curve_of(motion: MotionSamples, band_hz: float) -> FrictionCurve:
+    return friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind, band_hz=band_hz)
 
 
 def _unknown_lines(

@@ -214,6 +214,8 @@ def _write_table(found: OrderReport, path: Path, target: str) -> None:
 
 def show_orders(found: OrderReport) -> None:
     """Print the orders of each shaft that are seen, or that cannot be separated from a line."""
+    import numpy as np
+
     console = terminal.console(markup=False)
     low, high = found.speed_hz
     lines = f"; lines of the time: {', '.join(f'{f:g}' for f in found.lines_hz)} Hz" if len(found.lines_hz) else ""
@@ -226,6 +228,14 @@ def show_orders(found: OrderReport) -> None:
         )
     for one in found.shafts:
         _show_shaft(one, found.unit)
+    for errors in found.errors:
+        bound = errors.bound()
+        for i in np.flatnonzero(errors.seen):
+            console.print(
+                f"order {errors.shaft.orders[i]} of the {errors.shaft.name} grows with the square of the speed, as an "
+                f"error of the measured angle of {abs(errors.value[i]):.3g} ± {bound[i]:.2g} rad of the motor",
+                soft_wrap=True,
+            )
     if not all(one.by_strokes for one in found.shafts):
         console.print(
             "fewer than four strokes: a line of the time at constant speed is not told from an order", soft_wrap=True
