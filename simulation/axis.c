@@ -183,11 +183,18 @@ static int alive(const lb_axis_config *c, const lb_axis_state *state)
     return x >= c->position_m_min && x <= c->position_m_max;
 }
 
+/* Angle that the encoder reads: its disc is eccentric, and has steps. */
+static double encoder_reading(const lb_axis_config *c, double angle)
+{
+    const double q = c->encoder_step_rad, eccentricity = c->encoder_eccentricity_rad;
+    const double disc = eccentricity > 0.0 ? angle + eccentricity * sin(angle) : angle;
+    return q > 0.0 ? floor(disc / q + 0.5) * q : disc;
+}
+
 /* Readings of the drive: the angle in steps of the encoder, and the velocity with the steps' differences. */
 static double read_velocity(const lb_axis_config *c, lb_axis_state *state)
 {
-    const double angle = state->plant[0], q = c->encoder_step_rad;
-    const double reading = q > 0.0 ? floor(angle / q + 0.5) * q : angle;
+    const double angle = state->plant[0], reading = encoder_reading(c, angle);
     const double velocity = c->velocity_differenced
                                 ? (reading - state->reading) * c->rate_hz
                                 : state->plant[1] + ((reading - angle) - (state->reading - state->angle)) * c->rate_hz;
@@ -226,8 +233,7 @@ void lb_axis_rest(const lb_axis_config *c, double position_m, lb_axis_state *sta
     if (c->states == 6) state->plant[2] = m.angle; /* no span is elongated, not even by rounding */
     state->plant[c->states - 2] = m.travel;
     state->angle = state->plant[0];
-    state->reading = c->encoder_step_rad > 0.0 ? floor(state->angle / c->encoder_step_rad + 0.5) * c->encoder_step_rad
-                                               : state->angle;
+    state->reading = encoder_reading(c, state->angle);
 }
 
 size_t lb_axis_advance(const lb_axis_config *c, lb_axis_state *state, size_t ticks, const double *input, double *output)

@@ -38,6 +38,7 @@ typedef struct {
     double velocity_gain_n_m_s, integral_step, position_gain_per_s, velocity_feedforward;
     double torque_n_m_max;   /* infinite: none */
     double encoder_step_rad; /* 0: exact */
+    double encoder_eccentricity_rad;
     int velocity_differenced;
     double position_m_min, position_m_max;
 } lb_axis_config;

@@ -134,16 +134,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=400, help="recordings of each axis and word")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--word", default="", help="part of the name of a wrong word; default: all")
     given = parser.parse_args()
     print(f"{given.runs} recordings of {PERIODS} periods for each row; seed {given.seed}")
     for axis in AXES:
         print(f"\n{axis.name}")
-        print(f"  false alarms: {100 * false_alarms(axis, given.runs, given.seed):.2f} %")
+        print(f"  false alarms: {100 * false_alarms(axis, given.runs, given.seed):.2f} %", flush=True)
         print(f"  {'wrong word':28}{'noticed':>9}{'named':>9}{'first':>9}   changes named (median)")
         for number, word in enumerate(words(axis.drive)):
+            if given.word not in word.name:
+                continue
             of = shares(axis, word, given.runs, given.seed + 1 + number)
             parts = "".join(f"{100 * of[key]:8.1f}%" for key in ("noticed", "named", "first"))
-            print(f"  {word.name:28}{parts}   {of['alike']:g}")
+            print(f"  {word.name:28}{parts}   {of['alike']:g}", flush=True)
 
 
 if __name__ == "__main__":

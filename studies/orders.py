@@ -23,10 +23,11 @@ THERE_AND_BACK = (0.3, 0.8, 0.3, 0.8, 0.3, 0.8, 0.3)
 
 @dataclass(frozen=True)
 class Case:
-    """A motion, and the amplitude of an excitation that runs at the same time."""
+    """A motion, the amplitude of an excitation that runs at the same time, and the eccentricity of the encoder."""
 
     motion: StrokeSequence | Strokes
     excitation_n_m: float = 0.0
+    eccentricity_rad: float = 0.0
 
 
 def _sequence(*speeds_m_per_s: float) -> StrokeSequence:
@@ -40,6 +41,8 @@ CASES = {
     "three speeds, excited": Case(_sequence(0.1, 0.1, 0.15, 0.15, 0.2, 0.2), 0.2),
 }
 
+ECCENTRIC = Case(_sequence(0.1, 0.1, 0.15, 0.15, 0.3, 0.3), eccentricity_rad=0.02)
+
 
 def measured(case: Case, seed: int, ripple_n_m: float = RIPPLE_N_M) -> OrderReport:
     """Orders of a stiff axis with friction, noise of the torque and of the velocity, in 25 s."""
@@ -49,7 +52,7 @@ def measured(case: Case, seed: int, ripple_n_m: float = RIPPLE_N_M) -> OrderRepo
         excitation_n_m=case.excitation_n_m * multisine(LINES),
         friction=Friction(load_coulomb_n=15.0, load_viscous_n_s_per_m=40.0, smoothing_m_per_s=1e-4),
         drive=Drive(torque_ripple_n_m=ripple_n_m, torque_ripple_per_turn=PER_TURN, torque_noise_n_m=0.1),
-        sensor=Sensor(noise_rad_per_s=0.02),
+        sensor=Sensor(noise_rad_per_s=0.02, encoder_eccentricity_rad=case.eccentricity_rad),
         seconds=25.0,
         seed=seed,
     )
@@ -79,9 +82,26 @@ def main(runs: int) -> int:
         ))  # fmt: skip
         print(
             f"{name:24}{amplitude:>8.4f}{bound:>9.4f}{shares[0]:>9.0f} %{shares[1]:>9.0f} %"
-            f"{100 * seen[:, at].mean():>5.0f} %{100 * np.delete(seen, at, axis=1).mean():>5.1f} %"
+            f"{100 * seen[:, at].mean():>5.0f} %{100 * np.delete(seen, at, axis=1).mean():>5.1f} %",
+            flush=True,
         )
+    _print_eccentric(runs)
     return 0
+
+
+def _print_eccentric(runs: int) -> None:
+    """The position error of an eccentric encoder, as an error of order 1 that grows with the square of the speed."""
+    found = [measured(ECCENTRIC, seed).errors[0] for seed in range(runs)]
+    true = np.array([-1j * ECCENTRIC.eccentricity_rad] + [0.0] * (len(SHAFT.orders) - 1))
+    error = np.array([np.abs(one.value - true) for one in found])
+    shares = [100 * np.mean(error <= [one.bound(c) for one in found]) for c in (1, 2)]
+    seen = np.array([one.seen for one in found])
+    print(f"\neccentric encoder, {ECCENTRIC.eccentricity_rad} rad, at three speeds; {runs} runs")
+    print(
+        f"found {np.mean([abs(one.value[0]) for one in found]):.4f} ± {np.mean([one.bound()[0] for one in found]):.4f}"
+    )
+    print(f"in 63.2 %: {shares[0]:.0f} %, in 98.2 %: {shares[1]:.0f} %")
+    print(f"seen: {100 * seen[:, 0].mean():.0f} %, other orders: {100 * seen[:, 1:].mean():.1f} %")
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ EVERYTHING = {
     "friction": Friction(motor_coulomb_n_m=0.1, motor_viscous_n_m_s=1e-3, motor_stribeck_n_m=0.05, load_coulomb_n=15,
                          load_viscous_n_s_per_m=4, load_stribeck_n=5),
     "drive": Drive(delay_ticks=2, torque_n_m_max=4.0, torque_ripple_n_m=0.2, torque_noise_n_m=0.1),
-    "sensor": Sensor(noise_rad_per_s=0.1, encoder_counts_per_turn=1 << 16),
+    "sensor": Sensor(noise_rad_per_s=0.1, encoder_counts_per_turn=1 << 16, encoder_eccentricity_rad=0.003),
     "faults": (TensionLoss(start_s=0.02, loss=0.1), LoadChange(start_s=0.01, ramp_s=0.05, load_kg=1.0),
                DampingGrowth(start_s=0.03, factor=1.5), Backlash(start_s=0.04, ramp_s=0.02, gap_m=1e-4),
                SoftSpot(position_m=0.5, width_m=0.1, loss=0.2), FrictionChange(start_s=0.02, factor=0.6)),

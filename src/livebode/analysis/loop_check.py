@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from livebode.analysis.loop_changes import LoopChange, single_changes
 from livebode.configuration.loop_section import LoopSection
 from livebode.core import Loop, UsageError
-from livebode.validation import LoopResidual, LoopSignals
+from livebode.validation import LoopResidual, LoopSignals, held_path
 
 Floats = NDArray[np.float64]
 LoopVerdict = Literal["as described", "one change", "not explained"]
 
 ALPHA = 0.002
-"""Probability that a true description is not found to be as described."""
+"""Probability of each of the two tests that a true description is not found to be as described."""
 HARMLESS = 5e-4
 """Share of the signals, and relative change of a number, that is below the accuracy of any description."""
 _ALIKE = 10.0  # of twice the log-likelihood: odds of 150 to 1
@@ -50,8 +50,8 @@ class Explanation:
 
     @property
     def score(self) -> float:
-        """Misfit with a penalty for a fitted number; less is better."""
-        return self.residual.misfit + (0.0 if self.bound_95 is None else float(np.log(2 * self.residual.value.size)))
+        """Deviance with a penalty for a fitted number; less is better."""
+        return self.residual.deviance + (0.0 if self.bound_95 is None else float(np.log(2 * self.residual.value.size)))
 
     @property
     def sentence(self) -> str:
@@ -106,9 +106,9 @@ class LoopCheck:
 
     @property
     def verdict(self) -> LoopVerdict:
-        if self.p >= ALPHA or self.harmless:
-            return "as described"
-        return "one change" if self.explanations else "not explained"
+        if self.explanations:
+            return "one change"
+        return "as described" if self.nearest is None else "not explained"
 
     @property
     def largest(self) -> tuple[float, float, float]:
@@ -170,8 +170,13 @@ def check_loop(signals: LoopSignals, section: LoopSection) -> LoopCheck:
 
     The equation u = E·w − F·y is exact for a linear controller that computes u from the recorded y, so noise, load,
     cogging and the resolution of the encoder cancel: only noise in the recorded u, and a reference that moves, remain,
-    and their scatter from window to window gives the bounds. The test is biased where the signals were filtered after
-    the controller used them, or u is limited.
+    and their scatter from window to window gives the bounds. What a controller at a lower rate folds onto the lines is
+    part of the equation. The test is biased where the signals were filtered after the controller used them, or u is
+    limited.
+
+    Two tests find a wrong description: the remainder is larger than noise, or a single word explains the signals so
+    much better that chance does it with a probability of at most `ALPHA` (a likelihood ratio of k by chance has a
+    probability of at most 1/k; Royall, J. American Statistical Association 95(451), 2000).
 
     Parameters
     ----------
@@ -195,12 +200,15 @@ def check_loop(signals: LoopSignals, section: LoopSection) -> LoopCheck:
             "describe the controllers under [loop]",
             argument="feedback",
         )
-    residual = signals.judge(described)
+    residual = min((signals.judge(described, phase) for phase in _phases(described)), key=lambda one: one.deviance)
     windows = round(signals.dof * (1 + 2 / 36) + 1)
-    if (p := residual.p()) >= ALPHA:
+    p = residual.p()
+    changes = single_changes(section, signals.lines.rate_hz)
+    words = [_explained(signals, change) for change in changes if not change.starts]
+    if p >= ALPHA and not _much_better(words, residual):
         return LoopCheck(residual, p, (), None, False, windows)
-    tried = [_explained(signals, change) for change in single_changes(section, signals.lines.rate_hz)]
-    tried.sort(key=lambda one: round(one.score, 6))  # two names of the same change come in the order of the list
+    tried = words + [_explained(signals, change) for change in changes if change.starts]
+    tried.sort(key=lambda one: round(one.score, 6))  # two names of the same change: in the order of the list
     fitting = [one for one in tried if one.p >= ALPHA]
     if not fitting and residual.share < HARMLESS:
         return LoopCheck(residual, p, (), None, True, windows)
@@ -214,6 +222,12 @@ def check_loop(signals: LoopSignals, section: LoopSection) -> LoopCheck:
     excess = max(1.0, best.residual.misfit / (2 * best.residual.value.size))
     alike = tuple(one for one in fitting if one.score - best.score < _ALIKE * excess)
     return LoopCheck(residual, p, alike, None, False, windows)
+
+
+def _much_better(words: list[Explanation], described: LoopResidual) -> bool:
+    """Whether one of these words explains the signals so much better that it is not by chance."""
+    best = min((one.residual.deviance for one in words), default=np.inf)
+    return bool(described.deviance - best > 2 * np.log(len(words) / ALPHA))
 
 
 def _changes_little(best: Explanation) -> bool:
@@ -230,12 +244,22 @@ def _explained(signals: LoopSignals, change: LoopChange) -> Explanation:
     def loop(value: object) -> Loop:
         return change.apply(value).build(rate_hz)
 
+    def judged(phase: int) -> Callable[[float], LoopResidual]:
+        return lambda value: signals.judge(loop(value), phase)
+
     if not change.starts:
-        residual = signals.judge(loop(change.word))
+        one = loop(change.word)
+        residual = min((signals.judge(one, phase) for phase in _phases(one)), key=lambda found: found.deviance)
         return Explanation(change, change.word, None, residual, residual.p())
-    fits = [_fitted(lambda x: signals.judge(loop(x)), start, change.least) for start in change.starts]
-    value, sigma, residual = min(fits, key=lambda fit: fit[2].misfit)
+    fits = [_fitted(judged(phase), start, change.least) for start in change.starts for phase in _phases(loop(start))]
+    value, sigma, residual = min(fits, key=lambda fit: fit[2].deviance)
     return Explanation(change, value, _Z95 * sigma, residual, residual.p(fitted=1))
+
+
+def _phases(loop: Loop) -> range:
+    """Ticks at which a controller at a lower rate may read its input first; the recording does not contain which."""
+    path = held_path(loop.feedback)
+    return range(1 if path is None else path.samples.rate_divider)
 
 
 def _fitted(judged: Callable[[float], LoopResidual], start: float, least: float) -> tuple[float, float, LoopResidual]:

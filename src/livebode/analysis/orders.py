@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,26 @@ from numpy.typing import NDArray
 
 from livebode.analysis.strokes import MotionSamples
 from livebode.core import SignalError, UsageError
-from livebode.motion.angle_orders import Shaft, ShaftOrders, angle_windows, shaft_orders, strokes_of
+from livebode.motion.angle_orders import (
+    Shaft,
+    ShaftOrders,
+    Stroke,
+    angle_windows,
+    shaft_orders,
+    strokes_of,
+    usable_windows,
+)
 from livebode.motion.friction_curve import FrictionCurve, friction_curve
+from livebode.motion.order_changes import OrderChange, order_changes
+from livebode.motion.position_errors import PositionErrors, position_errors
 from livebode.motion.smooth_motion import SmoothKernel
+from livebode.motion.time_lines import TimeLine, time_lines
 
 Floats = NDArray[np.float64]
 
 _SHARPEST = 2.01  # samples: σ of the kernel
+_BANDS_HZ = (5.0, 2.5, 1.25)  # of the kernel that finds friction and inertia
+_SAME_LINE = 0.02  # of a frequency, within which a line is one that was specified
 _KEPT = 0.2  # of an amplitude, that the kernel must leave
 
 
@@ -29,6 +42,8 @@ class OrderReport:
     ----------
     shafts
         The orders of each shaft.
+    errors
+        Errors of the measured angle, of each shaft.
     friction
         The friction and the inertia with which the torque was computed.
     strokes
@@ -36,7 +51,9 @@ class OrderReport:
     speed_hz
         Slowest and fastest turns of the motor in a window, per second.
     lines_hz
-        Lines of the time that were left out.
+        Lines of the time that were left out because they were specified.
+    found_lines
+        Lines of the time that nobody specified, and that were found and left out.
     motion
         The samples.
     unit
@@ -44,21 +61,35 @@ class OrderReport:
     """
 
     shafts: list[ShaftOrders]
+    errors: list[PositionErrors]
     friction: FrictionCurve
     strokes: int
     speed_hz: tuple[float, float]
     lines_hz: Floats
+    found_lines: list[TimeLine]
     motion: MotionSamples
     unit: str
+
+    @property
+    def zero_known(self) -> bool:
+        """Whether phases count from the zero of a measured angle; else from the first sample."""
+        return self.motion.angle is not None or self.motion.kind == "position"
+
+    def changes_from(self, baseline: OrderReport, *, phases: bool = True) -> list[OrderChange]:
+        """Each order compared with that of an earlier recording; phases only if both angles have the same zero."""
+        same_zero = phases and self.zero_known and baseline.zero_known
+        return order_changes(baseline.shafts, self.shafts, phases=same_zero)
 
     def plain(self) -> dict[str, Any]:
         """As plain data, for JSON."""
         return {
             "shafts": [one.plain() for one in self.shafts],
+            "position_errors": [row for one in self.errors for row in one.plain()],
             "unit": self.unit,
             "strokes": self.strokes,
             "turns_per_s": list(self.speed_hz),
             "lines_hz": self.lines_hz.tolist(),
+            "found_lines": [{"frequency_hz": one.frequency_hz, "amplitude": one.amplitude} for one in self.found_lines],
             "inertia": self.friction["inertia"],
             "inertia_bound": float(self.friction.bound()[self.friction.index("inertia")]),
             "input": self.motion.input,
@@ -109,7 +140,7 @@ def orders_of(
             "out-of-range", f"{turn=} is not a positive number", "give the units of the angle in one turn",
             argument="turn", value=turn,
         )  # fmt: skip
-    curve = friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind)
+    curve = _friction(motion)
     kernel = SmoothKernel(_band(motion.block.rate_hz), motion.block.rate_hz)
     rest, acceleration, speed = _torque(motion, curve, kernel)
     scale = 2 * np.pi / per_turn
@@ -119,18 +150,67 @@ def orders_of(
     slowest = _slowest(speed)
     strokes = strokes_of(turned, speed, signals, motion.block.rate_hz, slowest)
     limit = min(highest_hz, _most_hz(kernel))
-    known = np.zeros(0) if lines_hz is None else lines_hz
+    known = np.zeros(0) if lines_hz is None else np.asarray(lines_hz, dtype=np.float64)
     sigma_j = float(curve.sigma[curve.index("inertia")])
-    found, speeds = [], list[float]()
-    for shaft in shafts:
+
+    def shaft_found(shaft: Shaft, lines: Floats) -> tuple[ShaftOrders, PositionErrors, list[float]]:
         windows = angle_windows(strokes, shaft)
-        speeds += [float(windows.slowest.min()) / shaft.turns, float(windows.fastest.max()) / shaft.turns]
         middle = (windows.slowest + windows.fastest)[:, np.newaxis] / 2 * np.array(shaft.orders)
         value = windows.value / _left(kernel, middle)
         extra = sigma_j * np.abs(np.nanmean(value[1], axis=0))
-        found.append(shaft_orders(windows, shaft, value[0], extra, known, limit))
+        speeds = [float(windows.slowest.min()) / shaft.turns, float(windows.fastest.max()) / shaft.turns]
+        use, _ = usable_windows(windows, shaft, lines, limit)
+        errors = position_errors(windows, shaft, value[0], use, curve["inertia"])
+        return shaft_orders(windows, shaft, value[0], extra, lines, limit), errors, speeds
+
+    found = [shaft_found(shaft, known) for shaft in shafts]
+    lines = _unknown_lines(strokes, [one for one, _, _ in found], known, limit, kernel)
+    if lines:
+        away = np.concatenate([known, [line.frequency_hz for line in lines]])
+        found = [shaft_found(shaft, away) for shaft in shafts]
+    speeds = [speed for _, _, both in found for speed in both]
     unit = motion.block.channels[motion.block.index(motion.input)].unit
-    return OrderReport(found, curve, len(strokes), (min(speeds), max(speeds)), known, motion, unit)
+    turns_per_s = (min(speeds), max(speeds))
+    orders, errors = [one for one, _, _ in found], [one for _, one, _ in found]
+    return OrderReport(orders, errors, curve, len(strokes), turns_per_s, known, lines, motion, unit)
+
+
+def _friction(motion: MotionSamples) -> FrictionCurve:
+    """Friction with the widest band that a ripple does not disturb.
+
+    A ripple in slow strokes moves the axis within the band, which makes the inertia too small. A lower band decides:
+    where the inertia differs by more than its bound there, the wider one is disturbed.
+    """
+    curves = [_curve_of(motion, _BANDS_HZ[0])]
+    for band_hz in _BANDS_HZ[1:]:
+        try:
+            curves.append(_curve_of(motion, band_hz))
+        except SignalError:  # the strokes are too short for a lower band
+            break
+    at = curves[0].index("inertia")
+    for i, curve in enumerate(curves):
+        if all(abs(curve.value[at] - other.value[at]) <= other.bound()[at] for other in curves[i + 1 :]):
+            return curve
+    return curves[-1]
+
+
+def _curve_of(motion: MotionSamples, band_hz: float) -> FrictionCurve:
+    return friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind, band_hz=band_hz)
+
+
+def _unknown_lines(
+    strokes: list[Stroke], found: list[ShaftOrders], known: Floats, highest_hz: float, kernel: SmoothKernel
+) -> list[TimeLine]:
+    """Lines of the time in what the orders leave, without those that are known."""
+    rests = [
+        replace(one, torque=one.torque[:1] - sum(shaft.torque(one.angle * shaft.shaft.turns) for shaft in found))
+        for one in strokes
+    ]
+    return [
+        TimeLine(line.frequency_hz, line.amplitude / float(_left(kernel, np.array(line.frequency_hz))))
+        for line in time_lines(rests, highest_hz)
+        if not np.any(np.abs(known - line.frequency_hz) < _SAME_LINE * line.frequency_hz)
+    ]
 
 
 def _slowest(speed: Floats) -> float:

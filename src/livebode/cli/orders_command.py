@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from livebode.analysis.orders import OrderReport
     from livebode.analysis.strokes import MotionSamples
     from livebode.motion.angle_orders import Shaft, ShaftOrders
+    from livebode.motion.order_changes import OrderChange
 
 _POINTS = 512
 _HIGHEST = 48
@@ -48,6 +49,16 @@ def orders_command(
         str | None,
         typer.Option(metavar="HZ", help="Lines of an excitation or the mains, which are not orders: 20,40,50."),
     ] = None,
+    baseline: Annotated[
+        str | None,
+        typer.Option(
+            metavar="BEFORE", help="An earlier recording, configuration or run: report the orders that changed."
+        ),
+    ] = None,
+    other_zero: Annotated[
+        bool,
+        typer.Option("--other-zero", help="The angle was homed again after BEFORE: compare the amplitudes only."),
+    ] = False,
     from_: From = None,
     to: To = None,
     rate: Rate = None,
@@ -64,7 +75,8 @@ def orders_command(
     """Find torque that repeats with the angle: cogging, eccentricity, gears; write a feedforward table.
 
     Shafts and channels default to those of the run or configuration, and the orders to 1 … 48 of the motor. A window
-    in which an order meets a line of the time is left out: record strokes at several speeds.
+    in which an order meets a line of the time is left out: record strokes at several speeds. With --baseline, orders
+    are compared with those of an earlier recording.
     """
     from livebode.analysis.orders import orders_of
     from livebode.analysis.strokes import read_strokes
@@ -78,14 +90,24 @@ def orders_command(
         part=motion_part(from_, to),
     )  # fmt: skip
     section = OrdersSection.model_validate(motion.settings.get("orders", {}))
-    found = orders_of(
-        motion,
-        [_shaft(text) for text in shaft] if shaft else _shafts(section),
-        angle=motion.angle,
-        turn=turn or section.turn,
-        lines_hz=_lines(time_lines, motion),
-        highest_hz=highest or section.highest_hz or float("inf"),
-    )
+    shafts = [_shaft(text) for text in shaft] if shaft else _shafts(section)
+
+    def found_in(samples: MotionSamples) -> OrderReport:
+        return orders_of(
+            samples,
+            shafts,
+            angle=samples.angle,
+            turn=turn or section.turn,
+            lines_hz=_lines(time_lines, samples),
+            highest_hz=highest or section.highest_hz or float("inf"),
+        )
+
+    found = found_in(motion)
+    changes: list[OrderChange] | None = None
+    if baseline is not None:
+        channels = {motion.kind: motion.output, "input": motion.input, "angle": motion.angle}
+        before = found_in(read_strokes(location(baseline), rate_hz=rate, time=time, **channels))  # type: ignore[arg-type]
+        changes = found.changes_from(before, phases=not other_zero)
     into = picture or (None if motion.run is None else results_directory(motion.run) / "orders.png")
     if into is not None and can_draw():
         from livebode.report import save_orders_picture
@@ -95,9 +117,12 @@ def orders_command(
     if table is not None:
         _write_table(found, table, target)
     if as_json:
-        print(to_json(found.plain()))
+        more = {} if changes is None else {"changes": [one.plain() for one in changes]}
+        print(to_json(found.plain() | more))
         return
     show_orders(found)
+    if changes is not None:
+        show_changes(changes, found, Path(str(baseline)).name)
     if table is not None:
         print(f"feedforward of the motor, to be added to the torque: {table}")
     if into is not None:
@@ -189,16 +214,47 @@ def _write_table(found: OrderReport, path: Path, target: str) -> None:
 
 def show_orders(found: OrderReport) -> None:
     """Print the orders of each shaft that are seen, or that cannot be separated from a line."""
+    import numpy as np
+
     console = terminal.console(markup=False)
     low, high = found.speed_hz
     lines = f"; lines of the time: {', '.join(f'{f:g}' for f in found.lines_hz)} Hz" if len(found.lines_hz) else ""
     console.print(f"{found.strokes} strokes at {low:.3g} … {high:.3g} turns/s of the motor{lines}", soft_wrap=True)
+    for line in found.found_lines:
+        size = f"{line.amplitude:.2g} {found.unit}".strip()
+        console.print(
+            f"line of the time found at {line.frequency_hz:.4g} Hz, amplitude {size}: not an order, left out",
+            soft_wrap=True,
+        )
     for one in found.shafts:
         _show_shaft(one, found.unit)
+    for errors in found.errors:
+        bound = errors.bound()
+        for i in np.flatnonzero(errors.seen):
+            console.print(
+                f"order {errors.shaft.orders[i]} of the {errors.shaft.name} grows with the square of the speed, as an "
+                f"error of the measured angle of {abs(errors.value[i]):.3g} ± {bound[i]:.2g} rad of the motor",
+                soft_wrap=True,
+            )
     if not all(one.by_strokes for one in found.shafts):
         console.print(
             "fewer than four strokes: a line of the time at constant speed is not told from an order", soft_wrap=True
         )
+
+
+def show_changes(changes: list[OrderChange], found: OrderReport, baseline: str) -> None:
+    """Print the orders that changed since the baseline."""
+    from livebode.motion.order_changes import FALSE_ALARM
+
+    console = terminal.console(markup=False)
+    changed = [one for one in changes if one.changed]
+    for one in changed:
+        console.print(one.sentence(found.unit), soft_wrap=True)
+    words = f"{len(changed) or 'no'} order{'s' * (len(changed) != 1)} changed"
+    console.print(
+        f"compared with {baseline}: {words} of {len(changes)}; probability of a false alarm {100 * FALSE_ALARM:g} %",
+        soft_wrap=True,
+    )
 
 
 def _show_shaft(one: ShaftOrders, unit: str) -> None:

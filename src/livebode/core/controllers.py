@@ -100,13 +100,21 @@ class DriveTiming(Algebra):
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)
-        tick = np.exp(-2j * np.pi * f / (self.rate_hz * self.rate_divider))
-        held = np.ones(f.shape, dtype=np.complex128)
-        if self.hold == "zero-order":
-            held = np.mean([tick**i for i in range(self.rate_divider)], axis=0)
+        if self.hold == "none":
+            return self.before_hold(f)
+        tick = self._tick(f)
+        return np.asarray(self.before_hold(f) * np.mean([tick**i for i in range(self.rate_divider)], axis=0))
+
+    def before_hold(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Law, low-pass and delay without the hold: what acts on samples that are held already."""
+        law = self.law(frequency_hz)
         if self.lowpass_s:
-            held = held / (1 + self.lowpass_s / integral(f, self.rate_hz, "backward"))
-        return np.asarray(self.law(f) * held * tick**self.delay_ticks, dtype=np.complex128)
+            law = law / (1 + self.lowpass_s / integral(frequency_hz, self.rate_hz, "backward"))
+        return np.asarray(law * self._tick(frequency_hz) ** self.delay_ticks, dtype=np.complex128)
+
+    def _tick(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Delay of one tick of the recorded loop."""
+        return np.asarray(np.exp(-2j * np.pi * frequency_hz / (self.rate_hz * self.rate_divider)))
 
     def law(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """The control law alone, as computed at `rate_hz`, without hold and delay."""

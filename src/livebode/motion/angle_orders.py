@@ -284,17 +284,7 @@ def shaft_orders(
         Of a window.
     """
     orders = np.array(shaft.orders)
-    low, high = (one[:, np.newaxis] * orders for one in (windows.slowest, windows.fastest))
-    beside = _MAIN_LOBE / turns * windows.fastest[:, np.newaxis]
-    met = np.zeros(low.shape, dtype=bool)
-    meets = np.full(orders.size, np.nan)
-    for line in lines_hz:
-        near = (low - beside < line) & (line < high + beside)
-        meets[near.any(axis=0) & np.isnan(meets)] = line
-        met |= near
-    slow = high <= highest_hz
-    use = ~met & slow
-    meets[use.any(axis=0) | ~slow.any(axis=0)] = np.nan
+    use, meets = usable_windows(windows, shaft, lines_hz, highest_hz, turns)
     by_strokes = bool(np.unique(windows.stroke).size >= _STROKES_MIN)
     many = [_mean(value[use[:, i], i], windows.stroke[use[:, i]], by_strokes) for i in range(orders.size)]
     mean, variance, dof = (np.array(one) for one in zip(*many))
@@ -311,6 +301,28 @@ def shaft_orders(
         meets_hz=meets,
         by_strokes=by_strokes,
     )
+
+
+def usable_windows(
+    windows: AngleWindows, shaft: Shaft, lines_hz: Floats, highest_hz: float, turns: int = 2
+) -> tuple[NDArray[np.bool_], Floats]:
+    """Windows in which an order meets no line and is not too fast, (windows, orders), and the line met in all of them.
+
+    The arguments are those of `shaft_orders`. The line is NaN for an order that has a window.
+    """
+    orders = np.array(shaft.orders)
+    low, high = (one[:, np.newaxis] * orders for one in (windows.slowest, windows.fastest))
+    beside = _MAIN_LOBE / turns * windows.fastest[:, np.newaxis]
+    met = np.zeros(low.shape, dtype=bool)
+    meets = np.full(orders.size, np.nan)
+    for line in lines_hz:
+        near = (low - beside < line) & (line < high + beside)
+        meets[near.any(axis=0) & np.isnan(meets)] = line
+        met |= near
+    slow = high <= highest_hz
+    use = ~met & slow
+    meets[use.any(axis=0) | ~slow.any(axis=0)] = np.nan
+    return use, meets
 
 
 def _mean(value: Complex, stroke: NDArray[np.int64], by_strokes: bool) -> tuple[complex, float, float]:

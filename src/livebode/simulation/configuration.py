@@ -269,6 +269,7 @@ def controller_settings(drive: Drive, sensor: Sensor) -> dict[str, Any]:
     return {name: getattr(drive, name) for name in _OF_DRIVE} | {
         "integral_step": 1.0 / (drive.velocity_rate_hz * drive.integral_time_s),
         "encoder_step_rad": sensor.encoder_step_rad,
+        "encoder_eccentricity_rad": sensor.encoder_eccentricity_rad,
         "velocity_differenced": int(sensor.velocity_differenced),
     }
 

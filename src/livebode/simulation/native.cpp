@@ -68,6 +68,7 @@ lb_axis_config config_of(const nb::dict &s)
     c.velocity_feedforward = number(s, "velocity_feedforward");
     c.torque_n_m_max = number(s, "torque_n_m_max");
     c.encoder_step_rad = number(s, "encoder_step_rad");
+    c.encoder_eccentricity_rad = number(s, "encoder_eccentricity_rad");
     c.velocity_differenced = whole(s, "velocity_differenced");
     c.position_m_min = number(s, "position_m_min");
     c.position_m_max = number(s, "position_m_max");

@@ -180,6 +180,8 @@ class Sensor:
     encoder_counts_per_turn
         Counts of the encoder per turn: the angle is rounded to these, and the velocity contains the rounding's
         differences times the rate. 0: exact.
+    encoder_eccentricity_rad
+        Amplitude of the position error of an eccentric encoder, once a turn: it reads φ + this·sin φ, rad.
     velocity_differenced
         The velocity is the difference of the last two angles times the rate, with its lag of half a tick; else the
         velocity at the tick itself.
@@ -187,10 +189,11 @@ class Sensor:
 
     noise_rad_per_s: NonNegative = 0.0
     encoder_counts_per_turn: Annotated[int, Ge(0), Le(_COUNTS_MAX)] = 0
+    encoder_eccentricity_rad: NonNegative = 0.0
     velocity_differenced: bool = False
 
     def __post_init__(self) -> None:
-        nonnegative(self, "noise_rad_per_s")
+        nonnegative(self, "noise_rad_per_s", "encoder_eccentricity_rad")
         count(self, "encoder_counts_per_turn", _COUNTS_MAX)
 
     @property

@@ -192,7 +192,7 @@ class Controller:
         self.control: float = 0.0
         self.delayed = [0.0] * settings["delay_ticks"]
         self.limited = False
-        self.angle, self.reading, self.tick_number = angle, self._rounded(angle), 0
+        self.angle, self.reading, self.tick_number = angle, self._encoder(angle), 0
 
     def tick(self, angle: float, velocity: float, now: Now) -> tuple[float, float, float]:
         """Torque, velocity and angle as logged at this tick."""
@@ -203,12 +203,14 @@ class Controller:
         self.tick_number += 1
         return (copysign(most, torque) if self.limited else torque), velocity, self.reading
 
-    def _rounded(self, angle: float) -> float:
-        step = self.settings["encoder_step_rad"]
+    def _encoder(self, angle: float) -> float:
+        step, eccentricity = self.settings["encoder_step_rad"], self.settings["encoder_eccentricity_rad"]
+        if eccentricity > 0 and isfinite(angle):
+            angle += eccentricity * sin(angle)
         return floor(angle / step + 0.5) * step if step > 0 and isfinite(angle) else angle
 
     def _read(self, angle: float, velocity: float) -> float:
-        reading, rate = self._rounded(angle), self.settings["rate_hz"]
+        reading, rate = self._encoder(angle), self.settings["rate_hz"]
         if self.settings["velocity_differenced"]:
             velocity = (reading - self.reading) * rate
         else:

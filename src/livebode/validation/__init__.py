@@ -3,6 +3,7 @@
 from livebode.validation.correlation import LIMIT, SMALL, Correlation
 from livebode.validation.lines import FittedModel, LineValidation, fitted_model, validate_at_lines
 from livebode.validation.loop_equation import LoopResidual, LoopSignals
+from livebode.validation.loop_images import held_path
 from livebode.validation.validate import Validation, validate
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "LoopSignals",
     "Validation",
     "fitted_model",
+    "held_path",
     "validate",
     "validate_at_lines",
 ]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Lines, Loop, SignalError
 from livebode.core.installing import needing
+from livebode.validation.loop_images import HeldSamples, held_path
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -38,6 +39,10 @@ class LoopSignals:
         Complex degrees of freedom of the covariance.
     step
         Standard deviation of the mean of U by the steps in which u is recorded; averaging does not reduce it.
+    output
+        Samples of the output, from which the images of a slower controller are computed, (samples,).
+    instrument
+        conj(W)/rms(W) of each window, (windows, lines).
     """
 
     lines: Lines
@@ -45,6 +50,10 @@ class LoopSignals:
     covariance: Complex
     dof: float
     step: float
+    output: Floats
+    instrument: Complex
+    _spectra: Complex
+    _with_images: dict[tuple[HeldSamples, int], tuple[Complex, Complex]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, block: Block, lines: Lines, *, input: str, excitation: str, output: str) -> LoopSignals:
@@ -65,14 +74,9 @@ class LoopSignals:
                 samples=len(block),
                 limit=(WINDOWS_MIN + 1) * period,
             )
-        hann = 1 - np.cos(np.pi * np.arange(2 * period) / period)
-        angle = np.pi / period * np.outer(np.arange(2 * period), 2 * np.array(lines.bins))
-        kernel = hann[:, np.newaxis] * np.exp(-1j * angle) / hann.sum()
         signals = np.stack([block[name] for name in (input, excitation, output)])
         signals = signals - signals.mean(axis=1, keepdims=True)
-        spectra = np.stack(
-            [signals[:, k * period : (k + 2) * period] @ kernel for k in range(count)]
-        )  # (windows, 3, lines)
+        spectra = _spectra(signals, lines)
         power = np.mean(np.abs(spectra[:, 1]) ** 2, axis=0)
         if not power.any():
             raise SignalError(
@@ -83,27 +87,61 @@ class LoopSignals:
             )
         excited = power > 1e-12 * power.max()
         lines, spectra = lines.take(np.flatnonzero(excited)), spectra[..., excited]
-        about = np.moveaxis(spectra * np.conj(spectra[:, 1:2]) / np.sqrt(power[excited]), 2, 0)  # (lines, windows, 3)
-        mean = about.mean(axis=1)
-        away = about - mean[:, np.newaxis]
-        scatter = np.einsum("lki,lkj->lij", away, np.conj(away)) / (count - 1)
-        covariance = scatter * (1 + 2 * _OVERLAP * (count - 1) / count) / (count - 2 * _OVERLAP)
+        instrument = np.conj(spectra[:, 1]) / np.sqrt(power[excited])
+        about = spectra * instrument[:, np.newaxis]
         dof = (count - 1) / (1 + 2 * _OVERLAP**2)
-        return cls(lines, mean, covariance, dof, _step(signals[0]) / np.sqrt(12 * period))
+        step = _step(signals[0]) / np.sqrt(12 * period)
+        return cls(lines, *_moments(about), dof, step, signals[2], instrument, about)
 
-    def judge(self, loop: Loop) -> LoopResidual:
-        """The equation of this loop; UsageError if its feedback is missing."""
+    def judge(self, loop: Loop, phase: int = 0) -> LoopResidual:
+        """The equation of this loop; UsageError if its feedback is missing.
+
+        A controller at a lower rate than the recording reads the output at the ticks `phase`, `phase` + its divider, ….
+        """
         f = self.lines.frequency_hz
         tick = np.exp(2j * np.pi * f / self.lines.rate_hz)
         advanced = [tick ** loop.advance_ticks(role) for role in ("input", "excitation", "output")]
-        weights = np.stack([np.ones(f.shape), -loop.entry_at(f), loop.feedback_at(f)], axis=1)
-        weights = weights * np.stack(advanced, axis=1)
-        parts = weights * self.mean
-        variance = np.einsum("li,lij,lj->l", weights, self.covariance, np.conj(weights)).real
+        weights = [np.ones(f.shape), -loop.entry_at(f), loop.feedback_at(f)]
+        mean, covariance = self.mean, self.covariance
+        if (path := held_path(loop.feedback)) is not None:
+            mean, covariance = self._moments_with(path.samples, phase)
+            weights.append(path.response(f))
+            advanced.append(advanced[2])
+        weighting = np.stack(weights, axis=1) * np.stack(advanced, axis=1)
+        parts = weighting * mean
+        variance = np.einsum("li,lij,lj->l", weighting, covariance, np.conj(weighting)).real
         variance = np.maximum(variance, 0) + self.step**2 + _ROUNDING**2 * np.sum(np.abs(parts) ** 2, axis=1)
-        output_variance = self.covariance[:, 2, 2].real * np.abs(weights[:, 2]) ** 2
+        output_variance = covariance[:, 2, 2].real * np.abs(weighting[:, 2]) ** 2
         known = np.abs(parts[:, 2]) > _WEAK * np.sqrt(output_variance)
         return LoopResidual(f, parts.sum(axis=1), variance, self.dof, parts[:, 2], np.abs(parts).max(axis=1), known)
+
+    def _moments_with(self, samples: HeldSamples, phase: int) -> tuple[Complex, Complex]:
+        """Mean and covariance of the three signals and of the images of a slower controller."""
+        if (samples, phase) not in self._with_images:
+            images = samples.images(self.output, self.lines.rate_hz, phase)
+            about = _spectra(images[np.newaxis], self.lines) * self.instrument[:, np.newaxis]
+            self._with_images[samples, phase] = _moments(np.concatenate([self._spectra, about], axis=1))
+        return self._with_images[samples, phase]
+
+
+def _spectra(signals: Floats, lines: Lines) -> Complex:
+    """Of windows of two periods, a period apart, (windows, signals, lines)."""
+    period = lines.window
+    hann = 1 - np.cos(np.pi * np.arange(2 * period) / period)
+    angle = np.pi / period * np.outer(np.arange(2 * period), 2 * np.array(lines.bins))
+    kernel = hann[:, np.newaxis] * np.exp(-1j * angle) / hann.sum()
+    count = signals.shape[1] // period - 1
+    return np.stack([signals[:, k * period : (k + 2) * period] @ kernel for k in range(count)])
+
+
+def _moments(about: Complex) -> tuple[Complex, Complex]:
+    """Mean over windows, (lines, signals), and its covariance, (lines, signals, signals)."""
+    count = len(about)
+    mean = about.mean(axis=0)
+    away = about - mean
+    scatter = np.einsum("kil,kjl->lij", away, np.conj(away)) / (count - 1)
+    covariance = scatter * (1 + 2 * _OVERLAP * (count - 1) / count) / (count - 2 * _OVERLAP)
+    return mean.T, covariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +193,14 @@ class LoopResidual:
         """
         away = np.abs(self.value) ** 2 / self.variance
         return float(2 * self.dof * np.sum(np.log1p(away / self.dof)))
+
+    @property
+    def deviance(self) -> float:
+        """Minus twice the logarithm of the likelihood, but for a constant.
+
+        Of a normal remainder whose variance is known by its estimate only: (variance + |value|²/d)^−(d + 1).
+        """
+        return float(2 * (self.dof + 1) * np.sum(np.log(self.variance + np.abs(self.value) ** 2 / self.dof)))
 
     @property
     def share(self) -> float:
