@@ -1,21 +1,40 @@
-"""Several inputs and outputs: excitations that separate the inputs, and the tracker of response matrices."""
+"""Several inputs and outputs: excitations that separate the inputs, matrices of responses, their modes and changes."""
 
 from livebode.core import REASONS, MatrixResponses
+from livebode.mimo.change import EntryChange, MatrixChange, compare_matrices
 from livebode.mimo.example import example_matrix_responses
 from livebode.mimo.excitation import MatrixExcitation
+from livebode.mimo.gantry_change import Cause, GantryChange, compare_gantries
+from livebode.mimo.gantry_fit import GantryFit, fit_gantry
+from livebode.mimo.mean import mean_matrix
+from livebode.mimo.modes import MatrixModes, fit_matrix
+from livebode.mimo.monitor import MatrixAlarm, MatrixMonitor
 from livebode.mimo.prediction import MatrixPrediction, predict, within_limits
 from livebode.mimo.settings import MatrixLoop, MatrixSettings
 from livebode.mimo.tracker import MatrixTracker
 
 __all__ = [
     "REASONS",
+    "Cause",
+    "EntryChange",
+    "GantryChange",
+    "GantryFit",
+    "MatrixAlarm",
+    "MatrixChange",
     "MatrixExcitation",
     "MatrixLoop",
+    "MatrixModes",
+    "MatrixMonitor",
     "MatrixPrediction",
     "MatrixResponses",
     "MatrixSettings",
     "MatrixTracker",
+    "compare_gantries",
+    "compare_matrices",
     "example_matrix_responses",
+    "fit_gantry",
+    "fit_matrix",
+    "mean_matrix",
     "predict",
     "within_limits",
 ]
