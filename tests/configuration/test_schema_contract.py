@@ -30,6 +30,10 @@ REQUIRED: dict[str, Any] = {
     "loop.position": {"gain": 1.0, "rate_hz": 4000},
     "loop.position_pd": {"position_gain": 1.0, "velocity_gain": 1.0, "rate_hz": 4000},
 }
+MATRIX: dict[str, Any] = SMALLEST | {
+    "signals": {"output": ["y", "z"], "input": "u", "excitation": "w"},
+    "lines": {"frequencies": "20", "window": 400},
+}
 TABLES = dict(tables(SCHEMA))
 
 
@@ -43,6 +47,8 @@ def accepted(data: dict[str, Any]) -> bool:
 
 def base_of(table: tuple[str, ...]) -> dict[str, Any]:
     name = ".".join(table)
+    if name == "experiments":
+        return MATRIX
     return with_value(SMALLEST, table, copy.deepcopy(REQUIRED[name])) if name in REQUIRED else SMALLEST
 
 

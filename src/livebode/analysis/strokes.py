@@ -119,7 +119,7 @@ def _configured(target: Location) -> tuple[Location, Axis | None, Path | None]:
 
 
 def _recorded_axis(run: Path) -> Axis:
-    words = recorded_configuration(RunRecord.open(run, output_only=True).summary)
+    words = recorded_configuration(RunRecord.open(run, output_only=True, matrix=True).summary)
     kept: dict[str, Any] = {key: words[key] for key in ("source", "signals", "lines", "orders") if key in words}
     if "signals" not in kept or "log" not in kept.get("source", {}):
         raise RecordError(

@@ -56,7 +56,7 @@ def validate_run(
         {key: own_words[key] for key in ("source", "signals", "loop", "monitoring") if key in own_words}, str(directory)
     )
     named = {role: name for role, name in (channels or {}).items() if name}
-    signals = axis.signals.model_copy(update=named)
+    signals = axis.signals.over(named)
     if signals.input is None:
         raise RecordError(
             "not-tracked",
@@ -70,7 +70,7 @@ def validate_run(
     opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=[signals.output])
     if signals.excitation and "excitation" not in named and not opened.has(signals.excitation):
         notes.append(f"{log.name} has no channel {signals.excitation!r}: judged without the excitation w")
-        signals = signals.model_copy(update={"excitation": None})
+        signals = signals.over({"excitation": None})
     names = [name for name in (signals.input, signals.output, signals.excitation) if name]
     ready = axis.ready
     if ready is not None and not opened.has(ready.channel):

@@ -13,6 +13,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.band import parsed_band
+from livebode.cli.matrix import show_matrix
 from livebode.cli.notices import NoticePrinter
 from livebode.cli.picture_support import tell_how_to_draw
 from livebode.cli.pictures import drawing, load_beside, show, tracked_amount
@@ -285,6 +286,8 @@ def _run_axes(
 
 
 def _drawing(axis: Axis) -> Draw:
+    if axis.signals.is_matrix:
+        return drawing(axis.source.title, ("", ""))  # a matrix run draws nothing
     names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
     return drawing(f"{axis.source.title}: {axis.signals.output}", names)
 
@@ -292,5 +295,7 @@ def _drawing(axis: Axis) -> Draw:
 def _show(outcome: Outcome, as_json: bool) -> None:
     if as_json:
         print(to_json({"directory": original(str(outcome.directory))} | outcome.summary), flush=True)
+    elif outcome.matrix is not None:
+        show_matrix(outcome, outcome.matrix)
     else:
         show(outcome)

@@ -6,11 +6,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, ValidationError
+from pydantic_core import ErrorDetails
 
+from livebode.configuration.experiments_section import ExperimentsSection
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.lines_section import LinesSection
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.machine_section import MachineSection
+from livebode.configuration.matrix import check_matrix, check_no_matrix
 from livebode.configuration.monitoring_section import MonitoringSection
 from livebode.configuration.motion_section import MotionSection
 from livebode.configuration.orders_section import OrdersSection
@@ -52,6 +55,8 @@ class Axis(ConfigurationSection):
         The excited frequencies and the window.
     tracking
         How responses and their bounds are estimated.
+    experiments
+        The experiments that separate the inputs of a matrix of responses.
     loop
         The controllers, the injection point of the excitation, and the times at which signals are logged.
     record
@@ -80,6 +85,7 @@ class Axis(ConfigurationSection):
     signals: SignalsSection
     lines: LinesSection = LinesSection()
     tracking: TrackingSection = TrackingSection()
+    experiments: ExperimentsSection | None = None
     loop: LoopSection = LoopSection()
     record: RecordSection | None = None
     motion: MotionSection | None = None
@@ -131,6 +137,10 @@ class Axis(ConfigurationSection):
             checked_address(axis.source.url, axis.source)
         if axis.source.replay is not None:
             check_keys(axis.source, "replay")
+        try:
+            (check_matrix if axis.signals.is_matrix else check_no_matrix)(axis)
+        except ConfigError as error:
+            raise error.at(origin) from None
         if axis.output_only is not None:
             check_output_only(axis, origin)
         try:
@@ -197,11 +207,13 @@ def _of_one_recording(axis: Axis) -> list[str]:
 
 def _first_of(error: ValidationError) -> ConfigError:
     """The first error, with its key and value; missing keys last, because a misspelt key also causes a missing one."""
-    first = min(error.errors(include_url=False), key=lambda one: one["type"] == "missing")
+    first = min(error.errors(include_url=False), key=_is_less_helpful)
     if first["loc"][:1] == ("report",):
         return report_error(first)
     # After a union, pydantic adds the name of the type that it tried.
-    place = one_line(".".join(str(part) for part in first["loc"] if part != "int" and "[" not in str(part)))
+    place = one_line(
+        ".".join(str(part) for part in first["loc"] if part not in ("int", "str") and "[" not in str(part))
+    )
     if first["type"] == "extra_forbidden":
         return ConfigError("key-unknown", f"there is no setting {place!r}", nearest(first["loc"]), key=place)
     if first["type"] == "missing":
@@ -211,6 +223,11 @@ def _first_of(error: ValidationError) -> ConfigError:
     why = first["msg"].removeprefix("Value error, ").lower()
     facts = {"key": place} | ({} if secret else {"value": value})
     return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", "correct it", **facts)
+
+
+def _is_less_helpful(error: ErrorDetails) -> tuple[bool, bool]:
+    """Whether others are reported first: of a list that may also be a text, those on the list."""
+    return error["type"] == "missing", error["type"] == "string_type" and isinstance(error["input"], list)
 
 
 def nearest(loc: tuple[int | str, ...]) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, counted
+from livebode.core import CHANNELS_MAX, PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, counted
 
 SAME_RATE = 1e-6
 Ticks = Annotated[int, Field(ge=0)]
@@ -80,6 +80,32 @@ class PositionPDSection(_ControllerSection):
     smoothed: bool = False
 
 
+class ControllerSection(ConfigurationSection):
+    """[[loop.controllers]]: the controller from one output to one input of a matrix.
+
+    Parameters
+    ----------
+    output
+        Channel of signals.output that the controller reads.
+    input
+        Channel of signals.input, or with "indirect" of signals.excitation, on whose place it acts.
+    velocity, position, velocity_differenced, position_pd
+        As in [loop].
+    """
+
+    output: str
+    input: str
+    velocity: PIDSection | None = None
+    position: PIDSection | None = None
+    velocity_differenced: bool = False
+    position_pd: PositionPDSection | None = None
+
+    def build(self, rate_hz: float) -> Model | None:
+        """The controller, recorded at `rate_hz`; ConfigError if its parts do not form one."""
+        parts = ("velocity", "position", "velocity_differenced", "position_pd")
+        return LoopSection(**{name: getattr(self, name) for name in parts}).build(rate_hz).feedback
+
+
 class LoopSection(ConfigurationSection):
     """[loop]: the controllers, the injection point of the excitation, and the times at which signals are logged.
 
@@ -103,6 +129,8 @@ class LoopSection(ConfigurationSection):
         The velocity is the difference of the last two positions that the position controller reads.
     position_pd
         The whole controller of an output that is a position.
+    controllers
+        The controllers of a matrix, one for each output and input that it joins.
     """
 
     excitation_at: Literal["plant input", "velocity reference", "output"] = "plant input"
@@ -114,6 +142,7 @@ class LoopSection(ConfigurationSection):
     position: PIDSection | None = None
     velocity_differenced: bool = False
     position_pd: PositionPDSection | None = None
+    controllers: Annotated[list[ControllerSection], Field(max_length=CHANNELS_MAX**2)] = []
 
     def build(self, rate_hz: float) -> Loop:
         """The Loop of this description, recorded at `rate_hz`; ConfigError if its parts do not form one."""

@@ -7,7 +7,7 @@ from pydantic import BaseModel
 from livebode.core import ConfigError
 
 _USED = {
-    "signals": {"output", "schedule"},
+    "signals": {"outputs", "schedule"},
     "lines": {"window"},
     "tracking": {"hop"},
 }
@@ -28,7 +28,8 @@ def check_output_only(axis: BaseModel, origin: str) -> None:
     for name in sorted(axis.model_fields_set - _USED_WHOLE):
         section = getattr(axis, name)
         if name in _USED and isinstance(section, BaseModel):
-            unused += [f"{name}.{key}" for key in sorted(section.model_fields_set - _USED[name])]
+            fields = type(section).model_fields
+            unused += [f"{name}.{fields[key].alias or key}" for key in sorted(section.model_fields_set - _USED[name])]
         elif section is not None:
             unused.append(name)
     if unused:

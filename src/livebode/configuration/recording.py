@@ -14,7 +14,7 @@ from livebode.sources.uneven import UNEVEN, UnevenLog, open_uneven
 def open_recording(axis: Axis) -> Log:
     """Open the one recording in [source] at the clock of the output; LivebodeError if it cannot be read."""
     (path,) = axis.source.logs
-    return open_log(path, **_reading(axis), channels=[axis.signals.output])
+    return open_log(path, **_reading(axis), channels=axis.signals.listed("output"))
 
 
 def open_even_or_uneven(axis: Axis) -> Log | UnevenLog:

@@ -70,6 +70,7 @@ def axis_schema() -> Schema:
         table.pop("required", None)
     found["$defs"]["LimitSection"]["required"] = ["quantity"]
     found["$defs"]["PublishSection"]["required"] = ["kind"]
+    found["$defs"]["ControllerSection"]["required"] = ["output", "input"]
     found["$defs"]["Axis"] = {key: found[key] for key in ("type", "additionalProperties", "description", "properties")}
     axes = {
         "description": "Several axes by name; the sections outside [axes] apply to all of them.",

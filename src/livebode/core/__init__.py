@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from livebode.core._frequency_response import PER_LINE, Quantity
     from livebode.core._kinds import PlotKind
     from livebode.core._loop import Loop
-    from livebode.core._matrix_responses import REASONS, MatrixResponses
+    from livebode.core._matrix_responses import CHANNELS_MAX, REASONS, MatrixResponses
     from livebode.core._plant_kinds import PlantKinds
     from livebode.core._plotting import plot_responses
     from livebode.core._response import PER_RESPONSE, Response, Responses, widened
@@ -69,6 +69,7 @@ _NAMES = {
     "_kinds": ("PlotKind",),
     "_loop": ("Loop",),
     "_matrix_responses": (
+        "CHANNELS_MAX",
         "REASONS",
         "MatrixResponses",
     ),
@@ -124,6 +125,7 @@ __getattr__ = on_first_use(__name__, _NAMES)
 logging.getLogger("livebode").addHandler(logging.NullHandler())
 
 __all__ = [
+    "CHANNELS_MAX",
     "LEFT_OUT",
     "NOT_WHOLE",
     "PER_LINE",

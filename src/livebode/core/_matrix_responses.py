@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+CHANNELS_MAX = 8
+"""Largest number of inputs, and of outputs."""
+
 REASONS = ("", "incomplete", "not excited", "not separated")
 """Why a column is invalid, by its number in `MatrixResponses.reason`; the first is that of a valid one."""
 

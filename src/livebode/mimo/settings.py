@@ -10,16 +10,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import Lines, Loop, Model, UsageError
+from livebode.core import CHANNELS_MAX, Lines, Loop, Model, UsageError
 from livebode.core.model import as_model
 from livebode.estimation.settings import nearest_hop
 
 Logged = Literal["before", "after"]
 Method = Literal["direct", "joint", "indirect"]
 Controllers = Sequence[Sequence[object]]
-
-CHANNELS_MAX = 8
-"""Largest number of inputs, and of outputs."""
 
 
 @dataclass(frozen=True)

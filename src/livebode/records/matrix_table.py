@@ -92,7 +92,7 @@ def covariance_rows(responses: MatrixResponses) -> Table:
     names = (*responses.outputs, *responses.inputs)
     row, column = np.concatenate([numbers[0], numbers[1] + len(responses.outputs)], axis=1)
     of = np.repeat([0, 1], [numbers[0].shape[1], numbers[1].shape[1]])
-    columns = [
+    columns: list[Any] = [
         np.repeat(responses.sample, lines * size),
         np.repeat(responses.time_s, lines * size),
         np.tile(np.repeat(responses.frequency_hz, size), rows),
@@ -161,7 +161,8 @@ class _Factors:
 def _matrix(table: Table, factors: _Factors, shape: MatrixShape) -> MatrixResponses:
     lines, outputs, inputs = len(shape.lines), len(shape.outputs), len(shape.inputs)
     whole = table.num_rows // shape.response_rows, lines, outputs, inputs
-    number = {name: table[name].reshape(whole) for name in ("first", "sample", "time_s", "dof", "coherence", "condition")}
+    names = ("first", "sample", "time_s", "dof", "coherence", "condition")
+    number = {name: table[name].reshape(whole) for name in names}
     first, sample, time_s, dof = (number[name][:, 0, 0, 0] for name in ("first", "sample", "time_s", "dof"))
     noise, spread = factors.of(sample)
     return MatrixResponses(

@@ -55,7 +55,7 @@ class QueryResult:
 
 
 def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
-    """The first rows of a query on the tables responses, covariance, parameters, samples, events, single_events and the tiers.
+    """The first rows of a query on the tables of rows, the events, single_events, and the tiers.
 
     Parameters
     ----------

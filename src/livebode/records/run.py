@@ -37,7 +37,7 @@ from livebode.records.matrix_run import (
     is_matrix,
     matrix_shape,
 )
-from livebode.records.matrix_table import COVARIANCE_SCHEMA, entry_rows, matrices
+from livebode.records.matrix_table import COVARIANCE_SCHEMA, MatrixShape, entry_rows, matrices
 from livebode.records.matrix_table import SCHEMA as MATRIX_SCHEMA
 from livebode.records.piece import StoredTable
 from livebode.records.response_table import EARLIER, SCHEMA, responses_in
@@ -117,8 +117,8 @@ class RunRecord:
     ) -> RunRecord:
         """The run in this directory; with `output_only` also one without responses, of which `lines` raises KeyError.
 
-        With `matrix` it may be a matrix run. With `entry`, such as "velocity2/u1", it must be one, and the result is the
-        view of that entry.
+        With `matrix` it may be a matrix run. With `entry`, such as "velocity2/u1", it must be one, and the result is
+        the view of that entry.
 
         Raises
         ------
@@ -204,20 +204,9 @@ class RunRecord:
         chosen = entry_named(str(self.path), self.summary, f"{output}/{input}")
         return replace(self, summary=entry_summary(self.summary, *chosen), selected=chosen)
 
-    def matrix(self) -> MatrixResponses:
-        """All matrices of a matrix run, as written; no rows before the first."""
-        shape = matrix_shape(self.summary, self.lines)
-        none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
-        return MatrixResponses.join(list(self.matrix_batches()) or list(none))
-
-    def matrix_batches(self) -> Iterator[MatrixResponses]:
-        """All readable matrices in order, in parts of bounded size.
-
-        Raises
-        ------
-        RecordError
-            If it is not a matrix run.
-        """
+    @property
+    def _matrix_shape(self) -> MatrixShape:
+        """Its lines and signals; RecordError if it is not a matrix run."""
         if not self.is_matrix:
             raise RecordError(
                 "no-matrix",
@@ -225,8 +214,24 @@ class RunRecord:
                 "read its responses",
                 path=str(self.path),
             )
-        shape = matrix_shape(self.summary, self.lines)
-        responses = self._whole(self.tables("responses"), shape.response_rows, (MATRIX_SCHEMA.names,))
+        return matrix_shape(self.summary, self.lines)
+
+    def matrix(self) -> MatrixResponses:
+        """All matrices of a matrix run, as written; no rows before the first. RecordError of another run."""
+        shape = self._matrix_shape
+        none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
+        return MatrixResponses.join(list(self.matrix_batches()) or list(none))
+
+    def matrix_batches(self, size_bytes_max: int | None = None) -> Iterator[MatrixResponses]:
+        """All readable matrices in order, in parts of bounded size; or the newest, from files up to this size.
+
+        Raises
+        ------
+        RecordError
+            If it is not a matrix run.
+        """
+        shape = self._matrix_shape
+        responses = self._whole(self.tables("responses", size_bytes_max), shape.response_rows, (MATRIX_SCHEMA.names,))
         covariance = self._whole(self.tables("covariance"), shape.covariance_rows, (COVARIANCE_SCHEMA.names,))
         yield from matrices(responses, covariance, shape)
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from livebode.configuration.axis import Axis
 from livebode.configuration.record_section import RecordSection
 from livebode.core import ConfigError, Event
-from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.matrix_pipeline import live_pipeline
 from livebode.runtime.run_control import RunControl
+from livebode.runtime.sample_pipeline import SamplePipeline
 from livebode.sources.live import LiveSource
 
 _KIND = "configuration-applied"
@@ -20,7 +21,7 @@ class ChangeRequest:
 
     sections: tuple[str, ...]
     record: RecordSection | None = None
-    pipeline: Pipeline | None = None
+    pipeline: SamplePipeline | None = None
 
     @property
     def event(self) -> Event:
@@ -83,4 +84,4 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> ChangeRequest 
     record, before = new.record or RecordSection(), old.record or RecordSection()
     if set(sections) <= {"record", "publish"} and record.samples == before.samples:
         return ChangeRequest(sections, record=record)
-    return ChangeRequest(sections, pipeline=Pipeline.live(new, source))
+    return ChangeRequest(sections, pipeline=live_pipeline(new, source))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from livebode.core import Block, Channel, Event, Parameters, Responses
+from livebode.core import Block, Channel, Event, MatrixResponses, Parameters, Responses
 
 if TYPE_CHECKING:
     from livebode.analysis.overview import Overview
@@ -89,6 +89,9 @@ class RunEnded:
     summary: Mapping[str, Any]
 
 
-Document = RunStarted | Channels | ClockSet | Responses | FitResults | Event | TrackerResults | RunEnded
-"""New `Responses` (when a run continues, first the newest previous ones), an `Event`, or one of the classes here."""
+Document = (
+    RunStarted | Channels | ClockSet | Responses | MatrixResponses | FitResults | Event | TrackerResults | RunEnded
+)
+"""New `Responses`, of a matrix run `MatrixResponses` (when a run continues, first the newest previous ones), an
+`Event`, or one of the classes here."""
 Subscriber = Callable[[Document], None]

@@ -9,6 +9,7 @@ import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from livebode.configuration.axis import NOT_RECORDED, Axis
 from livebode.configuration.record_section import RecordSection
@@ -18,14 +19,19 @@ from livebode.runtime import successors
 from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition, stream_position
 from livebode.runtime.destination import Destination
+from livebode.runtime.matrix_loop import MatrixRunLoop
+from livebode.runtime.matrix_pipeline import MatrixPipeline, live_pipeline
 from livebode.runtime.pipeline import Pipeline
 from livebode.runtime.provenance import provenance
 from livebode.runtime.recorded_run import source_of
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import Outcome, RunLoop
+from livebode.runtime.sample_loop import SampleLoop
+from livebode.runtime.sample_pipeline import SamplePipeline
 from livebode.sources.live import LiveSource
 from livebode.sources.live.replayable import ReplaySource
 
+AnyLoop = SampleLoop[Outcome]
 _logger = logging.getLogger(__name__)
 
 
@@ -38,7 +44,7 @@ def run_live(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     if position.left_at is not None:
         source.resume(position.left_at)
     with source.open(partial(_report_late, to)), contextlib.ExitStack() as finishing:
-        pipeline = Pipeline.live(axis, source)
+        pipeline = live_pipeline(axis, source)
         return _Succession(source, position, to, control, finishing).run(pipeline)
 
 
@@ -83,12 +89,12 @@ class _Succession:
         if isinstance(source, ReplaySource):
             self._relation.clock.pieces = list(source.clock.pieces)
 
-    def run(self, pipeline: Pipeline) -> Outcome:
+    def run(self, pipeline: SamplePipeline) -> Outcome:
         """The first run and all that follow, until the end."""
         with moments_by(self._relation.clock):
             return self._run(pipeline)
 
-    def _run(self, pipeline: Pipeline) -> Outcome:
+    def _run(self, pipeline: SamplePipeline) -> Outcome:
         from livebode.runtime.segmented import make_way  # needs a POSIX system
 
         directory, previous, force = self._to.directory, None, self._to.force
@@ -109,13 +115,13 @@ class _Succession:
                     outcome = loop.finish()
                     break
                 directory, force = successors.free(self._to.directory), False
-                previous = self._hand_over(loop, following, directory)
+                previous = self._hand_over(loop, pipeline, following, directory)
                 self._finish_beside(loop, leaving.pop_all())
                 pipeline = following
         loop.publish_end()
         return outcome
 
-    def _loop(self, pipeline: Pipeline, to: Destination, previous: PreviousRun | None) -> RunLoop:
+    def _loop(self, pipeline: SamplePipeline, to: Destination, previous: PreviousRun | None) -> AnyLoop:
         axis = pipeline.axis
         assert axis is not None
         about = {
@@ -125,28 +131,31 @@ class _Succession:
             **provenance(axis),
             "found": {"format": self._source.format, "rate_from": "the sender", "clock": "relative"},
         }
-        return RunLoop(
-            self._source,
-            pipeline,
-            to,
-            about=about,
-            segments=axis.record or RecordSection(),
-            again=False,
-            control=self._control,
-            position=self._position,
-            previous=previous,
-            relation=self._relation,
-        )
+        options: dict[str, Any] = {
+            "about": about,
+            "segments": axis.record or RecordSection(),
+            "again": False,
+            "control": self._control,
+            "position": self._position,
+            "previous": previous,
+            "relation": self._relation,
+        }
+        if isinstance(pipeline, MatrixPipeline):
+            return MatrixRunLoop(self._source, pipeline, to, **options)
+        assert isinstance(pipeline, Pipeline)
+        return RunLoop(self._source, pipeline, to, **options)
 
-    def _hand_over(self, loop: RunLoop, following: Pipeline, directory: Path) -> PreviousRun:
+    def _hand_over(
+        self, loop: AnyLoop, pipeline: SamplePipeline, following: SamplePipeline, directory: Path
+    ) -> PreviousRun:
         """End a run; the next one continues with as much of its state as possible."""
-        continues = following.take_over(loop.pipeline)
+        continues = following.take_over(pipeline)
         loop.end(directory.name, handed_over=continues)
         loop.publish_end()
-        counts = dict(following.follower.counts) if continues else {}
+        counts = dict(following.counts) if continues else {}
         return PreviousRun(loop.to.directory.name, *loop.position, counts)
 
-    def _finish_beside(self, loop: RunLoop, leaving: contextlib.ExitStack) -> None:
+    def _finish_beside(self, loop: AnyLoop, leaving: contextlib.ExitStack) -> None:
         """Draw its pictures and close it while the next one continues."""
 
         def finish() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from livebode.configuration.axis import Axis
-from livebode.core import Channel, LivebodeError, SignalError, Stateful, nearest_name
+from livebode.core import Channel, Lines, LivebodeError, SignalError, Stateful, nearest_name
 from livebode.estimation import Settings, plant_kinds
 from livebode.estimation.stream_estimator import Follower
 from livebode.fitting import RecordingsMean
@@ -15,6 +15,7 @@ from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection, change_detection
 from livebode.runtime.fits import Fits
 from livebode.runtime.readiness import Readiness
+from livebode.runtime.sample_pipeline import SamplePipeline
 from livebode.sources.live import LiveSource
 
 
@@ -61,18 +62,29 @@ class Pipeline:
         """The same for a live source, whose channels and rate are known; LivebodeError if they do not fit."""
         follower = live_follower(axis, source.rate_hz, source.spectra)
         pipeline = cls.of(axis, follower, source.channels, samples=source.spectra is None)
-        names = [channel.name for channel in source.channels]
-        for name in pipeline.channels:
-            if name not in names:
-                computed = ", and a live source computes no expressions" if set(name) & set("+-*/(") else ""
-                raise SignalError(
-                    "channel-unknown",
-                    f"there is no channel {name!r}{computed}",
-                    nearest_name(name, names),
-                    channel=name,
-                    allowed=names,
-                )
+        check_channels(pipeline.channels, source)
         return pipeline
+
+    @property
+    def lines(self) -> Lines:
+        """Lines of the responses."""
+        return self.follower.settings.lines
+
+    @property
+    def step(self) -> int:
+        """Samples between responses."""
+        return self.follower.settings.step
+
+    @property
+    def reference(self) -> str:
+        """The channel whose power is that of the excitation."""
+        settings = self.follower.settings
+        return settings.channel(settings.method.reference) or ""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counts of the follower."""
+        return self.follower.counts
 
     @property
     def signals(self) -> list[str]:
@@ -99,15 +111,17 @@ class Pipeline:
         }
         return {"tracker": self.follower} | {name: part for name, part in optional.items() if part}
 
-    def take_over(self, before: Pipeline) -> bool:
+    def take_over(self, before: SamplePipeline) -> bool:
         """Continue with the state of the previous one, if the settings that it depends on are unchanged.
 
         Returns whether the follower continues, so that no window is lost; else it begins again.
         """
         try:
-            self.follower.restore(before.follower.snapshot())
+            self.follower.restore(before.parts["tracker"].snapshot())
         except LivebodeError:
             return False
+        if not isinstance(before, Pipeline):
+            return True
         if self.readiness and before.readiness and self.readiness.condition == before.readiness.condition:
             self.readiness.take_over(before.readiness)
         if self._same(before, "signals", "tracking", "loop", "motion"):
@@ -119,6 +133,21 @@ class Pipeline:
 
     def _same(self, other: Pipeline, *sections: str) -> bool:
         return all(getattr(self.axis, name) == getattr(other.axis, name) for name in sections)
+
+
+def check_channels(used: Sequence[str], source: LiveSource) -> None:
+    """SignalError if a live source has not all of these channels."""
+    names = [channel.name for channel in source.channels]
+    for name in used:
+        if name not in names:
+            computed = ", and a live source computes no expressions" if set(name) & set("+-*/(") else ""
+            raise SignalError(
+                "channel-unknown",
+                f"there is no channel {name!r}{computed}",
+                nearest_name(name, names),
+                channel=name,
+                allowed=names,
+            )
 
 
 def _readiness(axis: Axis, settings: Settings) -> Readiness | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol, Self
 
 from livebode.configuration.record_section import RecordSection
-from livebode.core import Block, Event, Responses
+from livebode.core import Block, Event, MatrixResponses, Responses
 from livebode.runtime.documents import Document
 
 
@@ -42,6 +42,9 @@ class Recorder(Protocol):
 
     def previous(self) -> Iterator[Responses]:
         """The newest responses of the run that it continues."""
+
+    def previous_matrices(self) -> Iterator[MatrixResponses]:
+        """The same of a matrix run."""
 
     def pieces(self, block: Block) -> Iterator[Block]:
         """The samples of a Block that are not in the record yet, in Blocks that are short enough for a commit."""

@@ -37,7 +37,7 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
         return run_uneven(axis, opened, to, control, started)
     log = configured_part(axis, opened)
     follower = make_follower(axis, log)
-    log = log.naming([name for name in axis.signals.model_dump().values() if name])
+    log = log.naming(axis.signals.named)
     pipeline = Pipeline.of(axis, follower, log.channels)
     log = log.naming(pipeline.channels)  # with the covariates of a baseline
     to.prepare()

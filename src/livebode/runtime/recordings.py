@@ -108,8 +108,7 @@ def _prepared(axis: Axis) -> list[_Part]:
         own = axis.model_copy(update={"source": axis.source.model_copy(update={"log": path})})
         with located(path):
             log = configured_part(own, open_recording(own))
-            signals = [name for name in axis.signals.model_dump().values() if name]
-            log = log.naming(list(dict.fromkeys([*signals, *axis.monitoring.covariates])))
+            log = log.naming(list(dict.fromkeys([*axis.signals.named, *axis.monitoring.covariates])))
             settings = make_settings(own, log)
             if parts:
                 check_same(parts[0].log, parts[0].tracker.settings, log, settings)

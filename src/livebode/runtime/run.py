@@ -41,5 +41,9 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
         from livebode.runtime.live import run_live
 
         return run_live(axis, to, control)
+    if axis.signals.is_matrix:
+        from livebode.runtime.matrix_recording import run_matrix_recording
+
+        return run_matrix_recording(axis, to, control)
     recording = run_recordings if len(axis.source.logs) > 1 else run_recording
     return recording(axis, to, control)

@@ -8,7 +8,7 @@ from typing import Any
 
 from livebode.configuration.record_section import RecordSection
 from livebode.core import Event
-from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.sample_pipeline import SamplePipeline
 from livebode.sources.live import Health, LiveSource
 
 EVENTS_MAX = 64
@@ -25,7 +25,7 @@ class RunControl:
         self._lock = threading.Lock()
         self._events: list[Event] = []
         self._messages: list[tuple[str, str, dict[str, Any]]] = []
-        self._next: Pipeline | None = None
+        self._next: SamplePipeline | None = None
         self._record_section: RecordSection | None = None
         self._source: LiveSource | None = None
         self.ended = False
@@ -67,7 +67,7 @@ class RunControl:
         with self._lock:
             self._record_section = section
 
-    def change(self, pipeline: Pipeline, event: Event) -> None:
+    def change(self, pipeline: SamplePipeline, event: Event) -> None:
         """Finish the run after the present Block, with this event at its end, and continue in another one.
 
         The newest request is used.
@@ -93,7 +93,7 @@ class RunControl:
         source = self.source
         return None if source is None else source.health
 
-    def take_next(self) -> Pipeline | None:
+    def take_next(self) -> SamplePipeline | None:
         """The pipeline to continue with, once."""
         with self._lock:
             taken, self._next = self._next, None

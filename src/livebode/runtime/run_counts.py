@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from livebode.core import Responses
+from livebode.core import MatrixResponses, Responses
 from livebode.core.state import Stage, decode, encode, restore_parts
 from livebode.preparation.checks import ChannelCheck
 from livebode.runtime.continuing import PreviousRun
@@ -56,10 +56,10 @@ class RunCounts:
     def run_s(self) -> float:
         return time.perf_counter() - self._started
 
-    def take(self, responses: Responses, tracked_s: float) -> None:
+    def take(self, responses: Responses | MatrixResponses, tracked_s: float) -> None:
         """Count the results of a step, and the tracker's processing time in seconds."""
         self.responses += len(responses)
-        self.invalid += int(np.count_nonzero(~responses.valid.all(axis=1)))
+        self.invalid += int(np.count_nonzero(~responses.valid.all(axis=tuple(range(1, responses.valid.ndim)))))
         self.valid_lines += int(np.count_nonzero(responses.valid))
         self.tracked_s += tracked_s
 

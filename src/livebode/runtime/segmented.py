@@ -18,6 +18,7 @@ from livebode.core import (
     Channel,
     Event,
     LivebodeError,
+    MatrixResponses,
     RecordError,
     Responses,
     Spectra,
@@ -27,8 +28,9 @@ from livebode.core import (
 from livebode.core.clock import RunClock
 from livebode.core.files import whole_files
 from livebode.core.writing import why, writing
-from livebode.records import PARAMETERS, RESPONSES, RunRecord, to_json
+from livebode.records import COVARIANCE, MATRIX_RESPONSES, PARAMETERS, RESPONSES, RunRecord, to_json
 from livebode.records.inside import check_folder
+from livebode.records.matrix_run import is_matrix
 from livebode.records.removal import check_removable, remove
 from livebode.records.sample_table import samples_of
 from livebode.records.segments.journal import FOLDER
@@ -37,6 +39,7 @@ from livebode.records.segments.lock import Lock
 from livebode.records.segments.shelf import Tiers, no_tiers
 from livebode.records.segments.store import Store
 from livebode.records.segments.writer import Writer
+from livebode.records.table_file import ColumnTable
 from livebode.records.tiers import Thinning
 from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
 from livebode.runtime.documents import Document, FitResults
@@ -114,9 +117,7 @@ class SegmentedRecord:
         self._parts = dict(parts) | ({} if position is None else {SOURCE: position})
         self._force, self._again, self._ends, self._publish = force, again, ends, publish
         self._samples = samples_of(channels) if section.samples else None
-        tables = {"responses": RESPONSES, "parameters": PARAMETERS} | (
-            {"samples": self._samples} if self._samples else {}
-        )
+        tables = _tables(self._summary) | ({"samples": self._samples} if self._samples else {})
         self._reported: deque[Event] = deque()
         self._store = Store(path, tables, self._limits(section), self._reported.append, _tiers(self._summary))
         self._writer, self._unwritten = Writer(), Unwritten()
@@ -153,6 +154,8 @@ class SegmentedRecord:
         match document:
             case Responses() if len(document):
                 self._unwritten.responses.append(document)
+            case MatrixResponses() if len(document):
+                self._unwritten.matrices.append(document)
             case FitResults(parts):
                 self._unwritten.parameters.extend(part for part in parts if len(part))
             case Event():
@@ -185,6 +188,11 @@ class SegmentedRecord:
             newest = run.batches(_SEEN_AGAIN_BYTES)
             yield next(newest, None) or run.responses()  # an empty batch contains the lines, unlike no run
             yield from newest
+
+    def previous_matrices(self) -> Iterator[MatrixResponses]:
+        """The newest matrices of the continued run."""
+        if self._continued or "continues" in self._more:
+            yield from RunRecord.open(self.path, self._found_damaged, matrix=True).matrix_batches(_SEEN_AGAIN_BYTES)
 
     @property
     def phase(self) -> float:
@@ -328,7 +336,7 @@ class SegmentedRecord:
         return {name: part.snapshot() for name, part in self._parts.items()}
 
     def _restore(self, states: Mapping[str, bytes]) -> None:
-        before = RunRecord.open(self.path, self._found_damaged).summary
+        before = RunRecord.open(self.path, self._found_damaged, matrix=True).summary
         now = json.loads(to_json(self._summary))
         check_same_run(self.path, before, now, states, self._parts)
         for name, part in self._parts.items():
@@ -345,11 +353,17 @@ class SegmentedRecord:
         return self._more | summary
 
 
+def _tables(summary: Mapping[str, Any]) -> dict[str, ColumnTable]:
+    if is_matrix(summary):
+        return {"responses": MATRIX_RESPONSES, "covariance": COVARIANCE}
+    return {"responses": RESPONSES, "parameters": PARAMETERS}
+
+
 def _tiers(summary: Mapping[str, Any]) -> Tiers:
-    """Means of old responses; none of responses that are averages already, which contain each other."""
+    """Means of old responses; none of matrices, or of averages, which contain each other."""
     averages = (summary.get("configuration", {}).get("tracking") or {}).get("average")
     found = summary.get("found") or {}
-    return no_tiers if averages or "bins" not in found else Thinning(found).tables
+    return no_tiers if averages or is_matrix(summary) or "bins" not in found else Thinning(found).tables
 
 
 def make_way(path: Path) -> None:

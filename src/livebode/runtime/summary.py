@@ -40,10 +40,10 @@ def versions() -> dict[str, str | int]:
     }
 
 
-def done(tracker: Follower, run: RunCounts) -> dict[str, Any]:
-    """Entries at the end: counts and speed."""
-    counts, run_s = run.counts(tracker.counts), run.run_s
-    recorded_s = counts["samples"] / tracker.settings.lines.rate_hz
+def done(tracked: Mapping[str, int], rate_hz: float, run: RunCounts) -> dict[str, Any]:
+    """Entries at the end: counts and speed; `tracked` are the counts of the tracker."""
+    counts, run_s = run.counts(tracked), run.run_s
+    recorded_s = counts["samples"] / rate_hz
     speed = {
         "recorded_s": recorded_s,
         "run_s": run_s,

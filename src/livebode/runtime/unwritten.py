@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from livebode.core import Block, Event, Parameters, Responses
-from livebode.records import as_batch, parameter_rows
+from livebode.core import Block, Event, MatrixResponses, Parameters, Responses
+from livebode.records import as_batch, covariance_rows, matrix_rows, parameter_rows
 from livebode.records.sample_table import as_rows
 from livebode.records.segments.store import Store
 from livebode.records.table_file import ColumnTable
@@ -17,6 +17,7 @@ class Unwritten:
 
     blocks: list[Block] = field(default_factory=list)
     responses: list[Responses] = field(default_factory=list)
+    matrices: list[MatrixResponses] = field(default_factory=list)
     parameters: list[Parameters] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
 
@@ -26,6 +27,10 @@ class Unwritten:
             store.write("samples", as_rows(self.blocks, samples))
         if self.responses:
             store.write("responses", as_batch(Responses.join(self.responses)))
+        if self.matrices:
+            matrices = MatrixResponses.join(self.matrices)
+            store.write("responses", matrix_rows(matrices))
+            store.write("covariance", covariance_rows(matrices))
         for parameters in self.parameters:
             store.write("parameters", parameter_rows(parameters))
         for event in self.events:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from livebode.configuration.record_section import RecordSection
-from livebode.core import Block, Event, Responses
+from livebode.core import Block, Event, MatrixResponses, Responses
 from livebode.records import RunDirectory
 from livebode.runtime.documents import Document, FitResults
 
@@ -22,6 +22,9 @@ class RecordInOnePiece:
     begun = None
 
     def previous(self) -> Iterator[Responses]:
+        return iter(())
+
+    def previous_matrices(self) -> Iterator[MatrixResponses]:
         return iter(())
 
     def pieces(self, block: Block) -> Iterator[Block]:
@@ -52,9 +55,9 @@ class RecordInOnePiece:
 class WholeRecord(RecordInOnePiece):
     """Writes the documents of a run to a `RunDirectory`; an exception leaves nothing behind."""
 
-    def __init__(self, path: Path, *, force: bool, responses: bool = True) -> None:
+    def __init__(self, path: Path, *, force: bool, responses: bool = True, matrix: bool = False) -> None:
         self.path = path
-        self._directory = RunDirectory(path, force=force, responses=responses)
+        self._directory = RunDirectory(path, force=force, responses=responses, matrix=matrix)
 
     def __enter__(self) -> Self:
         self._directory.__enter__()
@@ -67,6 +70,8 @@ class WholeRecord(RecordInOnePiece):
         match document:
             case Responses():
                 self._directory.write(document)
+            case MatrixResponses():
+                self._directory.write_matrices(document)
             case FitResults(parts):
                 self._directory.write_parameters(*parts)
             case Event():
