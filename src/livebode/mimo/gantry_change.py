@@ -49,7 +49,7 @@ class Cause:
     def sentence(self) -> str:
         """As text."""
         if self.part == CART_PLACE:
-            return f"the cart is {abs(self.amount):.3g} ± {self.bound:.2g} m from its place in the baseline"
+            return f"the cart is {abs(self.amount):.3g} ± {self.bound:.2g} m from its specified place"
         way = "less" if self.amount < 0 else "more"
         if self.before > 0:
             share, bound = 100 * abs(self.amount) / self.before, 100 * self.bound / self.before

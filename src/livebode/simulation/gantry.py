@@ -54,7 +54,7 @@ class Gantry:
     right_damping_n_s_per_m: float | None = None
 
     def __post_init__(self) -> None:
-        names = (
+        names: tuple[str, ...] = (
             "motor_inertia_kg_m2",
             "radius_m",
             "stiffness_n_per_m",
