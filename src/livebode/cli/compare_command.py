@@ -6,7 +6,7 @@ import re
 from datetime import UTC, datetime
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -44,6 +44,18 @@ def compare_command(
         typer.Option(metavar="SIZE", help="Smallest change of a line that matters, as 0.5dB or 5%. \\[default: any]"),
     ] = None,
     entry: Entry = None,
+    gantry: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Of two matrix runs: the gantry in TOML, to name the part that changed.",
+            parser=location,
+        ),
+    ] = None,
+    cart: Annotated[
+        str | None,
+        typer.Option(metavar="BEFORE:AFTER", help="With --gantry: places of its cart in m. \\[default: as described]"),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     template: Template = None,
     machine: Machine = None,
@@ -74,8 +86,16 @@ def compare_command(
     from livebode.reporting.matrix_comparison import MatrixComparison, both_matrices
 
     if entry is None and out is None and (pair := both_matrices(before, after)) is not None:
-        _show_matrices(MatrixComparison.of(*pair, ignore_below=_share(ignore_below)), as_json)
+        machine_options = _described(gantry, cart)
+        _show_matrices(MatrixComparison.of(*pair, ignore_below=_share(ignore_below), **machine_options), as_json)
         return
+    if gantry is not None or cart is not None:
+        raise UsageError(
+            "conflict",
+            "a gantry is compared by all entries of two matrix runs",
+            "leave out --gantry and --cart, or --out and --entry",
+            argument="gantry",
+        )
     found = Comparison.of(before, after, ignore_below=_share(ignore_below), entry=entry)
     files: list[Path] = []
     remark = ""
@@ -101,6 +121,30 @@ def compare_command(
         print(found.changes.parameter_words)
     for line in filter(None, (*files, remark)):
         print(line)
+
+
+def _described(gantry: Path | None, cart: str | None) -> dict[str, Any]:
+    """The gantry, and places of its cart."""
+    from livebode.analysis.matrices import read_gantry
+
+    if gantry is None:
+        if cart is not None:
+            raise UsageError("missing", "--cart belongs to --gantry, which is missing", "add --gantry FILE",
+                             argument="gantry")  # fmt: skip
+        return {}
+    if cart is None:
+        return {"gantry": read_gantry(gantry)}
+    try:
+        before, after = (float(part) for part in cart.split(":"))
+    except ValueError:
+        raise UsageError(
+            "unreadable",
+            f"the places {cart!r} are not BEFORE:AFTER in m",
+            "write for example 0.2:0.3",
+            argument="cart",
+            value=cart,
+        ) from None
+    return {"gantry": read_gantry(gantry), "cart_m": (before, after)}
 
 
 def _show_matrices(found: MatrixComparison, as_json: bool) -> None:

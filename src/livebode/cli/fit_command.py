@@ -14,6 +14,7 @@ from livebode.locations import location
 
 if TYPE_CHECKING:
     from livebode.configuration.fit_section import FitSection
+    from livebode.fitting.common_poles import CommonPoles
     from livebode.fitting.pole_search import Kind
     from livebode.records import RunRecord
 
@@ -69,8 +70,8 @@ def fit_command(
 ) -> None:
     """Fit a model to the response of a run, and print its parameters with bounds.
 
-    With modal or rational the outputs of several runs have their poles in common. Defaults are from the run's \\[fit]
-    section. Exit code 3 if no model fits.
+    With modal or rational the outputs of several runs have their poles in common, and so do all entries of a matrix run
+    (rational by default). Defaults are from the run's \\[fit] section. Exit code 3 if no model fits.
     """
     from livebode.fitting import POLE_MODELS
     from livebode.fitting.pole_search import Kind
@@ -87,11 +88,24 @@ def fit_command(
         "hold": hold,
     }
     specified = {name: value for name, value in given.items() if value is not None}
+    if not entry and (model is None or model in POLE_MODELS) and (matrix := _matrix(directories)) is not None:
+        _fit_matrix(matrix, cast(Kind, model or "rational"), specified, order, as_json)
+        return
     runs = _opened(directories, entry or [])
     if model in POLE_MODELS:
         _fit_poles(runs, cast(Kind, model), specified, order, as_json)
     else:
         _fit_physical(runs, specified, order, as_json)
+
+
+def _matrix(directories: list[Path]) -> RunRecord | None:
+    """The matrix run, if it is one."""
+    from livebode.records import RunRecord
+
+    if len(directories) > 1:
+        return None
+    run = RunRecord.open(directories[0], matrix=True)
+    return run if run.is_matrix else None
 
 
 def _opened(directories: list[Path], entries: list[str]) -> list[RunRecord]:
@@ -144,11 +158,27 @@ def _fit_poles(
     runs: list[RunRecord], model: Kind, specified: dict[str, Any], order: int | None,
     as_json: bool,
 ) -> None:  # fmt: skip
-    from livebode.analysis.poles import fit_poles, plain_poles
-    from livebode.cli.pictures import show_poles
+    from livebode.analysis.poles import fit_poles
     from livebode.configuration.recorded import recorded_configuration
-    from livebode.records import to_json
 
+    _check_options(model, specified)
+    own = recorded_configuration(runs[0].summary).get("fit", {})
+    kept = {name: own[name] for name in ("band_hz", "hold") if name in own}
+    section = _section(runs[0].path, kept | {name: specified[name] for name in specified if name != "model"})
+    _show_poles(*fit_poles(runs, model, section, order), as_json)
+
+
+def _fit_matrix(
+    run: RunRecord, model: Kind, specified: dict[str, Any], order: int | None, as_json: bool
+) -> None:  # fmt: skip
+    from livebode.analysis.matrices import fit_matrix_run
+
+    _check_options(model, specified)
+    section = _section(run.path, {name: specified[name] for name in specified if name != "model"})
+    _show_poles(*fit_matrix_run(run, model, section, order), as_json)
+
+
+def _check_options(model: Kind, specified: dict[str, Any]) -> None:
     if other := sorted(specified.keys() - {"model", "band_hz", "hold"}):
         raise UsageError(
             "conflict",
@@ -157,10 +187,13 @@ def _fit_poles(
             argument=other[0],
             model=model,
         )
-    own = recorded_configuration(runs[0].summary).get("fit", {})
-    kept = {name: own[name] for name in ("band_hz", "hold") if name in own}
-    section = _section(runs[0].path, kept | {name: specified[name] for name in specified if name != "model"})
-    found, remarks = fit_poles(runs, model, section, order)
+
+
+def _show_poles(found: CommonPoles, remarks: list[str], as_json: bool) -> None:
+    from livebode.analysis.poles import plain_poles
+    from livebode.cli.pictures import show_poles
+    from livebode.records import to_json
+
     if as_json:
         print(to_json(plain_poles(found, remarks)))
     else:

@@ -221,18 +221,26 @@ def fit_common_poles(
     >>> found.order, round(found["frequency_1"], 1), found["damping_1"] < 0.1
     (1, 59.4, True)
     """
-    _check(model, order)
+    check_model(model, order)
     batches = [mean_response(one) if isinstance(one, Responses) else Responses.of(one) for one in measured]
     names = tuple(outputs or (f"y{k + 1}" for k in range(len(batches))))
-    outs = _outputs(batches, names, band_hz, hold)
+    outs = outputs_of(batches, names, band_hz, hold)
     best = search(outs, model, order)
-    found = best[0] if best else None
+    return assembled(outs, best, names, batches, model, specified=order is not None)
+
+
+def assembled(
+    outs: Outputs, best: Sequence[Separated], names: tuple[str, ...], batches: Sequence[Responses], model: Kind, *,
+    specified: bool, covariance: Floats | None = None,
+) -> CommonPoles:  # fmt: skip
+    """The first of these fits with its quantities; `covariance` by default with independent outputs."""
     blank = _Blank(model, names, batches)
-    if found is None:
+    if not best:
         return blank.without_fit(outs)
+    found = best[0]
     raw = np.concatenate([found.theta, found.linear.ravel()])
     quantities = PoleQuantities(found.structure, outs.unit, names, blank.units, raw)
-    covariance = whole_covariance(outs, found)
+    covariance = whole_covariance(outs, found) if covariance is None else covariance
     parameters = blank.parameters(quantities, outs, found, covariance)
     rest = np.where(outs.measured.use, outs.measured.value - found.response, 0.0) * found.weight
     correlated = np.array([neighbours(one[use]) for one, use in zip(rest, outs.measured.use)])
@@ -240,7 +248,7 @@ def fit_common_poles(
     return CommonPoles(
         model, names, blank.units, found, outs.grid, outs.unit, tuple((_order(one, model), one.cost) for one in best),
         parameters, found.epsilon, _reduced_chi2(outs, found), correlated,
-        tuple(name for name, one in zip(names, correlated > limit) if one), order is not None, covariance,
+        tuple(name for name, one in zip(names, correlated > limit) if one), specified, covariance,
     )  # fmt: skip
 
 
@@ -248,7 +256,7 @@ def _order(found: Separated, model: Kind) -> int:
     return found.structure.pairs if model == "modal" else found.structure.poles
 
 
-def _check(model: str, order: int | None) -> None:
+def check_model(model: str, order: int | None) -> None:
     if model not in POLE_MODELS:
         raise UsageError(
             "not-one-of", f"{model=} is not supported", "choose 'modal' or 'rational'", argument="model", value=model,
@@ -261,9 +269,10 @@ def _check(model: str, order: int | None) -> None:
         )  # fmt: skip
 
 
-def _outputs(
-    batches: list[Responses], names: tuple[str, ...], band_hz: tuple[float, float] | None, hold: Hold
+def outputs_of(
+    batches: Sequence[Responses], names: tuple[str, ...], band_hz: tuple[float, float] | None, hold: Hold
 ) -> Outputs:
+    """Lines of all outputs inside of a band."""
     lines = batches[0].lines
     for name, one in zip(names, batches):
         if one.lines.rate_hz != lines.rate_hz or not np.array_equal(one.lines.frequency_hz, lines.frequency_hz):
@@ -295,7 +304,7 @@ def _reduced_chi2(outs: Outputs, found: Separated) -> Floats:
 class _Blank:
     """What a result has whether or not the fit is valid."""
 
-    def __init__(self, model: Kind, names: tuple[str, ...], batches: list[Responses]) -> None:
+    def __init__(self, model: Kind, names: tuple[str, ...], batches: Sequence[Responses]) -> None:
         self._model, self._names, self._first = model, names, batches[0]
         self.units = tuple(one.unit for one in batches)
 

@@ -19,7 +19,7 @@ def example_matrix_responses() -> MatrixResponses:
     """
     lines = Lines.parse("10:40:5", rate_hz=4000, window=800)
     excitation = MatrixExcitation.orthogonal(lines, 2, 0.5, dwell=3, settle=2)
-    w = np.tile(excitation.samples, 4)
+    w = np.tile(excitation.samples, 8)
     noise = 0.05 * np.random.default_rng(0).standard_normal((3, w.shape[1]))
     settings = MatrixSettings(
         lines=lines,

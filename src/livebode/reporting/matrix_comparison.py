@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from livebode.core import GridError
+from livebode.core import FitError, GridError, MatrixResponses
+from livebode.mimo import compare_gantries, compare_matrices
 from livebode.records import RunRecord
 from livebode.reporting.compare_report import Comparison
+from livebode.simulation import Gantry
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,10 +22,20 @@ class MatrixComparison:
     """
 
     entries: Mapping[str, Comparison]
+    whole: tuple[str, ...]
+    """Sentences about all entries together: which one changed most, or which part of a described machine."""
 
     @classmethod
-    def of(cls, before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0) -> MatrixComparison:
-        """Read and compare two matrix runs.
+    def of(
+        cls,
+        before: RunRecord,
+        after: RunRecord,
+        *,
+        ignore_below: float = 0.0,
+        gantry: Gantry | None = None,
+        cart_m: tuple[float, float] | None = None,
+    ) -> MatrixComparison:
+        """Read and compare two matrix runs; `gantry` and `cart_m` as in `compare_gantries`.
 
         Raises
         ------
@@ -47,14 +59,16 @@ class MatrixComparison:
             {
                 name: Comparison.between(*pair, ignore_below=ignore_below, together=together)
                 for name, pair in pairs.items()
-            }
+            },
+            _whole(before.matrix(), after.matrix(), gantry, cart_m),
         )
 
     @property
     def sentences(self) -> list[str]:
         """The verdicts on all entries, those that differ first."""
         order = sorted(self.entries, key=lambda name: not self.entries[name].found.overall.differs.any())
-        return [f"{name}: {finding.text}" for name in order for finding in self.entries[name].sentences]
+        each = [f"{name}: {finding.text}" for name in order for finding in self.entries[name].sentences]
+        return [*self.whole, *each]
 
     @property
     def tables(self) -> list[str]:
@@ -72,6 +86,20 @@ class MatrixComparison:
             "differing": [name for name, one in self.entries.items() if one.found.overall.differs.any()],
             "sentences": self.sentences,
         }
+
+
+def _whole(
+    before: MatrixResponses, after: MatrixResponses, gantry: Gantry | None, cart_m: tuple[float, float] | None
+) -> tuple[str, ...]:
+    try:
+        if gantry is None:
+            return (f"all entries: {compare_matrices(before, after).sentence}",)
+        found = compare_gantries(before, after, gantry, cart_m=cart_m)
+        return tuple(f"gantry: {sentence}" for sentence in found.sentences)
+    except (FitError, GridError) as error:
+        if gantry is not None:
+            raise
+        return (f"all entries: not compared together: {error}",)
 
 
 def both_matrices(before: Path, after: Path) -> tuple[RunRecord, RunRecord] | None:

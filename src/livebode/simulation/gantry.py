@@ -21,7 +21,8 @@ class Gantry(LinearMechanism):
 
     Coordinates are the angles φ1, φ2 of the motors, the position Y of the beam's centre and its yaw angle θ, which is
     small: the ends of the beam are at Y ± d·θ, and the cart, at x from the centre, is at Y + x·θ. Each belt is a spring
-    and a damper between r·φ and its end of the beam; the guides resist yaw.
+    and a damper between r·φ and its end of the beam; the guides resist yaw. The left belt is that of motor 1, at Y +
+    d·θ; the right one is like it unless specified.
 
     Parameters
     ----------
@@ -35,6 +36,8 @@ class Gantry(LinearMechanism):
         Of the guides, per radian of yaw.
     cart_kg, cart_m
         Mass of the cart, and its place from the centre of the beam.
+    right_stiffness_n_per_m, right_damping_n_s_per_m
+        Of the right belt; default: as the left one.
 
     Raises
     ------
@@ -59,9 +62,11 @@ class Gantry(LinearMechanism):
     yaw_damping_n_m_s: float = 20.0
     cart_kg: float = 6.0
     cart_m: float = 0.2
+    right_stiffness_n_per_m: float | None = None
+    right_damping_n_s_per_m: float | None = None
 
     def __post_init__(self) -> None:
-        names = (
+        names: tuple[str, ...] = (
             "motor_inertia_kg_m2",
             "radius_m",
             "stiffness_n_per_m",
@@ -69,6 +74,7 @@ class Gantry(LinearMechanism):
             "beam_inertia_kg_m2",
             "half_width_m",
         )
+        names += ("right_stiffness_n_per_m",) * (self.right_stiffness_n_per_m is not None)
         for name in names:
             if not getattr(self, name) > 0:
                 raise UsageError(
@@ -95,11 +101,19 @@ class Gantry(LinearMechanism):
         mass += self.cart_kg * np.outer(cart, cart)
         r, d = self.radius_m, self.half_width_m
         belts = np.array([[r, 0.0, -1.0, -d], [0.0, r, -1.0, d]])
-        pull = belts.T @ belts
-        damping = self.damping_n_s_per_m * pull
+        springs, dampers = ([left, left if right is None else right] for left, right in self._belts)
+        damping = belts.T @ np.diag(dampers) @ belts
         damping += np.diag([self.motor_viscous_n_m_s, self.motor_viscous_n_m_s, 0.0, self.yaw_damping_n_m_s])
-        stiffness = self.stiffness_n_per_m * pull + np.diag([0.0, 0.0, 0.0, self.yaw_stiffness_n_m])
+        stiffness = belts.T @ np.diag(springs) @ belts + np.diag([0.0, 0.0, 0.0, self.yaw_stiffness_n_m])
         return mass, damping, stiffness
+
+    @property
+    def _belts(self) -> tuple[tuple[float, float | None], tuple[float, float | None]]:
+        """Stiffness and damping of the left and the right belt."""
+        return (
+            (self.stiffness_n_per_m, self.right_stiffness_n_per_m),
+            (self.damping_n_s_per_m, self.right_damping_n_s_per_m),
+        )
 
     @property
     def torque_map(self) -> Floats:
