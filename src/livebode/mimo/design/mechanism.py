@@ -52,6 +52,14 @@ class MechanismMachine(MatrixMachine):
                 "describe one motor as [belt]",
                 argument="input_shapes",
             )
+        finite = all(np.isfinite(one).all() for one in (*self.loop.mechanism.state_space, *self.loop.matrices))
+        if not finite or not np.any(self.response([1.0])):
+            raise UsageError(
+                "out-of-range",
+                "a value of the described machine or its drives is not finite, or too large or small to compute with",
+                "correct it",
+                argument="loop",
+            )
         if not self.loop.decay < 1:
             raise UsageError(
                 "out-of-range",
