@@ -90,6 +90,7 @@ def _phases(kind: Kind, lines: Lines, inputs: int, seed: int) -> Floats:
     return phases
 
 
+@np.errstate(all="ignore")  # what cannot be computed with is found at the end
 def _at(
     kind: Kind,
     spec: MatrixSpec,

@@ -43,6 +43,7 @@ class MechanismMachine(MatrixMachine):
     noise: float | Sequence[float]
     torque_constant_n_m_per_a: float | Sequence[float] | None = None
 
+    @np.errstate(all="ignore")  # numbers that are not finite are found
     def __post_init__(self) -> None:
         each_of(self.noise, len(self.outputs), "noise", "output")
         if not 2 <= len(self.inputs) <= CHANNELS_MAX:
