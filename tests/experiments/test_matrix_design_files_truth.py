@@ -190,6 +190,12 @@ def test_a_machine_of_modes_is_designed_for_the_time(tmp_path: Path) -> None:
         (("torque_n_m_max = [3.0, 2.0]", "torque_n_m_max = [3.0, 2.0, 1.0]"), "3 values for 2 motors"),
         (("[limits]", "[limitz]"), "limitz"),
         (("window = 800", ""), "excitation.window"),
+        (("cart_m = 0.2", "cart_kg = inf"), "not finite"),
+        (("cart_m = 0.2", "damping_n_s_per_m = nan"), "not finite"),
+        (("cart_m = 0.2", "motor_inertia_kg_m2 = 1e300"), "too large or small"),
+        (("noise = [0.05, 0.05, 0.001]", "noise = 1e300"), "too large or small"),
+        (("current_a_max = 5.0", "current_a_max = 1e-300"), "too large or small"),
+        (("rate_hz = 4000", "rate_hz = 1e-300"), "too large or small"),
         (('lines = "10:60:5"', 'lines = "10:60:3"'), "grid"),
     ],
 )

@@ -104,7 +104,7 @@ class MotorLoop(ABC):
         contains.
         """
         values = np.linalg.eigvals(self.matrices[0])
-        return float(np.abs(values[np.abs(values - 1) > _AT_REST]).max())
+        return float(np.abs(values[np.abs(values - 1) > _AT_REST]).max(initial=0.0))
 
     def settle_periods(self, window: int, remaining: float = 1e-9) -> int:
         """Whole periods after which this share of a transient remains: the `settle` of an experiment."""

@@ -8,7 +8,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Lines
+from livebode.core import DesignError, Lines, UsageError
 from livebode.excitation import low_crest_phases
 from livebode.mimo.design.amplitude import best_amplitudes
 from livebode.mimo.design.machine import LimitedPeak, MatrixLimits, MatrixMachine
@@ -25,7 +25,9 @@ REPETITIONS_MIN, REPETITIONS_MAX = 2, 1000
 SETTLED = 0.1
 """A transient has decayed where it is this share of the noise of a line, after all repetitions."""
 _SETTLE_MAX = 998
+_SAMPLES_MAX = 2_000_000  # of one repetition: more are a slip in the description
 _TRIES = 5
+_RATIO_MAX = 1e7  # of sigma over the required one: 1e14 repetitions
 _REACHED = 0.01  # of a limit: it is named as the limiting one
 _STARTS = 32  # of the search for phases
 
@@ -88,6 +90,7 @@ def _phases(kind: Kind, lines: Lines, inputs: int, seed: int) -> Floats:
     return phases
 
 
+@np.errstate(all="ignore")  # what cannot be computed with is found at the end
 def _at(
     kind: Kind,
     spec: MatrixSpec,
@@ -97,6 +100,15 @@ def _at(
     phases: Floats,
     settle: int,
 ) -> Candidate:
+    samples = (settle + 1) * lines.window * len(machine.inputs)
+    if samples > _SAMPLES_MAX:
+        raise DesignError(
+            "not-enough-time",
+            f"the transient of a change of experiment needs {settle} periods of {lines.window} samples to decay, "
+            f"so that one repetition has {samples:,} samples, more than {_SAMPLES_MAX:,}",
+            "correct the damping, the gains or the noise, or set settle_periods",
+            settle_periods=settle,
+        )
     make = getattr(MatrixExcitation, kind)
     unit: MatrixExcitation = make(lines, len(machine.inputs), 1.0, phases, dwell=settle + 1, settle=settle)
     signals, peaks = machine.unit_signals(unit, limits)
@@ -104,7 +116,15 @@ def _at(
     amplitude = best_amplitudes(cost.reshape(-1, cost.shape[-1]), signals / (1 - RESERVE))
     sizes = np.abs(signals @ amplitude).max(axis=1)
     reached = tuple(replace(one, size=float(size * one.limit)) for one, size in zip(peaks, sizes))
-    return Candidate(unit.scaled(amplitude), amplitude, np.sqrt(cost @ amplitude**-2.0), reached)
+    ratio = np.sqrt(cost @ amplitude**-2.0)
+    if not np.isfinite(ratio).all() or not 0 < ratio.max() < _RATIO_MAX:
+        raise UsageError(
+            "out-of-range",
+            "the noise, a limit, the required sigma or a value of the machine is too large or small to compute with",
+            "correct it",
+            argument="noise",
+        )
+    return Candidate(unit.scaled(amplitude), amplitude, ratio, reached)
 
 
 def _cost(unit: MatrixExcitation, spec: MatrixSpec, machine: MatrixMachine) -> Floats:

@@ -43,6 +43,7 @@ class MechanismMachine(MatrixMachine):
     noise: float | Sequence[float]
     torque_constant_n_m_per_a: float | Sequence[float] | None = None
 
+    @np.errstate(all="ignore")  # numbers that are not finite are found
     def __post_init__(self) -> None:
         each_of(self.noise, len(self.outputs), "noise", "output")
         if not 2 <= len(self.inputs) <= CHANNELS_MAX:
@@ -51,6 +52,14 @@ class MechanismMachine(MatrixMachine):
                 f"the machine has {counted(len(self.inputs), 'motor')}, and experiments separate 2 to {CHANNELS_MAX}",
                 "describe one motor as [belt]",
                 argument="input_shapes",
+            )
+        finite = all(np.isfinite(one).all() for one in (*self.loop.mechanism.state_space, *self.loop.matrices))
+        if not finite or not np.any(self.response([1.0])):
+            raise UsageError(
+                "out-of-range",
+                "a value of the described machine or its drives is not finite, or too large or small to compute with",
+                "correct it",
+                argument="loop",
             )
         if not self.loop.decay < 1:
             raise UsageError(
