@@ -46,6 +46,7 @@ MORE = {
     "tracking": "[Estimators](../explanation/estimators.md) describes the estimators, the bounds, the check of the "
     "roles and transients; [torque ripple](../explanation/motion.md#torque-ripple) describes `ripple`.",
     "loop": "[The loop description](../how-to/loop.md) gives the formulas.",
+    "experiments": "See [several inputs and outputs](../how-to/matrix.md).",
     "record": "See [the run directory](run-directory.md).",
     "motion": "See [motion correction](../explanation/motion.md).",
     "machine": "The names form a path, such as `Graz/line 2/press 4/X`, which is the machine in the [list of runs and "
@@ -99,7 +100,9 @@ def _tables(file: Schema, name: str, table: Schema, needed: Schema) -> Iterator[
         elif "$ref" in value.get("items", {}):
             yield from _tables(file, f"[{name}.{key}]" if name else f"[{key}]", _resolved(file, value["items"]), {})
         elif "properties" in value:
-            yield from _tables(file, f"{name}.{key}" if name else key, value, needed.get("properties", {}).get(key, {}))
+            yield from _tables(
+                file, f"{name.strip('[]')}.{key}" if name else key, value, needed.get("properties", {}).get(key, {})
+            )
 
 
 def _resolved(file: Schema, value: Schema) -> dict[str, Any]:

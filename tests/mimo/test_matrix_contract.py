@@ -67,6 +67,16 @@ def test_every_hop_of_a_periodic_excitation_of_one_input_gives_a_column() -> Non
     assert np.allclose(found.value[-1, :, :, 0], GAIN[:, 0], atol=0.01)
 
 
+def test_a_dwell_that_is_not_that_of_the_recording_makes_the_matrices_invalid() -> None:
+    """Both windows are of one experiment, so that the excitations are equal in them, and the inputs differ by noise."""
+    w = np.tile(MatrixExcitation.orthogonal(LINES, 2, dwell=8, settle=4).samples, 2)
+    u = w + 0.5 * np.random.default_rng(0).standard_normal(w.shape)
+    block = Block(np.vstack([w, u, GAIN @ u]), ("w1", "w2", *NAMES), rate_hz=1000)
+    found = tracker(estimator="joint", excitation=["w1", "w2"], dwell=2, settle=1, hop=200).process(block)
+    assert not found.valid[3].any()
+    assert "moves together with others" in found.why(3)[0]
+
+
 def test_a_gap_makes_matrices_invalid_until_all_experiments_are_complete_again() -> None:
     whole = block_of(ORTHOGONAL)
     one = tracker()

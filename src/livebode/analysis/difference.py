@@ -74,10 +74,30 @@ class Difference:
         return np.asarray(self.p < ALPHA / self.m)
 
     @classmethod
-    def of(cls, before: Response, after: Response, m: int | None = None, *, ignore_below: float = 0.0) -> Difference:
-        """The difference of two mean responses on the same lines; `m` if they are tested together with others."""
+    def of(
+        cls,
+        before: Response,
+        after: Response,
+        m: int | None = None,
+        *,
+        ignore_below: float = 0.0,
+        together: int = 1,
+    ) -> Difference:
+        """The difference of two mean responses on the same lines.
+
+        Parameters
+        ----------
+        before, after
+            The mean responses.
+        m
+            Number of lines that are tested together; default: those of these responses, times `together`.
+        ignore_below
+            Smallest change that matters.
+        together
+            Number of pairs of responses with so many lines that are tested together.
+        """
         known = before.valid & after.valid & np.isfinite(before.sigma) & np.isfinite(after.sigma)
-        m = m or max(int(np.count_nonzero(known)), 1)
+        m = m or together * max(int(np.count_nonzero(known)), 1)
         with np.errstate(all="ignore"):
             ratio = np.where(known, after.value / before.value, np.nan)
             first, second = (np.maximum(1, np.abs(ratio)) * before.sigma) ** 2, after.sigma**2
@@ -123,8 +143,10 @@ class Compared:
     warnings: tuple[str, ...]
 
 
-def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0) -> Compared:
+def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0, together: int = 1) -> Compared:
     """Compare two runs; lines whose |G₂/G₁ − 1| is less than `ignore_below` do not count as different.
+
+    Entries of a matrix that are tested `together` have no schedule, and so no places.
 
     Raises
     ------
@@ -150,9 +172,8 @@ def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0) -
     shared = sorted(means[0].keys() & means[1].keys()) if means else []
     if not shared:
         one, other = (_on(a.response, common, i) for a, i in zip(both, at))
-        return Compared(
-            (before, after), both, Difference.of(one, other, ignore_below=ignore_below), (), tuple(warnings)
-        )
+        difference = Difference.of(one, other, ignore_below=ignore_below, together=together)
+        return Compared((before, after), both, difference, (), tuple(warnings))
     pairs = [tuple(_on(m[key][0], common, i) for m, i in zip(means, at)) for key in shared]
     known = [_known(a) & _known(b) for a, b in pairs]
     m = max(int(np.sum(known)), 1)
@@ -161,8 +182,8 @@ def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0) -
         ComparedPlace(float(edges[i]), float(edges[i + 1]), back, Difference.of(a, b, m, ignore_below=ignore_below))
         for (i, back), (a, b) in zip(shared, pairs)
     )
-    together = [_together([pair[i] for pair in pairs], np.array(known)) for i in (0, 1)]
-    overall = Difference.of(together[0], together[1], ignore_below=ignore_below)
+    joined = [_together([pair[i] for pair in pairs], np.array(known)) for i in (0, 1)]
+    overall = Difference.of(joined[0], joined[1], ignore_below=ignore_below)
     return Compared((before, after), both, overall, places, tuple(warnings))
 
 

@@ -21,14 +21,14 @@ from livebode.sources.expressions import negated
 _WRONG = 0.3  # of |G|: the model error from which a finished run's fit is refused
 
 
-def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
-    """A model fitted to a finished run, and a description of what it was fitted to.
+def fit_run(directory: Path, section: FitSection, entry: str | None = None) -> tuple[Fit, str]:
+    """A model fitted to a finished run or to an entry of a matrix run, and a description of what it was fitted to.
 
     For a run that averages, the newest valid response; else the mean of all. If the run has no units, and its
     configuration does not specify whether the output is a velocity or a position, the one with the smaller misfit is
     used. A fit whose model error is 30 % of |G| or more is refused.
     """
-    return fit_averaged(averaged(RunRecord.open(directory)), section)
+    return fit_averaged(averaged(RunRecord.open(directory, entry=entry)), section)
 
 
 def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:

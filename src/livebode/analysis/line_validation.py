@@ -17,11 +17,16 @@ from livebode.validation import LineValidation, fitted_model, validate_at_lines
 
 
 def validate_run_at_lines(
-    directory: Path, other: Path, sections: list[tuple[FitSection, str]], drifting: dict[str, str]
+    directory: Path,
+    other: Path,
+    sections: list[tuple[FitSection, str]],
+    drifting: dict[str, str],
+    entry: str | None = None,
 ) -> tuple[list[LineValidation], list[str]]:
     """One verdict for the model of each section with the reason for judging it at lines, and remarks.
 
-    A section without a reason is judged if its model is in `drifting`, models by name with their reasons.
+    Of matrix runs, those of one `entry` are compared. A section without a reason is judged if its model is in
+    `drifting`, models by name with their reasons.
 
     Raises
     ------
@@ -32,7 +37,7 @@ def validate_run_at_lines(
     SignalError
         If the other run has no usable lines.
     """
-    runs = [RunRecord.open(path) for path in (directory, other)]
+    runs = [RunRecord.open(path, entry=entry) for path in (directory, other)]
     for what in ("quantity", "unit"):
         one, two = (run.found.get(what, "") for run in runs)
         if one != two:
@@ -47,7 +52,7 @@ def validate_run_at_lines(
     fits: list[tuple[Fit | CommonPoles, str]] = []
     for section, reason in sections:
         if section.model in POLE_MODELS:
-            fits.append((fit_poles([directory], cast(Kind, section.model), section)[0], reason))
+            fits.append((fit_poles(runs[:1], cast(Kind, section.model), section)[0], reason))
         else:
             fits.append((fit_averaged(average, section)[0], reason))
     with_reasons = [(fit, reason or drifting.get(_name(fit), "")) for fit, reason in fits if fit.status == "ok"]

@@ -107,9 +107,15 @@ class LoopReport:
 
 
 def loop_of_run(
-    directory: Path, section: FitSection | None = None, axis: Axis | None = None, peak_sensitivity: float = 2.0
+    directory: Path,
+    section: FitSection | None = None,
+    axis: Axis | None = None,
+    peak_sensitivity: float = 2.0,
+    entry: str | None = None,
 ) -> LoopReport:
     """The report of a finished run; loop and model are from `axis` and `section`, else from its configuration.
+
+    Of a matrix run that of one `entry`, with the controller between its output and its input; all other loops are open.
 
     Raises
     ------
@@ -118,13 +124,13 @@ def loop_of_run(
     FitError
         If no model could be fitted.
     """
-    run = RunRecord.open(directory)
+    run = RunRecord.open(directory, entry=entry)
     own_words = recorded_configuration(run.summary)
     loop = axis.loop if axis is not None else LoopSection.model_validate(own_words.get("loop", {}))
     if section is None:
         own = axis.fit if axis is not None else None
         section = own or FitSection.model_validate(own_words.get("fit", {}))
-    found, words = fit_run(directory, section)
+    found, words = fit_run(directory, section, entry)
     responses = Responses.join(list(run.steady_batches()))  # the fitted responses
     report = loop_report(found, words, responses, loop.build(responses.lines.rate_hz), peak_sensitivity)
     return replace(report, checked=checked_loop(directory, loop))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 from livebode.analysis.averaged import averaged
@@ -17,7 +17,7 @@ _SHARED = {"log": "source", "input": "signals", "excitation": "signals"}
 
 
 def fit_poles(
-    directories: list[Path], model: Kind, section: FitSection, order: int | None = None
+    runs: Sequence[RunRecord], model: Kind, section: FitSection, order: int | None = None
 ) -> tuple[CommonPoles, list[str]]:
     """Poles common to the outputs of these runs, and remarks.
 
@@ -26,7 +26,6 @@ def fit_poles(
     UsageError, GridError, FitError
         As `fit_common_poles`; or if two runs are of the same output, or of different inputs.
     """
-    runs = [RunRecord.open(directory) for directory in directories]
     configurations = [recorded_configuration(run.summary) for run in runs]
     names = [str(of.get("signals", {}).get("output", run.path.name)) for of, run in zip(configurations, runs)]
     if len(set(names)) < len(names):

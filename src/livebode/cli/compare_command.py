@@ -6,11 +6,11 @@ import re
 from datetime import UTC, datetime
 from math import inf
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.options import Json
+from livebode.cli.options import Entry, Json
 from livebode.cli.report_options import (
     Appendix,
     Ask,
@@ -29,6 +29,9 @@ from livebode.cli.report_options import (
 from livebode.core import UsageError
 from livebode.locations import location
 
+if TYPE_CHECKING:
+    from livebode.reporting.matrix_comparison import MatrixComparison
+
 
 def compare_command(
     before: Annotated[Path, typer.Argument(metavar="BEFORE", help="Run directory.", parser=location)],
@@ -40,6 +43,7 @@ def compare_command(
         str | None,
         typer.Option(metavar="SIZE", help="Smallest change of a line that matters, as 0.5dB or 5%. \\[default: any]"),
     ] = None,
+    entry: Entry = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     template: Template = None,
     machine: Machine = None,
@@ -58,16 +62,21 @@ def compare_command(
     """Find the lines, parameters and margins that differ between two runs, with amounts and bounds.
 
     A line differs if chance does not explain it; with --ignore-below only if |after/before − 1| is that large too.
-    Runs with a schedule, such as a position, are compared by place and direction, and over all places. The first page
-    of the files is as in `livebode report`; limits apply to AFTER.
+    Runs with a schedule, such as a position, are compared by place and direction, and over all places. Of two matrix
+    runs all entries are compared; files show one of them (--entry). The first page of the files is as in `livebode
+    report`; limits apply to AFTER.
     """
     from livebode.cli.documents import write_documents
     from livebode.configuration.recorded import recorded_report
     from livebode.language import in_language
     from livebode.records import to_json
     from livebode.reporting.compare_report import Comparison
+    from livebode.reporting.matrix_comparison import MatrixComparison, both_matrices
 
-    found = Comparison.of(before, after, ignore_below=_share(ignore_below))
+    if entry is None and out is None and (pair := both_matrices(before, after)) is not None:
+        _show_matrices(MatrixComparison.of(*pair, ignore_below=_share(ignore_below)), as_json)
+        return
+    found = Comparison.of(before, after, ignore_below=_share(ignore_below), entry=entry)
     files: list[Path] = []
     remark = ""
     options = {
@@ -92,6 +101,18 @@ def compare_command(
         print(found.changes.parameter_words)
     for line in filter(None, (*files, remark)):
         print(line)
+
+
+def _show_matrices(found: MatrixComparison, as_json: bool) -> None:
+    from livebode.records import to_json
+
+    if as_json:
+        print(to_json(found.plain()))
+        return
+    for sentence in found.sentences:
+        print(sentence)
+    for table in found.tables:
+        print(f"\n{table}")
 
 
 def _needs_out() -> UsageError:

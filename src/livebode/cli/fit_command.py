@@ -15,6 +15,7 @@ from livebode.locations import location
 if TYPE_CHECKING:
     from livebode.configuration.fit_section import FitSection
     from livebode.fitting.pole_search import Kind
+    from livebode.records import RunRecord
 
 _OPTIONS = {"radius_m": "radius", "inertia_ratio": "ratio", "fixed": "fix"}
 
@@ -58,6 +59,12 @@ def fit_command(
     hold: Annotated[
         str | None, typer.Option(help="zero-order (the input is constant between samples) or none.")
     ] = None,
+    entry: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="OUTPUT/INPUT", help="Entry of a matrix run, such as velocity2/u1; of common poles several."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Fit a model to the response of a run, and print its parameters with bounds.
@@ -80,30 +87,44 @@ def fit_command(
         "hold": hold,
     }
     specified = {name: value for name, value in given.items() if value is not None}
+    runs = _opened(directories, entry or [])
     if model in POLE_MODELS:
-        _fit_poles(directories, cast(Kind, model), specified, order, as_json)
+        _fit_poles(runs, cast(Kind, model), specified, order, as_json)
     else:
-        _fit_physical(directories, specified, order, as_json)
+        _fit_physical(runs, specified, order, as_json)
 
 
-def _fit_physical(directories: list[Path], specified: dict[str, Any], order: int | None, as_json: bool) -> None:
+def _opened(directories: list[Path], entries: list[str]) -> list[RunRecord]:
+    """The runs, or the entries of one matrix run."""
+    from livebode.records import RunRecord
+
+    if not entries:
+        return [RunRecord.open(directory) for directory in directories]
+    if len(directories) > 1:
+        raise UsageError(
+            "conflict", "entries cannot be combined with several runs", "give one matrix run", argument="entry"
+        )
+    return [RunRecord.open(directories[0], entry=name) for name in entries]
+
+
+def _fit_physical(runs: list[RunRecord], specified: dict[str, Any], order: int | None, as_json: bool) -> None:
     from livebode.analysis.averaged import averaged
     from livebode.analysis.fits import fit_averaged, fit_remarks, plain_fit
     from livebode.cli.pictures import show_fit
     from livebode.configuration.recorded import recorded_configuration
-    from livebode.records import RunRecord, to_json
+    from livebode.records import to_json
 
-    if len(directories) > 1 or order is not None:
-        what = "several runs" if len(directories) > 1 else "--order"
+    if len(runs) > 1 or order is not None:
+        what = "several runs" if len(runs) > 1 else "--order"
         raise UsageError(
             "conflict",
             f"{what} cannot be combined with a physical model",
             "add --model modal or --model rational",
-            argument="RUN" if len(directories) > 1 else "order",
+            argument="RUN" if len(runs) > 1 else "order",
         )
-    run = RunRecord.open(directories[0])
+    run = runs[0]
     configuration = recorded_configuration(run.summary)
-    section = _section(directories[0], configuration.get("fit", {}) | specified)
+    section = _section(run.path, configuration.get("fit", {}) | specified)
     average = averaged(run)
     found, words = fit_averaged(average, section)
     source, signals = (configuration.get(name, {}) for name in ("source", "signals"))
@@ -120,13 +141,13 @@ def _fit_physical(directories: list[Path], specified: dict[str, Any], order: int
 
 
 def _fit_poles(
-    directories: list[Path], model: Kind, specified: dict[str, Any], order: int | None,
+    runs: list[RunRecord], model: Kind, specified: dict[str, Any], order: int | None,
     as_json: bool,
 ) -> None:  # fmt: skip
     from livebode.analysis.poles import fit_poles, plain_poles
     from livebode.cli.pictures import show_poles
     from livebode.configuration.recorded import recorded_configuration
-    from livebode.records import RunRecord, to_json
+    from livebode.records import to_json
 
     if other := sorted(specified.keys() - {"model", "band_hz", "hold"}):
         raise UsageError(
@@ -136,10 +157,10 @@ def _fit_poles(
             argument=other[0],
             model=model,
         )
-    own = recorded_configuration(RunRecord.open(directories[0]).summary).get("fit", {})
+    own = recorded_configuration(runs[0].summary).get("fit", {})
     kept = {name: own[name] for name in ("band_hz", "hold") if name in own}
-    section = _section(directories[0], kept | {name: specified[name] for name in specified if name != "model"})
-    found, remarks = fit_poles(directories, model, section, order)
+    section = _section(runs[0].path, kept | {name: specified[name] for name in specified if name != "model"})
+    found, remarks = fit_poles(runs, model, section, order)
     if as_json:
         print(to_json(plain_poles(found, remarks)))
     else:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.options import Json
+from livebode.cli.options import Entry, Json
 from livebode.cli.remote import results_directory
 from livebode.core import RecordError
 from livebode.core.writing import writing
@@ -28,6 +28,7 @@ def margins_command(
     radius: Annotated[
         float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
     ] = None,
+    entry: Entry = None,
     max_sensitivity: Annotated[float, typer.Option(help="Largest permitted peak sensitivity Ms.")] = 2.0,
     as_json: Json = False,
 ) -> None:
@@ -44,7 +45,7 @@ def margins_command(
 
     given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
     section = FitSection.model_validate(given) if given else None
-    found = loop_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity)
+    found = loop_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity, entry)
     into = results_directory(directory)
     if can_draw():
         with writing(into, RecordError):

@@ -18,6 +18,8 @@ def show_matrix(outcome: Outcome, newest: MatrixResponses) -> None:
         print(f"inputs: condition number at most {condition['worst']:.3g} (at {condition['frequency_hz']:g} Hz)")
     for sentence in newest.why():
         print(sentence)
+    if not newest.valid.any():
+        print("if the inputs move, compare [experiments] with the recording: dwell_periods, settle_periods, start")
 
 
 def matrix_lines(newest: MatrixResponses) -> list[str]:

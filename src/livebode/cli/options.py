@@ -50,6 +50,10 @@ SkipPeriods = Annotated[
 Dbc = Annotated[
     Path | None, typer.Option(metavar="FILE", help="DBC file that defines the signals of a recording of CAN frames.")
 ]
+Entry = Annotated[
+    str | None,
+    typer.Option(metavar="OUTPUT/INPUT", help="Entry of a matrix run, such as velocity2/u1."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result, or the error, as JSON.")]
 Port = Annotated[
     int | None,

@@ -40,7 +40,7 @@ def query_command(
             "give one of them",
             options=["--csv", "--json"],
         )
-    found = query(RunRecord.open(run, output_only=True), sql, rows)
+    found = query(RunRecord.open(run, output_only=True, matrix=True), sql, rows)
     if as_json:
         plain = [[_plain(value) for value in row] for row in found.rows]
         print(to_json({"columns": found.columns, "rows": plain, "more": found.more}))

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from livebode.cli.band import Band
-from livebode.cli.options import Dbc, Excitation, From, Json, Outputs, Port, Rate, Serve, SkipPeriods, Time, To
+from livebode.cli.options import Dbc, From, Json, Outputs, Port, Rate, Serve, SkipPeriods, Time, To
 from livebode.core import UsageError
 from livebode.locations import location
 
@@ -18,9 +18,19 @@ def run_command(
         list[str],
         typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or several that are averaged, or a configuration."),
     ],
-    excitation: Excitation = None,
+    excitation: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CHANNEL", help="Channel of the excitation w, or an expression; repeat for a matrix."),
+    ] = None,
     output: Outputs = None,
-    input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
+    input: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CHANNEL", help="Channel of the plant input u; repeat for a matrix of responses."),
+    ] = None,
+    matrix: Annotated[
+        bool,
+        typer.Option("--matrix", help="One run with the responses of all --output, instead of a run for each."),
+    ] = False,
     schedule: Annotated[
         str | None, typer.Option(metavar="CHANNEL", help="Channel that the responses depend on, such as the position.")
     ] = None,
@@ -105,8 +115,10 @@ def run_command(
     """Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.
 
     Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png; with several
-    --output one for each in --out, which livebode fit takes together.
+    --output one for each in --out, which livebode fit takes together. With several --input, or with --matrix, the run
+    has a matrix of responses from all inputs to all outputs.
     """
+    as_matrix = matrix or any(len(names or []) > 1 for names in (input, excitation))
     given: dict[str, dict[str, Any]] = {
         "source": {
             "rate_hz": rate,
@@ -117,9 +129,9 @@ def run_command(
             "dbc": dbc,
         },
         "signals": {
-            "output": output[0] if output else None,
-            "input": input,
-            "excitation": excitation,
+            "output": (output if as_matrix else output[0]) if output else None,
+            "input": input or None,
+            "excitation": excitation or None,
             "schedule": schedule,
         },
         "lines": {"frequencies": lines, "window": _window(window)},
@@ -147,7 +159,7 @@ def run_command(
     from livebode.cli.running import run_targets  # with all that measures
 
     run_targets(
-        [location(target) for target in targets], over, output or [],
+        [location(target) for target in targets], over, [] if as_matrix else output or [],
         output_only=output_only, band=band, out=out, force=force, serve=serve, port=port, as_json=as_json,
     )  # fmt: skip
 

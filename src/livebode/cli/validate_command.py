@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.options import Excitation, Json, Output
+from livebode.cli.options import Entry, Excitation, Json, Output
 from livebode.cli.remote import results_directory
 from livebode.core import LivebodeError, RecordError
 from livebode.core.writing import writing
@@ -48,26 +48,28 @@ def validate_command(
         bool,
         typer.Option("--at-lines", help="Track LOG and compare at the lines. \\[default: if no simulation can judge]"),
     ] = False,
+    entry: Entry = None,
     as_json: Json = False,
 ) -> None:
     """Simulate the fitted model with another recording and test whether the residual correlates with the signals.
 
     Writes validation.png to the run directory. The parameters are constant: the mean over the run, also for a
     machine whose plant changes with position. The channels default to those of the run. A model whose simulation is
-    not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was.
+    not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was. So is
+    an entry of a matrix run.
     """
     from livebode.cli.picture_support import tell_how_to_draw
     from livebode.configuration.fit_section import FitSection
     from livebode.configuration.recorded import recorded_configuration
     from livebode.records import RunRecord, to_json
 
-    base = recorded_configuration(RunRecord.open(directory).summary).get("fit", {}) | (
+    base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {}) | (
         {} if radius is None else {"radius_m": radius}
     )
     named = [{"model": name} for name in model or []] or [{}]
     sections = [FitSection.model_validate(base | one) for one in named]
     channels = {"output": output, "input": input, "excitation": excitation}
-    reasons = [_reason(section, on, at_lines) for section in sections]
+    reasons = [_reason(section, on, at_lines, entry) for section in sections]
     simulated = [section for section, reason in zip(sections, reasons) if not reason]
     found: list[Validation] = []
     notes: list[str] = []
@@ -78,7 +80,7 @@ def validate_command(
     wanted = [(section, reason) for section, reason in zip(sections, reasons) if reason or drifting]
     at: list[LineValidation] = []
     if wanted:
-        at, more = _at_lines(directory, on, wanted, drifting, channels)
+        at, more = _at_lines(directory, on, wanted, drifting, channels, entry)
         notes = list(dict.fromkeys([*notes, *more]))
     if as_json:
         print(to_json({"models": [v.plain() for v in found] + [one.plain() for one in at], "notes": notes}))
@@ -94,10 +96,12 @@ def validate_command(
     tell_how_to_draw()
 
 
-def _reason(section: FitSection, on: Path, at_lines: bool) -> str:
+def _reason(section: FitSection, on: Path, at_lines: bool, entry: str | None) -> str:
     """Why a model is judged at the lines from the beginning; empty for one that is simulated."""
     from livebode.fitting import POLE_MODELS
 
+    if entry is not None:
+        return "the other inputs of a matrix move the output too"
     if at_lines:
         return "--at-lines asks for it"
     if (on / "run.json").exists():
@@ -122,7 +126,12 @@ def _simulated(
 
 
 def _at_lines(
-    directory: Path, on: Path, sections: list[tuple[FitSection, str]], drifting: dict[str, str], channels: Channels
+    directory: Path,
+    on: Path,
+    sections: list[tuple[FitSection, str]],
+    drifting: dict[str, str],
+    channels: Channels,
+    entry: str | None,
 ) -> tuple[list[LineValidation], list[str]]:
     """On another run; a recording is tracked as the run was, in a directory that is removed."""
     from tempfile import TemporaryDirectory
@@ -131,7 +140,7 @@ def _at_lines(
     from livebode.runtime import Destination, run
 
     if (on / "run.json").exists():
-        return validate_run_at_lines(directory, on, sections, drifting)
+        return validate_run_at_lines(directory, on, sections, drifting, entry)
     with TemporaryDirectory() as there:
         other = Path(there) / on.stem
         try:
@@ -140,7 +149,7 @@ def _at_lines(
             if all(reason for _, reason in sections):
                 raise
             return [], [f"{on.name} cannot be tracked, so the model cannot be judged at the lines: {error}"]
-        return validate_run_at_lines(directory, other, sections, drifting)
+        return validate_run_at_lines(directory, other, sections, drifting, entry)
 
 
 def _tracked_alike(directory: Path, on: Path, channels: Channels) -> Axis:
@@ -149,8 +158,8 @@ def _tracked_alike(directory: Path, on: Path, channels: Channels) -> Axis:
     from livebode.configuration.recorded import recorded_configuration
     from livebode.records import RunRecord
 
-    own = recorded_configuration(RunRecord.open(directory).summary)
-    data = {name: own[name] for name in ("signals", "lines", "tracking", "loop") if name in own}
+    own = recorded_configuration(RunRecord.open(directory, matrix=True).summary)
+    data = {name: own[name] for name in ("signals", "lines", "tracking", "experiments", "loop") if name in own}
     of_source = own.get("source", {})
     source = {name: of_source[name] for name in ("rate_hz", "time", "dbc", "kinds") if name in of_source}
     signals = data.get("signals", {}) | {role: name for role, name in channels.items() if name}

@@ -78,7 +78,7 @@ def _read(configuration: Path | None, run_path: Path | None) -> Subject:
     experiment = False
     if run_path is not None:
         try:
-            run = RunRecord.open(run_path, on_damage=lambda _: None)
+            run = RunRecord.open(run_path, on_damage=lambda _: None, matrix=True)
             if configuration is None:
                 axes = {"": Axis.of(recorded_configuration(run.summary), str(run_path))}
         except LivebodeError as error:

@@ -21,10 +21,13 @@ from livebode.core.writing import writing
 from livebode.excitation import chirp, multisine
 from livebode.export.delimited import write_columns, write_header
 from livebode.interface._example_hall import write_hall
+from livebode.mimo import MatrixExcitation
 from livebode.simulation import (
     BeltAxis,
     Drive,
     Friction,
+    Gantry,
+    GantryLoop,
     Mechanics,
     Sensor,
     SimulatedAxis,
@@ -131,6 +134,20 @@ def _strokes() -> Table:
     return _table(block, ("u", "velocity", "position"))
 
 
+def _gantry(seed: int, cart_m: float) -> Callable[[], Table]:
+    """A gantry in closed loop, whose two motors have orthogonal multisines, with noise of the encoders."""
+
+    def simulate() -> Table:
+        lines = Lines.parse("6:90:4", _RATE_HZ, 2000)
+        excitation = MatrixExcitation.orthogonal(lines, 2, amplitude=0.2, dwell=4, settle=3)
+        w = np.tile(excitation.samples, 4)
+        noise = 0.02 * np.random.default_rng(seed).standard_normal((3, w.shape[1]))
+        block = GantryLoop(gantry=Gantry(cart_m=cart_m)).simulate(w, noise=noise)
+        return _table(block, ("w1", "w2", "u1", "u2", "velocity1", "velocity2"))
+
+    return simulate
+
+
 EXAMPLES = {
     "standstill": Example(
         "an axis at standstill, recorded twice",
@@ -210,6 +227,17 @@ EXAMPLES = {
         {"strokes.parquet": _strokes},
         ("strokes.toml",),
         ("livebode friction strokes.toml", "livebode orders strokes.toml"),
+    ),
+    "matrix": Example(
+        "a gantry with two motors that move each other, with its cart at two places",
+        {"gantry.parquet": _gantry(10, 0.2), "gantry-2.parquet": _gantry(11, 0.25)},
+        ("gantry.toml", "gantry-2.toml"),
+        (
+            "livebode run gantry.toml",
+            "livebode fit runs/gantry --entry velocity1/u1 --entry velocity2/u1 --model modal",
+            "livebode run gantry-2.toml",
+            "livebode compare runs/gantry runs/gantry-2",
+        ),
     ),
     "hall": Example(
         "a year of a hall with eight axes, as the lake of an archive",

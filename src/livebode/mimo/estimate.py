@@ -67,6 +67,9 @@ def estimate(windows: Windows, average: bool, condition_max: float) -> Estimate:
     outputs = windows.output.shape[3]
     mean = _only(windows.denominator[:, :, part], used).sum(axis=2) / np.maximum(used, 1)[:, None, None, None]
     kept, condition, reason = _separation(mean, scatter[:, :, outputs:, outputs:], dof, used, condition_max)
+    if windows.reference is not windows.denominator:
+        excitation = _only(windows.reference[:, :, part], used).sum(axis=2) / np.maximum(used, 1)[:, None, None, None]
+        reason[(reason == 0).all(axis=2) & ~_separates(excitation, condition_max)] = 3
     solution = _solution(d, r, kept, reason)
     value = y @ solution
     known = np.where(reason[:, :, None, :] == 0, value, 0.0)
@@ -132,6 +135,16 @@ def _separation(
     span = left * ~without[:, :, None, :]
     projection = (span @ _star(left)) * scale[..., None] / scale[:, :, None, :]
     return projection, condition, reason
+
+
+def _separates(excitation: Complex, condition_max: float) -> Flags:
+    """Whether the excitations are as different over the experiments as inputs must be, shape (rows, lines).
+
+    They are not where `dwell` or `start` is not that of the recording; the inputs may differ there by transients.
+    """
+    scale = np.sqrt(np.mean(np.abs(excitation) ** 2, axis=(1, 3)))
+    size = np.linalg.svd(excitation / np.where(scale > 0, scale, 1.0)[:, None, :, None], compute_uv=False)
+    return np.asarray(size[:, :, -1] > size[:, :, 0] / condition_max)
 
 
 def _solution(d: Complex, r: Complex, kept: Complex, reason: NDArray[np.int8]) -> Complex:

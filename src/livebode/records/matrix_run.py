@@ -40,6 +40,7 @@ def entry_named(path: str, summary: Mapping[str, Any], name: str) -> tuple[str, 
             "remove the entry",
             path=path,
             entry=name,
+            argument="entry",
         )
     if name not in entries:
         raise RecordError(
@@ -49,6 +50,7 @@ def entry_named(path: str, summary: Mapping[str, Any], name: str) -> tuple[str, 
             path=path,
             entry=name,
             allowed=list(entries),
+            argument="entry",
         )
     return entries[name]
 
@@ -62,6 +64,7 @@ def entry_missing(path: str, summary: Mapping[str, Any]) -> RecordError:
         f"choose an entry: {', '.join(entries)}",
         path=path,
         allowed=entries,
+        argument="entry",
     )
 
 
@@ -75,5 +78,15 @@ def entry_summary(summary: Mapping[str, Any], output: str, input: str) -> dict[s
     signals = dict(configuration.get("signals", {}))
     signals.pop("excitation", None)  # all of them belong to every entry
     configuration["signals"] = signals | {"output": output, "input": input}
+    configuration["loop"] = _loop(configuration.get("loop") or {}, output, input)
     rest = {name: value for name, value in summary.items() if name not in ("matrix", "columns")}
     return rest | {"configuration": configuration, "found": found, "entry": f"{output}/{input}"}
+
+
+def _loop(section: Mapping[str, Any], output: str, input: str) -> dict[str, Any]:
+    """[loop] with the controller from this output to this input, if it is described."""
+    found = {name: value for name, value in section.items() if name != "controllers"}
+    for controller in section.get("controllers") or []:
+        if (controller["output"], controller["input"]) == (output, input):
+            found |= {name: value for name, value in controller.items() if name not in ("output", "input")}
+    return found

@@ -37,7 +37,7 @@ from livebode.records.matrix_run import (
     is_matrix,
     matrix_shape,
 )
-from livebode.records.matrix_table import COVARIANCE_SCHEMA, entry_rows, matrices
+from livebode.records.matrix_table import COVARIANCE_SCHEMA, MatrixShape, entry_rows, matrices
 from livebode.records.matrix_table import SCHEMA as MATRIX_SCHEMA
 from livebode.records.piece import StoredTable
 from livebode.records.response_table import EARLIER, SCHEMA, responses_in
@@ -204,9 +204,21 @@ class RunRecord:
         chosen = entry_named(str(self.path), self.summary, f"{output}/{input}")
         return replace(self, summary=entry_summary(self.summary, *chosen), selected=chosen)
 
+    @property
+    def _matrix_shape(self) -> MatrixShape:
+        """Its lines and signals; RecordError if it is not a matrix run."""
+        if not self.is_matrix:
+            raise RecordError(
+                "no-matrix",
+                f"{str(self.path)!r} has one response, and no matrix of them",
+                "read its responses",
+                path=str(self.path),
+            )
+        return matrix_shape(self.summary, self.lines)
+
     def matrix(self) -> MatrixResponses:
-        """All matrices of a matrix run, as written; no rows before the first."""
-        shape = matrix_shape(self.summary, self.lines)
+        """All matrices of a matrix run, as written; no rows before the first. RecordError of another run."""
+        shape = self._matrix_shape
         none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
         return MatrixResponses.join(list(self.matrix_batches()) or list(none))
 
@@ -218,14 +230,7 @@ class RunRecord:
         RecordError
             If it is not a matrix run.
         """
-        if not self.is_matrix:
-            raise RecordError(
-                "no-matrix",
-                f"{str(self.path)!r} has one response, and no matrix of them",
-                "read its responses",
-                path=str(self.path),
-            )
-        shape = matrix_shape(self.summary, self.lines)
+        shape = self._matrix_shape
         responses = self._whole(self.tables("responses", size_bytes_max), shape.response_rows, (MATRIX_SCHEMA.names,))
         covariance = self._whole(self.tables("covariance"), shape.covariance_rows, (COVARIANCE_SCHEMA.names,))
         yield from matrices(responses, covariance, shape)

@@ -39,9 +39,17 @@ class Comparison:
     changes: Changes
 
     @classmethod
-    def of(cls, before: Path, after: Path, *, ignore_below: float = 0.0) -> Comparison:
-        """Read and compare two runs; raises the errors of `compare`."""
-        found = compare(RunRecord.open(before), RunRecord.open(after), ignore_below=ignore_below)
+    def of(cls, before: Path, after: Path, *, ignore_below: float = 0.0, entry: str | None = None) -> Comparison:
+        """Read and compare two runs, or one entry of two matrix runs; raises the errors of `compare`."""
+        runs = RunRecord.open(before, entry=entry), RunRecord.open(after, entry=entry)
+        return cls.between(*runs, ignore_below=ignore_below)
+
+    @classmethod
+    def between(
+        cls, before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0, together: int = 1
+    ) -> Comparison:
+        """Compare two opened runs; `together` as in `compare`."""
+        found = compare(before, after, ignore_below=ignore_below, together=together)
         return cls(found, changes(found))
 
     @property

@@ -17,16 +17,22 @@ class MatrixColumns(StatefulBase):
     ----------
     inputs
         Names of the inputs.
+    lines
+        Number of lines.
     """
 
     _stage = Stage("matrix-columns", 1)
     _STATE = ("_counts", "_newest", "_condition")
 
-    def __init__(self, inputs: Sequence[str]) -> None:
+    def __init__(self, inputs: Sequence[str], lines: int) -> None:
         self._inputs = tuple(inputs)
         self._counts = np.zeros((len(inputs), len(REASONS)), dtype=np.int64)
-        self._newest = np.zeros((len(inputs), 0), dtype=np.int8)
-        self._condition = np.zeros(0)
+        self._newest = np.zeros((len(inputs), lines), dtype=np.int64)
+        self._condition = np.full(lines, np.nan)
+
+    @property
+    def _identity(self) -> str:
+        return repr((self._inputs, len(self._condition)))
 
     @property
     def valid(self) -> int:
@@ -39,7 +45,7 @@ class MatrixColumns(StatefulBase):
             return
         for number in range(len(REASONS)):
             self._counts[:, number] += np.count_nonzero(responses.reason == number, axis=(0, 1))
-        self._newest = responses.reason[-1].T.copy()
+        self._newest = responses.reason[-1].T.astype(np.int64)
         self._condition = responses.condition[-1].copy()
 
     def summary(self, frequency_hz: np.ndarray) -> dict[str, Any]:

@@ -39,7 +39,7 @@ class MatrixPipeline:
     def of(cls, axis: Axis, rate_hz: float, hop: int | None = None) -> MatrixPipeline:
         """The configured tracker for samples of this rate; LivebodeError if its settings do not fit each other."""
         tracker = MatrixTracker(matrix_settings(axis, rate_hz, hop))
-        return cls(axis, tracker, MatrixColumns(tracker.settings.columns))
+        return cls(axis, tracker, MatrixColumns(tracker.settings.columns, len(tracker.settings.lines)))
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> MatrixPipeline:
