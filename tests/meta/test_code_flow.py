@@ -11,6 +11,7 @@ import pytest
 
 from livebode.runtime import documents
 from livebode.runtime.run_loop import RunLoop
+from livebode.runtime.sample_loop import SampleLoop
 
 PAGE = (Path(__file__).parents[2] / "docs" / "explanation" / "code-flow.md").read_text("utf-8")
 NAMES = sorted(set(re.findall(r"`(livebode(?:\.\w+)+)`", PAGE)))
@@ -22,10 +23,12 @@ def test_a_name_on_the_page_exists(name: str) -> None:
 
 
 def test_the_loop_calls_its_steps_in_the_order_of_the_page() -> None:
-    steps = re.findall(r"self\.(?:_recorder\.|_stream\.)?(\w+)\(", inspect.getsource(RunLoop._process))
-    assert steps == [
-        "write_samples", "_ready_parts", "_monitor_samples", "_estimate", "_record_and_publish", "_report_events",
-        "announce", "_check_signals", "commit",
+    call = r"self\.(?:_recorder\.|_stream\.)?(\w+)\("
+    assert re.findall(call, inspect.getsource(SampleLoop._process)) == [
+        "write_samples", "_publish_noticed", "_compute", "_report_events", "announce", "_check_signals", "commit",
+    ]  # fmt: skip
+    assert re.findall(call, inspect.getsource(RunLoop._compute)) == [
+        "_ready_parts", "_monitor_samples", "_estimate", "_record_and_publish",
     ]  # fmt: skip
     order = (
         "Number",

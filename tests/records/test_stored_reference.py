@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from livebode.records.segments.json_lines import to_line
 from livebode.records.segments.recovery import recover
 from livebode.records.summary_file import COPY, RUN, read_summary, to_document
 from livebode.records.versions import VERSIONS, format_of
-from tests.support import stored
+from tests.support import stored, stored_matrix
 from tests.support.errors import refused
 from tests.support.recorded import NAMES
 from tests.support.stateful_cases import MONITORED
@@ -73,6 +74,20 @@ def test_a_finished_run_is_read_exactly(folder: Path) -> None:
     assert (rows[-3]["name"], rows[-3]["value"], rows[-3]["status"]) == ("J", 0.03837103485160787, "ok")
     assert [event.kind for event in run.events()].count("fit-failed") == 3
     assert (run.summary["counts"]["samples"], run.summary["configuration"]["lines"]["window"]) == (600, 20)
+    assert run.damages == []
+
+
+def test_a_matrix_run_of_version_2_is_read_exactly() -> None:
+    folder = Path(__file__).parent / "stored" / "matrix-2"
+    run = RunRecord.open(folder / "piece", matrix=True)
+    matrix = run.matrix()
+    assert stored_matrix.content(matrix) == json.loads((folder / "expected.json").read_text())
+    assert (len(matrix), matrix.outputs, matrix.inputs) == (12, ("y1", "y2"), ("u1", "u2"))
+    assert (
+        RunRecord.open(folder / "piece", entry="y2/u1")
+        .responses()
+        .equals(replace(matrix.entry("y2", "u1"), unit="rad/s/(N m)"))
+    )
     assert run.damages == []
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import livebode
+from livebode.configuration import Axis
+from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Block, Channel, ConfigError, RecordError, SignalError
 from livebode.mimo import MatrixSettings, MatrixTracker
 from livebode.records import RunRecord
@@ -89,6 +91,11 @@ def test_an_entry_reads_as_an_ordinary_run(recorded: Path) -> None:
     assert fit.average.frequency_hz.tolist() == LINES.frequency_hz.tolist()
 
 
+def test_the_recorded_configuration_is_that_of_the_run(recorded: Path, log: Path) -> None:
+    words = recorded_configuration(RunRecord.open(recorded, matrix=True).summary)
+    assert Axis.of(words, "run.json").signals == gantry_axis(log).signals
+
+
 def test_where_one_entry_is_needed_the_error_names_them(recorded: Path, tmp_path: Path) -> None:
     every = ["velocity1/u1", "velocity1/u2", "velocity2/u1", "velocity2/u2"]
     with refused(RecordError, "entry-missing", allowed=every):
@@ -141,7 +148,7 @@ def test_a_live_source_gives_what_the_recording_gives(block: Block, recorded: Pa
         input = ["u1", "u2"]
         excitation = ["w1", "w2"]
         [lines]
-        frequencies = "10:40:10"
+        frequencies = "10:60:5"
         window = 800
         [tracking]
         hop = 200

@@ -15,11 +15,11 @@ from livebode.simulation import GantryLoop
 from tests.support.command import write_parquet
 
 RATE_HZ, WINDOW, DWELL, SETTLE = 4000, 800, 6, 4
-LINES = Lines.parse("10:40:10", rate_hz=RATE_HZ, window=WINDOW)
+LINES = Lines.parse("10:60:5", rate_hz=RATE_HZ, window=WINDOW)
 NAMES = ("w1", "w2", "u1", "u2", "velocity1", "velocity2")
 SECTIONS: dict[str, Any] = {
     "signals": {"output": ["velocity1", "velocity2"], "input": ["u1", "u2"], "excitation": ["w1", "w2"]},
-    "lines": {"frequencies": "10:40:10", "window": WINDOW},
+    "lines": {"frequencies": "10:60:5", "window": WINDOW},
     "tracking": {"hop": 200},
     "experiments": {"dwell_periods": DWELL, "settle_periods": SETTLE, "memory": 3},
 }

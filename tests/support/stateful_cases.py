@@ -21,13 +21,20 @@ from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.fitting.drift import DriftTest
 from livebode.fleet.axis_stream import AxisStream
 from livebode.fleet.message import write_message
-from livebode.mimo import MatrixExcitation, MatrixSettings, MatrixTracker
+from livebode.mimo import (
+    MatrixExcitation,
+    MatrixResponses,
+    MatrixSettings,
+    MatrixTracker,
+    example_matrix_responses,
+)
 from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_table, places, signals_of
 from livebode.motion import MotionCorrection
 from livebode.preparation.checks import ChannelCheck
 from livebode.runtime.change_detection import ChangeDetection
 from livebode.runtime.continuing import StreamPosition
 from livebode.runtime.fits import Fits
+from livebode.runtime.matrix_columns import MatrixColumns
 from livebode.runtime.readiness import Readiness
 from livebode.runtime.run_counts import RunCounts
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
@@ -169,6 +176,22 @@ def matrix_tracker() -> Case:
         lambda: MatrixTracker(settings),
         [lambda stage, part=part: step(stage, part) for part in parts],
         [lambda: MatrixTracker(replace(settings, memory=3))],
+    )
+
+
+def matrix_columns() -> Case:
+    """Of the example's matrices, in two steps; in the second all are valid."""
+    matrices = example_matrix_responses()
+    inputs, lines = matrices.inputs, len(matrices.lines)
+
+    def step(stage: MatrixColumns, part: MatrixResponses) -> object:
+        stage.take(part)
+        return stage.summary(matrices.frequency_hz), stage.valid
+
+    return Case(
+        lambda: MatrixColumns(inputs, lines),
+        [lambda stage, part=part: step(stage, part) for part in (matrices[:1], matrices[1:2], matrices[2:])],
+        [lambda: MatrixColumns(inputs, lines + 1)],
     )
 
 
@@ -377,7 +400,8 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, direct_tracker, successive_trackers, matrix_tracker, local_polynomial, welch_average, spectra_tracker,
+        tracker, direct_tracker, successive_trackers, matrix_tracker, matrix_columns, local_polynomial, welch_average,
+        spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
         run_counts, readiness, sequencer, axis_stream, stream_position,
     )

@@ -65,9 +65,8 @@ def read_strokes(
         If the recording cannot be read, or has no stretch without gaps.
     """
     log, axis, run = _configured(target)
-    settings: dict[str, Any] = {} if axis is None else axis.model_dump(exclude_none=True)
-    signals = settings.get("signals", {})
-    torque = input or signals.get("input")
+    settings: dict[str, Any] = {} if axis is None else axis.model_dump(exclude_none=True, by_alias=True)
+    torque = input or (None if axis is None else axis.signals.input)
     if torque is None:
         raise _missing("input", "the torque, force or current that moves the axis")
     if position and velocity:
@@ -77,7 +76,7 @@ def read_strokes(
             "give the one that is measured best",
             options=["position", "velocity"],
         )
-    output = position or velocity or signals.get("output")
+    output = position or velocity or (None if axis is None else axis.signals.output)
     if output is None:
         raise _missing("position", "the position or the velocity of the axis")
     turned = angle or settings.get("orders", {}).get("angle")

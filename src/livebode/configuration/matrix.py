@@ -52,7 +52,7 @@ def check_matrix(axis: Axis) -> None:
 
 
 def _check_keys(axis: Axis) -> None:
-    unused = ["source.skip_periods"] if "skip_periods" in axis.source.model_fields_set else []
+    unused = ["source.skip_periods"] if axis.source.skip_periods else []
     unused += [name for name in _OTHER_RUNS if getattr(axis, name) is not None]
     for name in sorted(axis.model_fields_set - _USED_WHOLE):
         section = getattr(axis, name)

@@ -103,7 +103,8 @@ class MeasuredAxis:
         """[loop] of the file or of the run."""
         if self._given is not None:
             return self._given.model_dump(exclude_unset=True, exclude_none=True)
-        return dict(self._recorded.get("loop", {}))
+        recorded = self._recorded.get("loop", {})
+        return {name: value for name, value in recorded.items() if name != "controllers"}
 
     def signal_names(self) -> dict[str, str]:
         """[signals] of the run; a design always has an excitation."""

@@ -85,7 +85,7 @@ def matrix_rows(responses: MatrixResponses) -> Table:
 
 def covariance_rows(responses: MatrixResponses) -> Table:
     """The factors of the covariance in long form: lines within a response, then "noise" and "spread" by rows."""
-    flat = [factor.reshape(*factor.shape[:2], -1) for factor in (responses.noise, responses.spread)]
+    flat = [factor.reshape(*factor.shape[:2], factor.shape[2] ** 2) for factor in (responses.noise, responses.spread)]
     value = np.concatenate(flat, axis=2)
     rows, lines, size = value.shape
     numbers = [np.indices((len(names), len(names))).reshape(2, -1) for names in (responses.outputs, responses.inputs)]
@@ -153,7 +153,7 @@ class _Factors:
     def _append(self, table: Table) -> None:
         shape = (table.num_rows // self._shape.covariance_rows, *self._value.shape[1:])
         value = _complex(table, shape)
-        sample = table["sample"].reshape(len(value), -1)[:, 0]
+        sample = table["sample"][:: self._shape.covariance_rows]
         self._sample = np.concatenate([self._sample, sample])
         self._value = np.concatenate([self._value, value])
 

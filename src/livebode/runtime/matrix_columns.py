@@ -31,6 +31,10 @@ class MatrixColumns(StatefulBase):
         self._condition = np.full(lines, np.nan)
 
     @property
+    def _identity(self) -> str:
+        return repr((self._inputs, len(self._condition)))
+
+    @property
     def valid(self) -> int:
         """Number of valid values: columns at lines of responses."""
         return int(self._counts[:, 0].sum())

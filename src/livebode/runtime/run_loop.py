@@ -108,7 +108,8 @@ class RunLoop(SampleLoop[Outcome]):
     def _compute(self, block: Block) -> list[Block]:
         ready = self._ready_parts(block)
         self._monitor_samples(ready)
-        self._record_and_publish(self._estimate(block))
+        responses = self._estimate(block)
+        self._record_and_publish(responses)
         return ready
 
     def _ready_parts(self, block: Block) -> list[Block]:

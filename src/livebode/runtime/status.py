@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from livebode.core import Block, Event, Responses
+from livebode.core import Block, Event, MatrixResponses, Responses
 from livebode.runtime.documents import Channels, Document, RunStarted, TrackerResults
 from livebode.runtime.run_control import RunControl
 from livebode.sources.live import Health, LiveBlock
@@ -57,7 +57,7 @@ class Status:
                 self.state, self.directory, self._control = "tracking", document.directory, document.control
             case Channels():
                 self.rate_hz = document.rate_hz
-            case Responses():
+            case Responses() | MatrixResponses():
                 self.responses += len(document)
             case Event():
                 self.event = document
