@@ -5,9 +5,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
+import pyuff
+import scipy.io
+import xarray as xr
 
 from livebode.core import Block
+from livebode.records import RunRecord
 from tests.support.command import livebode
 from tests.support.gantry_runs import NAMES, RATE_HZ, gantry_block, gantry_log
 
@@ -109,3 +115,48 @@ def test_a_query_sees_the_columns(folder: Path) -> None:
     ]
     factors = json.loads(livebode("query", folder / "before", "SELECT DISTINCT factor FROM covariance", "--json").out)
     assert sorted(row[0] for row in factors["rows"]) == ["noise", "spread"]
+
+
+def test_every_format_of_a_whole_matrix_run(folder: Path) -> None:
+    matrix = RunRecord.open(folder / "before", matrix=True).matrix()
+    for to, ending in {"csv": ".csv", "mat": ".mat", "netcdf": ".nc", "uff": ".uff"}.items():
+        done = livebode("export", folder / "before", "--to", to, "--out", folder / f"whole{ending}")
+        assert (done.code, done.err) == (0, "")
+    table = pd.read_csv(folder / "whole.csv")
+    assert len(table) == matrix.value.size
+    last = table[(table.output == "velocity2") & (table.input == "u1") & (table["sample"] == matrix.sample[-1])]
+    found = last.re.to_numpy() + 1j * last.im.to_numpy()
+    assert np.allclose(found, matrix.value[-1, :, 1, 0], rtol=1e-14, atol=0)
+    struct = scipy.io.loadmat(folder / "whole.mat")["livebode"][0, 0]
+    assert struct["H"].shape == (2, 2, len(matrix.lines), len(matrix))
+    with xr.open_dataset(folder / "whole.nc") as dataset:
+        assert dataset.sizes["output"] == dataset.sizes["input"] == 2
+    valid = int(np.count_nonzero(matrix.valid.sum(axis=1) >= 2)) * 2  # of each column two outputs
+    assert pyuff.UFF(str(folder / "whole.uff")).get_n_sets() == valid
+
+
+def test_the_newest_matrix_and_one_entry(folder: Path) -> None:
+    matrix = RunRecord.open(folder / "before", matrix=True).matrix().newest()
+    assert livebode("export", folder / "before", "--to", "mat", "--mean", "--out", folder / "mean.mat").code == 0
+    found = scipy.io.loadmat(folder / "mean.mat")["livebode"][0, 0]["H"]
+    assert np.array_equal(found[..., 0] if found.ndim == 4 else found, np.moveaxis(matrix.value[0], 0, -1))
+    options = ["--to", "mat", "--mean", "--entry", "velocity2/u1", "--out", folder / "entry.mat"]
+    assert livebode("export", folder / "before", *options).code == 0
+    one = scipy.io.loadmat(folder / "entry.mat")["livebode"][0, 0]["H"]
+    assert np.array_equal(one.ravel(), matrix.value[0, :, 1, 0])
+
+
+@pytest.mark.parametrize(
+    ("options", "remedy"),
+    [
+        (["--to", "xlsx"], "choose csv, mat, netcdf or uff"),
+        (["--to", "csv", "--at", "1"], "use --mean for the newest matrix"),
+        (["--to", "csv", "--entry", "velocity3/u1"], f"choose one of {EVERY}"),
+    ],
+)
+def test_what_cannot_be_exported_is_refused_in_one_sentence(folder: Path, options: list[str], remedy: str) -> None:
+    found = livebode("export", folder / "before", *options, "--out", folder / "refused")
+    assert found.code == 2
+    assert remedy in found.err
+    assert len(found.err.strip().splitlines()) == 1
+    assert not (folder / "refused").exists()
