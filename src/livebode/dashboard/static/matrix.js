@@ -211,15 +211,17 @@ export class Matrix {
         class: `entry${valid ? "" : " invalid"}`,
         "data-axis": axis,
         "aria-current": current ? "true" : null,
-        "aria-label": [tr("{output} from {input}", { output: outputs[o], input: inputs[i] }), words, peak]
-          .filter(Boolean)
-          .join("; "),
         onclick: () => {
           if (axis !== this.page.axis) this.choose(axis);
           this.show(false);
           $("matrix-open").focus();
         },
       },
+      element(
+        "span",
+        { class: "unseen" },
+        `${tr("{output} from {input}", { output: outputs[o], input: inputs[i] })}; ${state}; `,
+      ),
       element(
         "span",
         { class: "scale" },
