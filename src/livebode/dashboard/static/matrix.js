@@ -203,7 +203,8 @@ export class Matrix {
       points: hz.length <= FEW_LINES,
       axes: false,
     });
-    const current = axis === this.page.axis;
+    const current = axis === this.page.axis,
+      name = tr("{output} from {input}", { output: outputs[o], input: inputs[i] });
     return element(
       "button",
       {
@@ -217,11 +218,7 @@ export class Matrix {
           $("matrix-open").focus();
         },
       },
-      element(
-        "span",
-        { class: "unseen" },
-        `${tr("{output} from {input}", { output: outputs[o], input: inputs[i] })}; ${state}; `,
-      ),
+      element("span", { class: "unseen" }, `${name}; ${state}; `),
       element(
         "span",
         { class: "scale" },
