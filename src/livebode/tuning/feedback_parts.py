@@ -44,7 +44,7 @@ class FeedbackParts:
     >>> parts.values
     {'gain': 0.2, 'integral_time_s': 0.1}
     >>> abs(parts.response({"gain": 0.4})).round(4)
-    array([0.4051, 0.4   ])
+    array([0.4055, 0.4006])
     """
 
     values: Mapping[str, float]

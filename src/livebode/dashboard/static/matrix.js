@@ -203,7 +203,8 @@ export class Matrix {
       points: hz.length <= FEW_LINES,
       axes: false,
     });
-    const current = axis === this.page.axis;
+    const current = axis === this.page.axis,
+      name = tr("{output} from {input}", { output: outputs[o], input: inputs[i] });
     return element(
       "button",
       {
@@ -211,15 +212,13 @@ export class Matrix {
         class: `entry${valid ? "" : " invalid"}`,
         "data-axis": axis,
         "aria-current": current ? "true" : null,
-        "aria-label": [tr("{output} from {input}", { output: outputs[o], input: inputs[i] }), words, peak]
-          .filter(Boolean)
-          .join("; "),
         onclick: () => {
           if (axis !== this.page.axis) this.choose(axis);
           this.show(false);
           $("matrix-open").focus();
         },
       },
+      element("span", { class: "unseen" }, `${name}; ${state}; `),
       element(
         "span",
         { class: "scale" },
