@@ -73,9 +73,7 @@ def check(dialect: Dialect, text: bytes) -> None:
 @example(
     Dialect(",", False, ",", headings=("a", "b", "c"), kinds=(CellKind.NUMBER,) * 3), [["", "0", "0.0", "inf"]], "\n"
 )
-@example(
-    Dialect(";", True, ".", headings=("a", "b", "c"), kinds=(CellKind.NUMBER,) * 3), [["0.0", "0.0", "0.0"]], "\n"
-)
+@example(Dialect(";", True, ".", headings=("a", "b", "c"), kinds=(CellKind.NUMBER,) * 3), [["0.0", "0.0", "0.0"]], "\n")
 @given(DIALECTS, st.lists(st.lists(CELLS, min_size=2, max_size=4), max_size=6), st.sampled_from(["\n", "\r\n", "\r"]))
 def test_rows_have_the_values_of_their_definition(dialect, rows, end):
     text = end.join(dialect.delimiter.join(cells) for cells in rows).encode()
