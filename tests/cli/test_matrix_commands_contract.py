@@ -180,3 +180,15 @@ def test_what_cannot_be_exported_is_refused_in_one_sentence(folder: Path, option
     assert remedy in found.err
     assert len(found.err.strip().splitlines()) == 1
     assert not (folder / "refused").exists()
+
+
+def test_a_report_of_one_entry(folder: Path) -> None:
+    options = ["--entry", "velocity2/u1", "--out", folder / "entry", "--json"]
+    found = livebode("report", folder / "before", *options)
+    assert found.code == 0, found.err
+    page = (folder / "entry.html").read_text()
+    assert "velocity2" in page
+    assert "velocity1" not in page
+    refused = livebode("report", folder / "before", *options, "--force", "--on", folder / "after.parquet")
+    assert refused.code == 2
+    assert "livebode validate RUN --entry" in refused.err
