@@ -58,6 +58,26 @@ def test_the_result_lists_the_entries_and_the_condition(folder: Path) -> None:
     assert "inputs: condition number at most " in found.out
 
 
+def test_a_run_draws_its_pictures_and_is_replaced_with_them(folder: Path) -> None:
+    again = ("run", folder / "before.toml", "--out", folder / "drawn", "--force")
+    for _ in range(2):
+        found = livebode(*again, pictures=True)
+        assert (found.code, found.err) == (0, "")
+    assert sorted(path.name for path in (folder / "drawn").iterdir()) == [
+        "bode.png", "covariance.parquet", "events.jsonl", "responses.parquet", "run-copy.json", "run.json",
+        "singular-values.png",
+    ]  # fmt: skip
+
+
+def test_without_matplotlib_a_run_says_how_to_get_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("livebode.cli.picture_support.can_draw", lambda: False)
+    monkeypatch.setattr("livebode.cli.pictures.can_draw", lambda: False)
+    found = livebode("run", folder / "before.toml", "--out", folder / "bare", pictures=True)
+    assert found.code == 0
+    assert found.out.count("no pictures, because Matplotlib is not installed; run ") == 1
+    assert not (folder / "bare" / "bode.png").exists()
+
+
 def test_repeated_options_make_a_matrix(folder: Path) -> None:
     roles = [("--output", "velocity1"), ("--output", "velocity2"), ("--input", "u1"), ("--input", "u2")]
     roles += [("--excitation", "w1"), ("--excitation", "w2")]
@@ -160,3 +180,15 @@ def test_what_cannot_be_exported_is_refused_in_one_sentence(folder: Path, option
     assert remedy in found.err
     assert len(found.err.strip().splitlines()) == 1
     assert not (folder / "refused").exists()
+
+
+def test_a_report_of_one_entry(folder: Path) -> None:
+    options = ["--entry", "velocity2/u1", "--out", folder / "entry", "--json"]
+    found = livebode("report", folder / "before", *options)
+    assert found.code == 0, found.err
+    page = (folder / "entry.html").read_text()
+    assert "velocity2" in page
+    assert "velocity1" not in page
+    refused = livebode("report", folder / "before", *options, "--force", "--on", folder / "after.parquet")
+    assert refused.code == 2
+    assert "livebode validate RUN --entry" in refused.err

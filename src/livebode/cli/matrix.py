@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from livebode.cli.picture_support import tell_how_to_draw
 from livebode.cli.pictures import tracked_amount
 from livebode.core import MatrixResponses
 from livebode.locations import original
@@ -20,6 +21,7 @@ def show_matrix(outcome: Outcome, newest: MatrixResponses) -> None:
         print(sentence)
     if not newest.valid.any():
         print("if the inputs move, compare [experiments] with the recording: dwell_periods, settle_periods, start")
+    tell_how_to_draw()
 
 
 def matrix_lines(newest: MatrixResponses) -> list[str]:

@@ -13,12 +13,13 @@ from typing import Any
 
 from livebode.cli.picture_support import can_draw, tell_how_to_draw
 from livebode.cli.terminal import is_terminal, print_drawn
-from livebode.core import Model, Responses, counted
+from livebode.core import MatrixResponses, Model, Responses, counted
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.fitting import Fit
 from livebode.fitting.common_poles import CommonPoles
 from livebode.locations import original
 from livebode.runtime import Draw, Outcome
+from livebode.runtime.destination import DrawMatrix
 
 _ALARMS_SHOWN = 8
 _ONE_AT_A_TIME = threading.Lock()
@@ -39,6 +40,20 @@ def drawing(title: str, names: tuple[str, str]) -> Draw:
 
         with _ONE_AT_A_TIME:
             save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
+
+    return draw
+
+
+def drawing_matrix(title: str) -> DrawMatrix:
+    """A function that draws the bode.png and singular-values.png of a matrix run, if Matplotlib is installed."""
+
+    def draw(responses: MatrixResponses, into: Path) -> None:
+        if not can_draw():
+            return
+        from livebode.report import save_matrix_pictures
+
+        with _ONE_AT_A_TIME:
+            save_matrix_pictures(responses, into, title=title)
 
     return draw
 

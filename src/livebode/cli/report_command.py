@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.options import Json
+from livebode.cli.options import Entry, Json
 from livebode.cli.remote import results_directory
 from livebode.cli.report_options import (
     Appendix,
@@ -61,6 +61,7 @@ def report_command(
     logo: LogoFile = None,
     paper: PaperSize = None,
     language: ReportLanguage = None,
+    entry: Entry = None,
     ask: Ask = False,
     appendix: Appendix = False,
     check: Annotated[
@@ -72,7 +73,7 @@ def report_command(
 
     The first page and the limits are from the [report] of the axis.toml with which the run was recorded, from
     --template, and from the options. An existing report in the run directory is replaced. The PDF needs the extra
-    `pdf`. Without --check the exit code does not depend on the limits.
+    `pdf`. Without --check the exit code does not depend on the limits. Of a matrix run the report is on one --entry.
     """
     from livebode.cli.documents import write_documents
     from livebode.configuration.recorded import recorded_report
@@ -82,7 +83,7 @@ def report_command(
     from livebode.reporting.report_data import read
     from livebode.reporting.run_report import report_of
 
-    run = RunRecord.open(directory, on_damage=lambda _: None)
+    run = RunRecord.open(directory, on_damage=lambda _: None, entry=entry)
     options = {
         "machine": machine, "serial_number": serial_number, "operator": operator, "company": company,
         "customer": customer, "conditions": conditions, "logo": logo, "paper": paper,
@@ -90,9 +91,11 @@ def report_command(
     first = header(recorded_report(run.summary), template, ask, options)
     if check and not first.limits:
         raise _no_limits()
+    if on is not None and entry is not None:
+        raise _not_on_an_entry()
     judged = None if on is None else _judged(directory, on)
     with moments_by(run.clock), in_language(language or first.language or "en"):
-        of = read(directory, judged, first)
+        of = read(directory, judged, first, entry)
         document = report_of(of, made=datetime.now(UTC), appendix=appendix)
         files, remark = write_documents(
             document, out or results_directory(directory) / "report", force=force or out is None
@@ -122,6 +125,17 @@ def _no_limits() -> Exception:
         "--check needs limits, and neither the run nor a template has any",
         "add [[report.limits]] to the axis.toml, or use --template",
         argument="--check",
+    )
+
+
+def _not_on_an_entry() -> Exception:
+    from livebode.core import UsageError
+
+    return UsageError(
+        "conflict",
+        "--on and --entry exclude each other in a report: the other inputs of a matrix move in the recording, too",
+        "compare the entry with another run by `livebode validate RUN --entry OUTPUT/INPUT --on RUN`",
+        options=["--on", "--entry"],
     )
 
 

@@ -116,7 +116,7 @@ def run_command(
 
     Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png; with several
     --output one for each in --out, which livebode fit takes together. With several --input, or with --matrix, the run
-    has a matrix of responses from all inputs to all outputs.
+    has a matrix of responses from all inputs to all outputs, and singular-values.png instead of tracking.png.
     """
     as_matrix = matrix or any(len(names or []) > 1 for names in (input, excitation))
     given: dict[str, dict[str, Any]] = {

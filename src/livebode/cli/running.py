@@ -6,6 +6,7 @@ import gc
 import re
 import signal
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,7 +17,7 @@ from livebode.cli.band import parsed_band
 from livebode.cli.matrix import show_matrix
 from livebode.cli.notices import NoticePrinter
 from livebode.cli.picture_support import tell_how_to_draw
-from livebode.cli.pictures import drawing, load_beside, show, tracked_amount
+from livebode.cli.pictures import drawing, drawing_matrix, load_beside, show, tracked_amount
 from livebode.cli.publishing import published, publishing_to
 from livebode.cli.remote import recorded_at
 from livebode.cli.serving import SubscribersOf, served
@@ -25,7 +26,7 @@ from livebode.configuration.serve_section import ServeSection
 from livebode.core import ConfigError, LivebodeError, LocationError, UsageError
 from livebode.locations import Location, Url, local_copy, location, original
 from livebode.records import to_json
-from livebode.runtime import Destination, Document, Draw, Outcome, StoppedError, Subscriber, run
+from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, run
 from livebode.runtime.documents import TrackerResults
 from livebode.sources.formats import read_head
 
@@ -192,8 +193,8 @@ def _run(
     """Track one recording."""
 
     def job(own: tuple[Subscriber, ...]) -> Outcome:
-        to = Destination(directory, _drawing(axis), force, (*subscribers, *own), prepare=load_beside)
-        return run(axis, publishing_to(to, publisher, ""))
+        to = _destination(axis, directory, force, (*subscribers, *own))
+        return run(axis, publishing_to(replace(to, prepare=load_beside), publisher, ""))
 
     return _with_progress(job, quiet)
 
@@ -267,7 +268,7 @@ def _run_axes(
 
     def to(name: str, axis: Axis) -> Destination:
         subscribers = (*subscribers_of(name), shown.subscriber(name))
-        return publishing_to(Destination(directory / name, _drawing(axis), force, subscribers), publisher, name)
+        return publishing_to(_destination(axis, directory / name, force, subscribers), publisher, name)
 
     gc.freeze()  # what is loaded remains: a search through it would stop all axes for tens of milliseconds
     shown = AxesTerminal(quiet=as_json)
@@ -294,11 +295,13 @@ def _run_axes(
         raise typer.Exit(2 if all(isinstance(error, (LivebodeError, StoppedError)) for error in errors) else 1)
 
 
-def _drawing(axis: Axis) -> Draw:
+def _destination(axis: Axis, directory: Path, force: bool, subscribers: tuple[Subscriber, ...]) -> Destination:
+    """Where an axis is recorded, with its pictures."""
     if axis.signals.is_matrix:
-        return drawing(axis.source.title, ("", ""))  # a matrix run draws nothing
+        title = axis.source.title
+        return Destination(directory, drawing(title, ("", "")), force, subscribers, draw_matrix=drawing_matrix(title))
     names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
-    return drawing(f"{axis.source.title}: {axis.signals.output}", names)
+    return Destination(directory, drawing(f"{axis.source.title}: {axis.signals.output}", names), force, subscribers)
 
 
 def _show(outcome: Outcome, as_json: bool) -> None:

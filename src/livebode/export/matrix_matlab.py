@@ -28,8 +28,8 @@ def write_matrix_mat(
     product is the covariance of all entries; ``coherence`` (outputs, lines, responses), ``condition`` (lines,
     responses), ``valid`` and ``reason`` (inputs, lines, responses) with ``reasons`` as their words; ``OutputName``,
     ``InputName``, ``units`` (outputs, inputs); ``f_hz`` (lines, 1), ``time_s``, ``dof``, ``first``, ``sample``
-    (1, responses), ``Ts`` in seconds, ``window``, and ``run``, run.json as text. A single response has only lines with
-    a valid column; invalid columns are NaN.
+    (1, responses), ``Ts`` in seconds, ``window``, and ``run``, run.json as text. A single response has only lines
+    with a valid column; invalid columns are NaN.
 
     Raises
     ------

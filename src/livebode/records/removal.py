@@ -14,13 +14,14 @@ from livebode.records.summary_file import read_summary
 
 _SHOWN = 5
 _PARTIAL = r"\.partial(-[0-9a-f]{8})?"  # of livebode.core.files
-_REPLACED = r"(run|run-copy|references|notes)\.json|report\.(html|pdf)|(bode|tracking|modes|margins|validation)\.png"
+_DRAWN = r"(bode|tracking|modes|margins|validation|singular-values)\.png"
+_REPLACED = rf"(run|run-copy|references|notes)\.json|report\.(html|pdf)|{_DRAWN}"
 _FILES = re.compile(
     rf"{_REPLACED}|\.({_REPLACED}){_PARTIAL}|(events|manifest)\.jsonl|(responses|covariance|parameters)\.parquet"
 )
 _SEGMENT = re.compile(r"\d{6,9}(-\d{6,9})?\.parquet|\.\d{6,9}(-\d{6,9})?\.parquet\.partial")
 _JOURNAL = re.compile(r"\d{6,9}\.journal|\.\d{6,9}\.journal\.partial")
-_PICTURE = re.compile(rf"[a-z]+\.png|\.[a-z]+\.png{_PARTIAL}")
+_PICTURE = re.compile(rf"[a-z-]+\.png|\.[a-z-]+\.png{_PARTIAL}")
 _FOLDERS = {
     "responses": _SEGMENT, "covariance": _SEGMENT, "parameters": _SEGMENT, "samples": _SEGMENT,
     "responses_1s": _SEGMENT, "responses_1min": _SEGMENT, "responses_1h": _SEGMENT,

@@ -220,7 +220,7 @@ class RunRecord:
         """All matrices of a matrix run, as written; no rows before the first. RecordError of another run."""
         shape = self._matrix_shape
         none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
-        return MatrixResponses.join(list(self.matrix_batches()) or list(none))
+        return MatrixResponses.join(list(self.matrix_batches()) or [self._with_units(one) for one in none])
 
     def matrix_batches(self, size_bytes_max: int | None = None) -> Iterator[MatrixResponses]:
         """All readable matrices in order, in parts of bounded size; or the newest, from files up to this size.
@@ -233,7 +233,10 @@ class RunRecord:
         shape = self._matrix_shape
         responses = self._whole(self.tables("responses", size_bytes_max), shape.response_rows, (MATRIX_SCHEMA.names,))
         covariance = self._whole(self.tables("covariance"), shape.covariance_rows, (COVARIANCE_SCHEMA.names,))
-        yield from matrices(responses, covariance, shape)
+        yield from map(self._with_units, matrices(responses, covariance, shape))
+
+    def _with_units(self, responses: MatrixResponses) -> MatrixResponses:
+        return replace(responses, units=tuple(map(tuple, self.summary["found"]["units"])))
 
     @property
     def lines(self) -> Lines:

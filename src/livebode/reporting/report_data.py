@@ -111,15 +111,17 @@ class ReportData:
         return {role: str(name) for role, name in self.configuration.get("signals", {}).items()}
 
 
-def read(directory: Path, judged: Judged | None = None, header: ReportSection | None = None) -> ReportData:
-    """Read the run; `header` replaces the [report] with which it was recorded.
+def read(
+    directory: Path, judged: Judged | None = None, header: ReportSection | None = None, entry: str | None = None
+) -> ReportData:
+    """Read the run, or an entry of a matrix run; `header` replaces the [report] with which it was recorded.
 
     Raises
     ------
     RecordError, SignalError
         If the directory is not a run, cannot be read, or has no valid response.
     """
-    run = RunRecord.open(directory)
+    run = RunRecord.open(directory, entry=entry)
     configuration, of = recorded_configuration(run.summary), averaged(run)
     fit, fit_words = _fit(configuration, of)
     loop, loop_words = _loop(run, configuration, of, fit)

@@ -7,15 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from livebode.core import Model, Responses
+from livebode.core import MatrixResponses, Model, Responses
 from livebode.runtime.documents import Subscriber
 from livebode.runtime.recorder import Recorder
 
 Draw = Callable[[Responses, Path, str, Model | None], None]
+DrawMatrix = Callable[[MatrixResponses, Path], None]
 
 
 def nothing() -> None:
     """No preparation."""
+
+
+def no_pictures(_responses: MatrixResponses, _into: Path) -> None:
+    """No pictures of a matrix run."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,8 @@ class Destination:
         Called once when a recording has been opened: loads, beside the run, what `draw` needs.
     findings
         Called at the end of the run: entries of run.json about its subscribers.
+    draw_matrix
+        Instead of `draw` of a matrix run: called with the newest matrix that has a valid column, and the directory.
     """
 
     directory: Path
@@ -49,3 +56,4 @@ class Destination:
     record: Recorder | None = None
     prepare: Callable[[], None] = nothing
     findings: Callable[[], Mapping[str, Any]] = dict
+    draw_matrix: DrawMatrix = no_pictures

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,8 @@ class MatrixRunLoop(SampleLoop[Outcome]):
     ) -> None:
         self.pipeline, self._tracker = pipeline, pipeline.tracker
         self._newest: MatrixResponses | None = None
+        self._drawn: MatrixResponses | None = None
+        self._units = tuple(map(tuple, _units(self._tracker.settings, source.channels)))
         super().__init__(source, pipeline, to, about=about, **others)
 
     def _describe(self) -> dict[str, Any]:
@@ -57,7 +59,7 @@ class MatrixRunLoop(SampleLoop[Outcome]):
     def _compute(self, block: Block) -> list[Block]:
         self._count(block)
         before = time.perf_counter()
-        responses = self._tracker.process(block, self._events.append)
+        responses = replace(self._tracker.process(block, self._events.append), units=self._units)
         self._counts.take(responses, time.perf_counter() - before)
         self.pipeline.columns.take(responses)
         if len(responses):
@@ -68,6 +70,8 @@ class MatrixRunLoop(SampleLoop[Outcome]):
     def _remember(self, responses: MatrixResponses) -> None:
         if len(responses):
             self._newest = MatrixResponses.join([responses[-1:]])  # a view would keep all rows in memory
+        if len(valid := responses.newest()):
+            self._drawn = MatrixResponses.join([valid])
 
     def _check_signals(self, block: Block, ready: list[Block]) -> None:
         """A matrix has its reasons in each response."""
@@ -103,7 +107,8 @@ class MatrixRunLoop(SampleLoop[Outcome]):
         return done | self.pipeline.columns.summary(self._tracker.settings.lines.frequency_hz)
 
     def _draw(self, into: Path) -> None:
-        """A matrix run has no pictures of its own; `livebode report` draws its entries."""
+        if (responses := self._drawn or self._newest) is not None:
+            self.to.draw_matrix(responses, into)
 
     def _outcome(self) -> Outcome:
         return Outcome(self.to.directory, self._done, None, matrix=self._newest)
@@ -111,9 +116,7 @@ class MatrixRunLoop(SampleLoop[Outcome]):
 
 def _found(settings: MatrixSettings, channels: tuple[Channel, ...]) -> dict[str, Any]:
     """Entries of run.json under `found`: the grid, the signals and the experiments."""
-    by_name = {channel.name: channel for channel in channels}
-    outputs = [by_name.get(name, Channel(name)) for name in settings.output]
-    inputs = [by_name.get(name, Channel(name)) for name in settings.columns]
+    outputs, inputs = _channels(settings, channels)
     lines = settings.lines
     return {
         "rate_hz": lines.rate_hz,
@@ -126,7 +129,7 @@ def _found(settings: MatrixSettings, channels: tuple[Channel, ...]) -> dict[str,
         "unit": "",
         "outputs": list(settings.output),
         "inputs": list(settings.columns),
-        "units": [[f"{o.unit}/({i.unit})" if o.unit and i.unit else "" for i in inputs] for o in outputs],
+        "units": _units(settings, channels),
         "kinds_of_entries": [[asdict(PlantKinds.of(o, i)) for i in inputs] for o in outputs],
         "experiments": {
             "number": settings.count,
@@ -137,3 +140,17 @@ def _found(settings: MatrixSettings, channels: tuple[Channel, ...]) -> dict[str,
             "condition_max": settings.condition_max,
         },
     }
+
+
+def _units(settings: MatrixSettings, channels: tuple[Channel, ...]) -> list[list[str]]:
+    """Unit of each entry, a row for each output; empty where not known."""
+    outputs, inputs = _channels(settings, channels)
+    return [[f"{o.unit}/({i.unit})" if o.unit and i.unit else "" for i in inputs] for o in outputs]
+
+
+def _channels(settings: MatrixSettings, channels: tuple[Channel, ...]) -> tuple[list[Channel], list[Channel]]:
+    """Those of the outputs and of the inputs."""
+    by_name = {channel.name: channel for channel in channels}
+    outputs = [by_name.get(name, Channel(name)) for name in settings.output]
+    inputs = [by_name.get(name, Channel(name)) for name in settings.columns]
+    return outputs, inputs
