@@ -94,7 +94,7 @@ def test_one_run_of_several_outputs(folder: Path) -> None:
     assert json.loads((folder / "outputs" / "run.json").read_text())["found"]["outputs"] == ["velocity1", "velocity2"]
 
 
-@pytest.mark.parametrize("command", [["fit"], ["margins"], ["report"]])
+@pytest.mark.parametrize("command", [["margins"], ["report"]])
 def test_a_missing_entry_is_answered_by_the_names(folder: Path, command: list[str]) -> None:
     found = livebode(*command, folder / "before")
     assert found.code == 2

@@ -39,7 +39,7 @@ def test_samples_around_an_alarm_are_saved_with_exact_numbers(
     monkeypatch.setattr(alarm_samples, "_LATE_S", -2 * alarm_samples.AROUND_S)  # all of them are in the log already
     log, axes, lake = log_section(server.url), fleet_axes(2), tmp_path / "lake"
     key = next(iter(axes))
-    signals = axes[key].signals.model_copy(update={"output": "missing"})
+    signals = axes[key].signals.model_copy(update={"outputs": "missing"})
     sent(log, axes, 20)
     sent(log, axes, 20, 23)  # three batches are lost
     owned_until_current(log, axes | {key: axes[key].model_copy(update={"signals": signals})})

@@ -89,7 +89,7 @@ def test_the_messages_are_tracked(kind: str) -> None:
 
 
 def test_an_axis_that_cannot_be_tracked_fails_with_the_same_event_however_its_messages_are_taken() -> None:
-    wrong = AXIS.model_copy(update={"signals": AXIS.signals.model_copy(update={"output": "z"})})
+    wrong = AXIS.model_copy(update={"signals": AXIS.signals.model_copy(update={"outputs": "z"})})
     one_by_one = _tracked(wrong, SAMPLE_MESSAGES, set(range(1, COUNT + 1)), set())
     assert _tracked(wrong, SAMPLE_MESSAGES, set(), set()) == one_by_one
     assert len(one_by_one[2]) == 1

@@ -10,7 +10,7 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.options import From, Json, Rate, Time, To
 from livebode.cli.remote import results_directory
-from livebode.core import OutputError, UsageError
+from livebode.core import OutputError, UsageError, counted
 from livebode.core.writing import writing
 from livebode.locations import location
 
@@ -250,7 +250,7 @@ def show_changes(changes: list[OrderChange], found: OrderReport, baseline: str) 
     changed = [one for one in changes if one.changed]
     for one in changed:
         console.print(one.sentence(found.unit), soft_wrap=True)
-    words = f"{len(changed) or 'no'} order{'s' * (len(changed) != 1)} changed"
+    words = f"{counted(len(changed), 'order') if changed else 'no order'} changed"
     console.print(
         f"compared with {baseline}: {words} of {len(changes)}; probability of a false alarm {100 * FALSE_ALARM:g} %",
         soft_wrap=True,

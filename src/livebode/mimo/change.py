@@ -117,13 +117,13 @@ def compare_matrices(before: MatrixResponses, after: MatrixResponses, alpha: flo
     >>> compare_matrices(responses, responses).sentence
     'no entry changed by more than chance explains (7 lines, false alarms 1 %)'
     """
-    pair = Pair.of(mean_matrix(before), mean_matrix(after))
+    pair = MatrixPair.of(mean_matrix(before), mean_matrix(after))
     entries = sorted(pair.entries(), key=lambda one: one.probability)
     return MatrixChange(pair.probability, alpha, len(pair.frequency_hz), tuple(entries))
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class MatrixPair:
     """The difference of two matrices, after minus before, and its covariance noise ⊗ spread, at common valid lines.
 
     Attributes
@@ -148,7 +148,7 @@ class Pair:
     size: Floats
 
     @classmethod
-    def of(cls, before: MatrixResponses, after: MatrixResponses) -> Pair:
+    def of(cls, before: MatrixResponses, after: MatrixResponses) -> MatrixPair:
         """Of two matrices of one row each."""
         same = (before.outputs, before.inputs) == (after.outputs, after.inputs)
         a, b = before.lines, after.lines

@@ -23,7 +23,7 @@ _EPSILON_MAX, _HALVINGS = 1e3, 60
 
 
 @dataclass(frozen=True, eq=False)
-class Minimum:
+class MatrixMinimum:
     """Where the least squares ended.
 
     Attributes
@@ -47,7 +47,7 @@ class Minimum:
     settled: bool
 
 
-def minimise(weighted: Weighted, model: Model, slopes: Model, start: Floats) -> Minimum:
+def minimise(weighted: Weighted, model: Model, slopes: Model, start: Floats) -> MatrixMinimum:
     """Fit from a start near the minimum, and again with the ε with which reduced chi² is 1."""
     dof = float(max(weighted.count - start.size, 1))
     epsilon, found, settled = 0.0, start, False
@@ -67,7 +67,7 @@ def minimise(weighted: Weighted, model: Model, slopes: Model, start: Floats) -> 
     rest = _rest(weighted, response, inverse)
     chi2 = _chi2(_rest(weighted, response, weighted.part(0.0)[0]))
     widened = 1 + (weighted.scatter - 1) * share
-    return Minimum(found, covariance * widened, epsilon, chi2, dof, rest, settled)
+    return MatrixMinimum(found, covariance * widened, epsilon, chi2, dof, rest, settled)
 
 
 def _searched(weighted: Weighted, model: Model, slopes: Model, inverse: Complex, start: Floats) -> tuple[Floats, bool]:

@@ -13,7 +13,7 @@ from livebode.fitting.partial_fractions import PartialFractions, Structure
 from livebode.fitting.physical import Hold
 from livebode.fitting.pole_search import Kind, search
 from livebode.fitting.separable import Outputs, Separated
-from livebode.mimo.least_squares import Minimum, minimise
+from livebode.mimo.least_squares import MatrixMinimum, minimise
 from livebode.mimo.mean import mean_matrix
 from livebode.mimo.whitening import Weighted
 
@@ -162,7 +162,7 @@ def _started(like: MatrixModes, names: tuple[str, ...]) -> Separated:
     return like.found
 
 
-def _refined(weighted: Weighted, outs: Outputs, of: Separated) -> Minimum:
+def _refined(weighted: Weighted, outs: Outputs, of: Separated) -> MatrixMinimum:
     structure = of.structure
     shapes = PartialFractions(structure, outs.grid._replace(frequency_hz=weighted.frequency_hz), outs.unit)
 
@@ -204,7 +204,7 @@ def _slopes(shapes: PartialFractions, of: Structure, raw: Floats) -> Complex:
     return slope
 
 
-def _separated(of: Separated, outs: Outputs, minimum: Minimum) -> Separated:
+def _separated(of: Separated, outs: Outputs, minimum: MatrixMinimum) -> Separated:
     structure = of.structure
     theta, linear = _parts(structure, minimum.values)
     response = _response(PartialFractions(structure, outs.grid, outs.unit), structure, minimum.values).T

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from livebode.core import FitError, MatrixResponses, UsageError
-from livebode.mimo.change import EntryChange, Pair
+from livebode.mimo.change import EntryChange, MatrixPair
 from livebode.mimo.gantry_change import Cause, compare_gantries
 from livebode.mimo.mean import mean_matrix
 from livebode.simulation import Gantry
@@ -105,7 +105,7 @@ class MatrixMonitor:
             if not (responses.valid[row] & self._baseline.valid[0]).all(axis=1).any():
                 continue
             one = responses[np.array([row])]
-            pair = Pair.of(self._baseline, one)
+            pair = MatrixPair.of(self._baseline, one)
             span_s = float(one.sample[0] - one.first[0] + 1) / one.lines.rate_hz
             self._judged = int(one.sample[0])
             differs = pair.probability < span_s / self._interval_s
@@ -114,7 +114,7 @@ class MatrixMonitor:
             self.alarmed = differs
         return found
 
-    def _alarm(self, one: MatrixResponses, pair: Pair) -> MatrixAlarm:
+    def _alarm(self, one: MatrixResponses, pair: MatrixPair) -> MatrixAlarm:
         entry = min(pair.entries(), key=lambda changed: changed.probability)
         causes: tuple[Cause, ...] = ()
         if self._description is not None:
