@@ -158,7 +158,9 @@ def test_a_log_without_its_beginning_cannot_be_checked(server: LogServer) -> Non
 def test_an_axis_whose_channels_are_missing_is_not_tracked_and_the_others_are(server: LogServer) -> None:
     settings, axes = log_section(server.url), fleet_axes(2)
     key, other = axes
-    wrong = axes | {key: axes[key].model_copy(update={"signals": axes[key].signals.model_copy(update={"outputs": "z"})})}
+    wrong = axes | {
+        key: axes[key].model_copy(update={"signals": axes[key].signals.model_copy(update={"outputs": "z"})})
+    }
     sent(settings, axes, 20)
     owned_until_current(settings, wrong)
     found = {axis["axis"]: axis for axis in _status(settings, wrong)["axes"]}
