@@ -51,7 +51,7 @@ def read_gantry(path: Path) -> Gantry:
             )
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise UsageError(
-                "not-a-number",
+                "unreadable",
                 f"{str(path)!r}: {name} = {shortened(value)} is not a number",
                 "write one in the unit of the name",
                 argument="gantry",
