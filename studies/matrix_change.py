@@ -32,7 +32,7 @@ from livebode.simulation import Gantry, GantryLoop
 from livebode.simulation.gantry import CHANNELS
 from studies.result import Verdict
 
-RUNS, AT_ONCE, SEARCHED = 400, 25, 10
+RUNS, AT_ONCE, SEARCHED = 200, 25, 10
 RATE_HZ, NOISE_RAD_PER_S, AMPLITUDE_N_M = 1000.0, 0.05, 0.2
 LINES = Lines.parse("5:100:2.5", rate_hz=RATE_HZ, window=400)
 PERIODS = {"dwell": 3, "settle": 2}
@@ -49,6 +49,8 @@ SETTINGS = MatrixSettings(
     hop=LINES.window,
     **PERIODS,
 )
+SEARCH = "the order is chosen with independent entries; probably noise that they share looks like a pole, not measured"
+RINGING = "probably the yaw mode at 7.6 Hz, whose ringing carries noise from one window into the next; not measured"
 ALPHAS = (0.1, 0.05, 0.01)
 CHANGES = {
     "left belt's stiffness": {"stiffness_n_per_m": 0.98 * 4e5},
@@ -87,16 +89,22 @@ def true_modes(gantry: Gantry) -> Floats:
     return np.array([[abs(p) / (2 * np.pi), -p.real / abs(p)] for p in sorted(poles, key=abs)])
 
 
-def modes(measured: list[MatrixResponses]) -> tuple[float, Floats, Floats]:
-    """Share of right structures, 95 % coverage of frequencies and dampings (modes, 2), and without the highest mode."""
+def modes(measured: list[MatrixResponses]) -> tuple[float, Floats]:
+    """Share of right structures, and 95 % coverage of frequencies and dampings (modes, 2)."""
     truth = true_modes(GANTRY)
     searched = [fit_matrix(one) for one in measured[: min(SEARCHED, len(measured))]]
     right = [one for one in searched if one.found is not None and one.found.structure.pairs == len(truth)]
     inside = [_inside(fit_matrix(one, like=right[0]), truth) for one in measured]
-    lower = (LINES.frequency_hz[0], 62.5)
-    first = fit_matrix(measured[0], order=5, band_hz=lower)
-    lacking = [_inside(fit_matrix(one, like=first, band_hz=lower), truth[:2]) for one in measured]
-    return len(right) / len(searched), np.mean(inside, axis=0), np.mean(lacking, axis=0)
+    return len(right) / len(searched), np.mean(inside, axis=0)
+
+
+def lacking(measured: list[MatrixResponses]) -> tuple[float, float, Floats]:
+    """Of a fit without the mode at 71 Hz, to 62.5 Hz: share that says so, mean ε, and 95 % coverage (modes, 2)."""
+    band, truth = (5.0, 62.5), true_modes(GANTRY)[:2]
+    first = fit_matrix(measured[0], "modal", order=2, band_hz=band)
+    found = [fit_matrix(one, like=first, band_hz=band) for one in measured]
+    said, epsilon = np.mean([not one.complete for one in found]), np.mean([one.epsilon[0] for one in found])
+    return float(said), float(epsilon), np.mean([_inside(one, truth) for one in found], axis=0)
 
 
 def _inside(found: MatrixModes, truth: Floats) -> NDArray[np.bool_]:
@@ -146,12 +154,15 @@ def moved(before: list[MatrixResponses], seed: int) -> tuple[float, float, float
 def main(words: list[str]) -> int:
     runs = int(words[0]) if words else RUNS
     before, after = (matrices(GANTRY, runs, np.random.default_rng(seed)) for seed in (1, 2))
-    right, inside, lacking = modes(before)
-    print(Verdict("structures found by the search that are right", right, 0.95, at_least=True))
-    for name, shares, what in (("", inside, ""), ("lacking the mode at 71 Hz: ", lacking, "the lines end at 62.5 Hz")):
-        print(f"{name}covered by 95 % bounds of frequency and damping of each mode:", (100 * shares).round(1).tolist())
-        off = 100 * abs(shares.mean() - 0.95)
-        print(Verdict(f"{name}points from 95 %, mean of all", float(off), 2.0, why=what), flush=True)
+    right, inside = modes(before)
+    print(Verdict("structures found by the search that are right", right, 0.95, at_least=True, why=SEARCH))
+    print("covered by 95 % bounds of frequency and damping of each mode, %:", (100 * inside).round(1).tolist())
+    print(Verdict("points from 95 %, mean of all", float(100 * abs(inside.mean() - 0.95)), 2.0), flush=True)
+    worst = float(100 * np.abs(inside - 0.95).max())
+    print(Verdict("points from 95 %, worst quantity", worst, 2.0, why=RINGING), flush=True)
+    said, epsilon, inside = lacking(before)
+    print(f"the mode at 71 Hz lacking: ε {100 * epsilon:.2g} %, covered, %:", (100 * inside).round(1).tolist())
+    print(Verdict("the same: fits that say that ± is not a 95 % bound", said, 0.95, at_least=True), flush=True)
     covered = 100 * parameters(before)
     print("physical parameters covered by 95 % bounds, %:", covered.round(1).tolist())
     print(Verdict("points from 95 %, mean of all parameters", float(abs(covered.mean() - 95)), 2.0), flush=True)

@@ -67,7 +67,7 @@ def test_modes_and_shapes_are_those_of_the_machine(fitted: MatrixModes) -> None:
 
 
 def test_bounds_of_modes_and_parameters_cover(healthy: list[MatrixResponses], fitted: MatrixModes) -> None:
-    """12 recordings; `python -m studies.matrix_change` has 400. Off by less than four deviations of the binomial."""
+    """12 recordings; `python -m studies.matrix_change` has 200. Off by less than four deviations of the binomial."""
     truth = true_modes(GANTRY)
     inside = []
     for one in healthy:
