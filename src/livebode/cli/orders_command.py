@@ -10,7 +10,7 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.options import From, Json, Rate, Time, To
 from livebode.cli.remote import results_directory
-from livebode.core import OutputError, UsageError
+from livebode.core import OutputError, UsageError, counted
 from livebode.core.writing import writing
 from livebode.locations import location
 
@@ -45,6 +45,9 @@ def orders_command(
     highest: Annotated[
         float | None, typer.Option(metavar="HZ", help="Highest frequency of an order; below the antiresonance.")
     ] = None,
+    band: Annotated[
+        float, typer.Option(metavar="HZ", help="Band in which friction and inertia are found; as in livebode friction.")
+    ] = 5.0,
     time_lines: Annotated[
         str | None,
         typer.Option(metavar="HZ", help="Lines of an excitation or the mains, which are not orders: 20,40,50."),
@@ -100,6 +103,7 @@ def orders_command(
             turn=turn or section.turn,
             lines_hz=_lines(time_lines, samples),
             highest_hz=highest or section.highest_hz or float("inf"),
+            band_hz=band,
         )
 
     found = found_in(motion)
@@ -250,7 +254,7 @@ def show_changes(changes: list[OrderChange], found: OrderReport, baseline: str) 
     changed = [one for one in changes if one.changed]
     for one in changed:
         console.print(one.sentence(found.unit), soft_wrap=True)
-    words = f"{len(changed) or 'no'} order{'s' * (len(changed) != 1)} changed"
+    words = f"{counted(len(changed), 'order') if changed else 'no order'} changed"
     console.print(
         f"compared with {baseline}: {words} of {len(changes)}; probability of a false alarm {100 * FALSE_ALARM:g} %",
         soft_wrap=True,
