@@ -23,21 +23,24 @@ THERE_AND_BACK = (0.3, 0.8, 0.3, 0.8, 0.3, 0.8, 0.3)
 
 @dataclass(frozen=True)
 class Case:
-    """A motion, the amplitude of an excitation that runs at the same time, and the eccentricity of the encoder."""
+    """A motion, an excitation that runs at the same time, the eccentricity of the encoder, and the band of friction."""
 
     motion: StrokeSequence | Strokes
     excitation_n_m: float = 0.0
     eccentricity_rad: float = 0.0
+    band_hz: float = 5.0
 
 
 def _sequence(*speeds_m_per_s: float) -> StrokeSequence:
     return StrokeSequence(turning_points_m=THERE_AND_BACK, speeds_m_per_s=speeds_m_per_s)
 
 
+SLOW_RAMPS = Strokes(start_m=0.3, end_m=0.8, speed_m_per_s=0.22, acceleration_m_per_s2=0.1)
 CASES = {
     "one speed": Case(_sequence(*[0.15] * 6)),
     "three speeds": Case(_sequence(0.1, 0.1, 0.15, 0.15, 0.2, 0.2)),
-    "always accelerating": Case(Strokes(start_m=0.3, end_m=0.8, speed_m_per_s=0.22, acceleration_m_per_s2=0.1)),
+    "always accelerating": Case(SLOW_RAMPS),
+    "the same, band 2.5 Hz": Case(SLOW_RAMPS, band_hz=2.5),
     "three speeds, excited": Case(_sequence(0.1, 0.1, 0.15, 0.15, 0.2, 0.2), 0.2),
 }
 
@@ -59,7 +62,7 @@ def measured(case: Case, seed: int, ripple_n_m: float = RIPPLE_N_M) -> OrderRepo
     block, _ = SimulatedAxis(axis).run()
     samples = MotionSamples(block, "u", "velocity", "velocity", len(block), None, {})
     lines_hz = LINES.frequency_hz if case.excitation_n_m else None
-    return orders_of(samples, [SHAFT], angle="position", lines_hz=lines_hz)
+    return orders_of(samples, [SHAFT], angle="position", lines_hz=lines_hz, band_hz=case.band_hz)
 
 
 def truth(ripple_n_m: float = RIPPLE_N_M) -> np.ndarray:

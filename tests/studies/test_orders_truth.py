@@ -243,7 +243,7 @@ def test_wrong_options_of_orders_end_in_a_sentence(example: Path) -> None:
 def test_the_command_compares_with_a_baseline(example: Path) -> None:
     done = livebode("orders", example / "strokes.toml", "--baseline", example / "strokes.toml")
     assert done.code == 0, done.err
-    assert "compared with strokes.toml: no orders changed of 8; probability of a false alarm 0.1 %" in done.out
+    assert "compared with strokes.toml: no order changed of 8; probability of a false alarm 0.1 %" in done.out
     found = livebode("orders", example / "strokes.toml", "--baseline", example / "strokes.toml", "--json")
     assert {one["changed"] for one in json.loads(found.out)["changes"]} == {False}
     missing = livebode("orders", example / "strokes.toml", "--baseline", example / "none.toml")

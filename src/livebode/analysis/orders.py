@@ -29,7 +29,6 @@ from livebode.motion.time_lines import TimeLine, time_lines
 Floats = NDArray[np.float64]
 
 _SHARPEST = 2.01  # samples: σ of the kernel
-_BANDS_HZ = (5.0, 2.5, 1.25)  # of the kernel that finds friction and inertia
 _SAME_LINE = 0.02  # of a frequency, within which a line is one that was specified
 _KEPT = 0.2  # of an amplitude, that the kernel must leave
 
@@ -105,6 +104,7 @@ def orders_of(
     turn: float | None = None,
     lines_hz: Floats | None = None,
     highest_hz: float = np.inf,
+    band_hz: float = 5.0,
 ) -> OrderReport:
     """Torque that acts on the axis beside its input, over the angle of its shafts.
 
@@ -126,6 +126,9 @@ def orders_of(
         Lines of the time, such as those of an excitation that runs at the same time.
     highest_hz
         Highest frequency of an order.
+    band_hz
+        Band of the kernel with which friction and inertia are found (`friction_curve`): a ripple of slow strokes within
+        it makes the inertia, and with it the orders, too small.
 
     Raises
     ------
@@ -140,7 +143,7 @@ def orders_of(
             "out-of-range", f"{turn=} is not a positive number", "give the units of the angle in one turn",
             argument="turn", value=turn,
         )  # fmt: skip
-    curve = _friction(motion)
+    curve = friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind, band_hz=band_hz)
     kernel = SmoothKernel(_band(motion.block.rate_hz), motion.block.rate_hz)
     rest, acceleration, speed = _torque(motion, curve, kernel)
     scale = 2 * np.pi / per_turn
@@ -173,29 +176,6 @@ def orders_of(
     turns_per_s = (min(speeds), max(speeds))
     orders, errors = [one for one, _, _ in found], [one for _, one, _ in found]
     return OrderReport(orders, errors, curve, len(strokes), turns_per_s, known, lines, motion, unit)
-
-
-def _friction(motion: MotionSamples) -> FrictionCurve:
-    """Friction with the widest band that a ripple does not disturb.
-
-    A ripple in slow strokes moves the axis within the band, which makes the inertia too small. A lower band decides:
-    where the inertia differs by more than its bound there, the wider one is disturbed.
-    """
-    curves = [_curve_of(motion, _BANDS_HZ[0])]
-    for band_hz in _BANDS_HZ[1:]:
-        try:
-            curves.append(_curve_of(motion, band_hz))
-        except SignalError:  # the strokes are too short for a lower band
-            break
-    at = curves[0].index("inertia")
-    for i, curve in enumerate(curves):
-        if all(abs(curve.value[at] - other.value[at]) <= other.bound()[at] for other in curves[i + 1 :]):
-            return curve
-    return curves[-1]
-
-
-def _curve_of(motion: MotionSamples, band_hz: float) -> FrictionCurve:
-    return friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind, band_hz=band_hz)
 
 
 def _unknown_lines(

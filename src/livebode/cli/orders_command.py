@@ -45,6 +45,9 @@ def orders_command(
     highest: Annotated[
         float | None, typer.Option(metavar="HZ", help="Highest frequency of an order; below the antiresonance.")
     ] = None,
+    band: Annotated[
+        float, typer.Option(metavar="HZ", help="Band in which friction and inertia are found; as in livebode friction.")
+    ] = 5.0,
     time_lines: Annotated[
         str | None,
         typer.Option(metavar="HZ", help="Lines of an excitation or the mains, which are not orders: 20,40,50."),
@@ -100,6 +103,7 @@ def orders_command(
             turn=turn or section.turn,
             lines_hz=_lines(time_lines, samples),
             highest_hz=highest or section.highest_hz or float("inf"),
+            band_hz=band,
         )
 
     found = found_in(motion)
