@@ -269,4 +269,4 @@ def test_the_page_shows_the_signals_of_the_second_that_it_names(browser: Browser
         assert words.inner_text() == "The samples of this time are not recorded: set samples = true under [record]."
         assert tab.js("signals.charts.length") == 0
         assert tab.wrong == []
-    assert decoded(recorded_answer(watched.directory, 99.0, "time"), ())["why_not"] == "outside"
+    assert decoded(recorded_answer(watched.directory, None, 99.0, "time"), ())["why_not"] == "outside"

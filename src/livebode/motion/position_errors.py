@@ -66,8 +66,6 @@ def position_errors(
 ) -> PositionErrors:
     """Fit of a torque and an error of the angle to the order of each stroke.
 
-    Sigma is that of MacKinnon and White (J. Econometrics 29(3), 1985), because the noise grows with the speed.
-
     An error e·cos(k·φ) of the angle has the acceleration −e·ω²·cos(k·φ), with the order's angular frequency ω, and the
     inertia turns it into a torque that is not there. It grows with the square of the speed, and a torque does not.
 
@@ -106,8 +104,5 @@ def _error(
     away = -inertia * (square - square.mean())
     slope = complex(away @ torque / (away @ away))
     rest = torque - torque.mean() - slope * away
-    share = away**2 / (away @ away)
-    # Fast strokes have more noise, and decide: HC3, with the degrees of freedom of what decides.
-    kept = 1 - 1 / strokes.size - share
-    variance = float(np.sum(share * np.abs(rest / kept) ** 2) / (away @ away))
-    return slope, float(np.sqrt(variance)), max(float(1 / np.sum(share**2) - 1), 1.0)
+    variance = float(np.sum(np.abs(rest) ** 2)) / (strokes.size - 2) / float(away @ away)
+    return slope, float(np.sqrt(variance)), float(strokes.size - 2)
