@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field
 
+from livebode.core.deferred_model import DeferredModel
 from livebode.language import available
 
 
@@ -21,8 +22,8 @@ Language = Annotated[str, AfterValidator(_known_language)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-class ConfigurationSection(BaseModel):
+class ConfigurationSection(DeferredModel):
     """A table that accepts its own keys only, each with its own type."""
 
-    # Built when it is first used: the sections are built again inside of `Axis`, half of the time of its import.
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
+    # Deferred: the sections are built again inside of `Axis`, half of the time of its import.
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from livebode.core import QuantityKind
 from livebode.core.clock import ClockKind
+from livebode.core.deferred_model import DeferredModel
 
 Text = Annotated[str, Field(max_length=100_000)]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -16,12 +17,12 @@ Positive = Annotated[int, Field(gt=0, lt=1 << 62)]
 Section = dict[str, Any]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False, defer_build=True)
+class _Part(DeferredModel):
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
 
 
-class _Kinds(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
+class _Kinds(DeferredModel):
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     output: QuantityKind | None
     input: QuantityKind | None

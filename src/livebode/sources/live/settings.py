@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     ConfigDict,
     Field,
     PlainSerializer,
@@ -19,6 +18,7 @@ from pydantic_core import PydanticCustomError
 
 from livebode.core import Channel, ConfigError, QuantityKind
 from livebode.core.clock import ClockKind
+from livebode.core.deferred_model import DeferredModel
 from livebode.locations import Location, Url, location
 from livebode.sources.part_limit import PATTERN, part_limit
 from livebode.sources.units import split_unit
@@ -80,7 +80,7 @@ def _checked_limit(given: float | str) -> float | str:
 Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PATTERN})], AfterValidator(_checked_limit)]
 
 
-class SourceSettings(BaseModel):
+class SourceSettings(DeferredModel):
     """[source]: a recording (`log`), one that grows (`follow`), a live source (`url`), or a recorded one (`replay`).
 
     Parameters
@@ -177,7 +177,7 @@ class SourceSettings(BaseModel):
         Time between reads of the ring, in seconds (ADS).
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     log: LocatedFile | Annotated[list[LocatedFile], Field(min_length=1, max_length=RECORDINGS_MAX)] | None = None
     time: str | None = None
