@@ -13,11 +13,13 @@ from typing import Any
 import control
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from playwright.sync_api import Browser
 
 from livebode.analysis.places import by_place
 from livebode.configuration.loop_section import LoopSection
 from livebode.core import PID, Cascade, Model, Responses
+from livebode.core.model import Algebra
 from livebode.dashboard import Dashboard, Serving
 from livebode.margins import Biquad, low_pass, notch
 from livebode.margins.stability import stable
@@ -25,6 +27,7 @@ from livebode.records import RunRecord
 from livebode.tuning.code_text import c_header
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.predicted import predicted
+from livebode.tuning.predicted_steps import predicted_steps
 from tests.support.browser import Tab
 from tests.support.dashboards import LINES, LOOP, RATE_HZ, Watched
 
@@ -127,6 +130,42 @@ def test_margins_before_and_after_and_of_the_worst_plant_are_those_of_tune(tab: 
                 assert value == pytest.approx(getattr(expected, own), rel=1e-9), (side, kind, own)
     cells = tab.page.locator("#what-if-margins tbody tr").nth(3).locator("td").all_inner_texts()
     assert all(cells), "Ms is shown in every column"
+
+
+class Late(Algebra):
+    """F with the delay of `ADDRESS`."""
+
+    def response(self, frequency_hz: ArrayLike) -> np.ndarray:
+        f = np.asarray(frequency_hz, dtype=float)
+        return tried().response(f) * late(f)
+
+
+def test_steps_with_their_bands_are_those_of_tune(tab: Tab, run: Path) -> None:
+    """Of the trial that has rested: the page draws what Python predicts for its own controllers and filters."""
+    tab.until("whatIf.steps.answer")
+    answer, plant = tab.js("whatIf.steps.answer"), band(run)
+    time_s = np.array(answer["time_ms"]) / 1000
+    for side, feedback in (("before", described()), ("after", Late())):
+        for kind, step in zip(("reference", "disturbance"), predicted_steps(plant, feedback, time_s), strict=True):
+            for name in ("value", "low", "high"):
+                expected = np.ravel(getattr(step, name))
+                assert np.allclose(answer[side][kind][name], expected, rtol=1e-9, atol=1e-9), (side, kind, name)
+    charts = tab.js("whatIf.steps.charts.map(({made}) => made.data[2].length)")
+    assert charts == [len(time_s)] * 2
+
+
+def test_torque_noise_is_that_of_tune_and_within_its_range(tab: Tab, run: Path) -> None:
+    """The rms at the worst place is that of an even grid of frequencies, as a long record has; 1e-3."""
+    tab.until("whatIf.steps.answer")
+    answer, plant = tab.js("whatIf.steps.answer"), band(run)
+    f = plant.frequency_hz
+    even = np.linspace(f[0], f[-1], 200_001)
+    for side, feedback in (("before", described()), ("after", Late())):
+        behind = feedback.response(f)
+        mean = max(np.interp(even, f, np.abs(behind / (1 + value * behind)) ** 2).mean() for value in plant.value)
+        noise = answer[side]["noise"]
+        assert noise["value"] == pytest.approx(np.sqrt(mean), rel=1e-3)
+        assert noise["low"] < noise["value"] < noise["high"]
 
 
 def compared(tab: Tab, plant: np.ndarray, hz: np.ndarray) -> dict[str, Any]:
@@ -238,6 +277,8 @@ def test_an_unstable_trial_is_named_and_has_no_margins(tab: Tab) -> None:
     tab.until("whatIf.margins.after === null")
     cells = tab.page.locator("#what-if-margins tbody td[data-name^=after]").all_inner_texts()
     assert set(cells) == {"unstable"}
+    assert tab.page.locator(".step").first.is_hidden()
+    assert "unstable" in tab.page.locator("#what-if-steps").inner_text()
 
 
 def test_a_phase_beyond_a_turn_gets_that_of_the_factor(tab: Tab) -> None:

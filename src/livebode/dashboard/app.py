@@ -24,7 +24,7 @@ from livebode.dashboard.fleet_pages import FleetPages
 from livebode.dashboard.fleet_view import FleetView
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
-from livebode.dashboard.loop_trial import loop_trial
+from livebode.dashboard.loop_trials import LoopTrials
 from livebode.dashboard.matrix_answer import matrix_answer
 from livebode.dashboard.past import Past
 from livebode.dashboard.runs_pages import RunsPages
@@ -77,6 +77,7 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
         Route("/api/moment", pages.moment),
         Route("/api/signals", pages.signals),
         Route("/api/loop", pages.loop),
+        Route("/api/steps", pages.steps),
         Route("/api/matrix", pages.matrix),
         Route("/api/export", pages.export),
         Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
@@ -94,6 +95,7 @@ class _Pages:
     def __init__(self, board: Board, serving: Serving, files: dict[str, tuple[bytes, str]]) -> None:
         self._board, self._secure, self._language = board, serving.tls is not None, serving.language
         self.files = files
+        self._trials = LoopTrials()
 
     async def page(self, request: Request) -> Response:
         if self._role(request) is None:
@@ -161,9 +163,15 @@ class _Pages:
         """The controllers and the plant with its bounds, from which the page computes other gains and filters."""
         if (state := self._asked_state(request)) is None:
             return _unknown()
-        assert state.quantities is not None
-        found = await self._board.elsewhere(loop_trial, Past.of(state), state.quantities, dict(state.summary))
-        return JSONResponse(found)
+        job, asked = self._trials.facts, (state.axis, Past.of(state), state.quantities, dict(state.summary))
+        return JSONResponse(await self._board.elsewhere(job, *asked))
+
+    async def steps(self, request: Request) -> Response:
+        """Steps and torque noise of the described loop and of the gains and filters that a person tries."""
+        if (state := self._asked_state(request)) is None:
+            return _unknown()
+        job, text = self._trials.steps, request.query_params.get("trial", "")
+        return JSONResponse(await self._board.elsewhere(job, state.axis, Past.of(state), state.quantities, text))
 
     async def matrix(self, request: Request) -> Response:
         """The newest matrix of the run that an axis is an entry of, or the one nearest to a time."""

@@ -6,6 +6,7 @@ slider needs no request. The definitions are those of `livebode tune`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,9 @@ Floats = NDArray[np.float64]
 _READ_BYTES = 16 << 20  # a longer run is averaged from its overview, every n-th response
 
 
-def loop_trial(past: Past, quantities: Quantities, summary: dict[str, Any]) -> dict[str, Any]:
+def loop_trial(
+    past: Past, quantities: Quantities, summary: dict[str, Any], plant: Callable[[], PlantBand]
+) -> dict[str, Any]:
     """For the page, as plain data; `why_not` if nothing can be tried, `band_why_not` if the bounds are unknown."""
     feedback = quantities.loop.feedback if quantities.loop is not None else None
     if feedback is None and quantities.own != "open loop":
@@ -48,23 +51,33 @@ def loop_trial(past: Past, quantities: Quantities, summary: dict[str, Any]) -> d
         "sentence": checked.sentence,
         "tables": _tables(model),
         "values": dict(parts.values),
-        "rate_hz": _filter_rate_hz(model, rate_hz),
+        "rate_hz": filter_rate_hz(model, rate_hz),
         "frequency_hz": drawn_hz.tolist(),
         "parts": _parts(parts),
         "proposed": proposed_filters(past.directory),
-        **_band(past, quantities, model),
+        **_band(plant, model),
     }
 
 
-def _band(past: Past, quantities: Quantities, model: Model) -> dict[str, Any]:
-    """The plant at each place with its radius, and the parts of F on the same frequencies."""
+def plant_band(past: Past, quantities: Quantities) -> PlantBand:
+    """The plant at each place with its bounds; without a description of the loop, L.
+
+    Raises
+    ------
+    TuneError
+        If too few lines are valid.
+    """
     limits = LoopSpecification()
+    mean = by_place(_responses(past))
+    if quantities.loop is not None and quantities.loop.feedback is not None:
+        mean = quantities.of_responses(mean, "plant")
+    return PlantBand.of(mean, quantities.lines.rate_hz, coherence=limits.coherence, confidence=limits.confidence)
+
+
+def _band(plant: Callable[[], PlantBand], model: Model) -> dict[str, Any]:
+    """The plant at each place with its radius, and the parts of F on the same frequencies."""
     try:
-        mean = by_place(_responses(past))
-        if quantities.loop is not None and quantities.loop.feedback is not None:
-            mean = quantities.of_responses(mean, "plant")
-        rate_hz = quantities.lines.rate_hz
-        band = PlantBand.of(mean, rate_hz, coherence=limits.coherence, confidence=limits.confidence)
+        band = plant()
     except LivebodeError as error:
         return {"band": None, "band_why_not": str(error)}
     found = {
@@ -72,7 +85,7 @@ def _band(past: Past, quantities: Quantities, model: Model) -> dict[str, Any]:
         "known": int(np.count_nonzero(~band.above)),
         "lines_hz": band.lines_hz.tolist(),
         "dropped": len(band.dropped_hz),
-        "confidence": limits.confidence,
+        "confidence": LoopSpecification().confidence,
         "places": [
             {**_complex(value), "radius": radius.tolist()} for value, radius in zip(band.value, band.radius)
         ],
@@ -103,7 +116,7 @@ def _tables(model: Model) -> dict[str, str]:
     return of | {"position_gain": "loop.position.gain"}
 
 
-def _filter_rate_hz(model: Model, rate_hz: float) -> float:
+def filter_rate_hz(model: Model, rate_hz: float) -> float:
     """Of the innermost controller, with which filters are computed."""
     inner = model.velocity if isinstance(model, Cascade) else model
     return float(getattr(inner, "rate_hz", rate_hz))

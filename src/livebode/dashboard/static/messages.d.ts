@@ -337,6 +337,37 @@ export interface LoopFacts {
 
 export type LoopAnswer = (LoopFacts & { why_not: "" }) | { why_not: string; described?: undefined };
 
+/** A step with its band; without one where a plant within the bounds may be unstable. */
+export interface StepBand {
+  value: number[];
+  low: number[] | null;
+  high: number[] | null;
+}
+
+/** Rms of the plant input for white noise of 1 at the output, and its range over all plants within the bounds. */
+export interface NoiseRange {
+  value: number;
+  low: number | null;
+  high: number | null;
+}
+
+/** Without disturbance and noise where the run measured L and its loop is not described. */
+export interface StepsSide {
+  reference: StepBand;
+  disturbance: StepBand | null;
+  noise: NoiseRange | null;
+}
+
+/** Predicted steps of a trial; see trial_steps.py. A side that is null is unstable. */
+export interface StepsAnswer {
+  time_ms: number[];
+  before: StepsSide | null;
+  after: StepsSide | null;
+  /** Of the plant. */
+  unit: string;
+  places: number;
+}
+
 /** What the page shows, and what is to be drawn again (`dirty`). */
 export interface Page {
   axis: number;

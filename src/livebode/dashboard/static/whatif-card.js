@@ -8,6 +8,7 @@ import { recognised } from "./recognition.js";
 import { slider } from "./slider.js";
 import { factor, isNothing, NOTCHES_MAX, nothing, textOf, trialOf } from "./trial.js";
 import { briefWords, TrialMargins } from "./whatif-margins.js";
+import { TrialSteps } from "./whatif-steps.js";
 import { checkWords, filtersText, tomlText } from "./whatif-text.js";
 import { signed } from "./words.js";
 
@@ -43,6 +44,7 @@ export class WhatIfCard {
     this.rows = $("what-if-rows");
     this.check = $("what-if-check");
     this.margins = new TrialMargins($("what-if-margins"));
+    this.steps = new TrialSteps($("what-if-steps"));
     this.trial = trialOf(/** @type {string} */ (chosen("what-if", "")));
     /** @type {LoopFacts | null} */
     this.facts = null;
@@ -80,6 +82,7 @@ export class WhatIfCard {
     remember("sliders", open ? "1" : "", "");
     this.show(open);
     this.begin();
+    this.page.dirty.add("trial");
     if (!open) this.button.focus();
     else this.card.querySelector("input")?.focus();
   }
@@ -122,6 +125,7 @@ export class WhatIfCard {
       this.check.className = "check open";
       this.check.textContent = recognised(answer.why_not);
       $("what-if-margins").replaceChildren();
+      this.steps.clear("");
       this.rows.replaceChildren();
       this.changed();
       return;
@@ -162,6 +166,7 @@ export class WhatIfCard {
   draw() {
     if (this.card.hidden || !this.facts) return;
     this.margins.draw(this.trial);
+    this.steps.follow(this.page.axis, this.facts, this.trial, this.margins.after !== null);
     $("what-if-brief").textContent = this.facts.band ? briefWords(this.margins.after) : "";
     $("what-if-plant").hidden = this.bode.quantity !== "plant";
   }
