@@ -43,6 +43,8 @@ def test_nothing_is_shown_without_a_token(watched: Watched) -> None:
         "/api/past?axis=0&from=0&to=1",
         "/api/moment?axis=0&from=0",
         "/api/signals?axis=0",
+        "/api/loop?axis=0",
+        "/api/steps?axis=0&trial=gain~0.3",
         "/api/export?axis=0&from=0&to=1",
         "/api/saved?axis=0",
     ):

@@ -14,7 +14,7 @@ import control
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, Route
 
 from livebode.analysis.places import by_place
 from livebode.configuration.loop_section import LoopSection
@@ -166,6 +166,26 @@ def test_torque_noise_is_that_of_tune_and_within_its_range(tab: Tab, run: Path) 
         noise = answer[side]["noise"]
         assert noise["value"] == pytest.approx(np.sqrt(mean), rel=1e-3)
         assert noise["low"] < noise["value"] < noise["high"]
+
+
+def test_steps_of_an_outdated_trial_are_dropped_and_one_request_is_made_at_a_time(tab: Tab) -> None:
+    tab.until("whatIf.steps.answer")
+    held: list[Route] = []
+    tab.page.route("**/api/steps*", lambda route: held.append(route))
+    field = tab.page.locator('#what-if-rows [type=number][data-part="gain"]')
+    before = tab.js("whatIf.steps.answer")
+    for gain in ("0.3", "0.31", "0.32", str(TRIAL["gain"])):
+        field.fill(gain)
+        field.press("Tab")
+        tab.until(f"whatIf.steps.rested && whatIf.steps.text.includes('gain~{gain}')")
+    assert len(held) == 1, "the next one waits for its answer"
+    with tab.page.expect_request("**/api/steps*"):
+        held[0].fulfill(json=before | {"places": 99})
+    assert tab.js("whatIf.steps.answer.places") == before["places"], "that of 0.3 is not shown"
+    held[1].fulfill(json=before | {"places": 100})
+    tab.until("whatIf.steps.answer.places === 100")
+    tab.page.unroute("**/api/steps*")
+    assert len(held) == 2
 
 
 def compared(tab: Tab, plant: np.ndarray, hz: np.ndarray) -> dict[str, Any]:

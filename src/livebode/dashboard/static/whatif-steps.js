@@ -61,7 +61,7 @@ class StepChart {
     );
   }
 
-  /** @param {number[]} timeMs @param {StepBand | null} before @param {StepBand} after @param {string} unit */
+  /** @param {number[]} timeMs @param {StepBand | null} before @param {StepBand} after @param {string} unit of a step of 1; empty if it is 1 */
   draw(timeMs, before, after, unit) {
     this.unit = unit;
     this.made ??= this.build();
@@ -181,10 +181,10 @@ export class TrialSteps {
       this.plots.replaceChildren();
       this.charts = kinds.map((kind) => new StepChart(this.plots, kind));
     }
+    const unit = answer.unit || tr("output/input");
     for (const one of this.charts) {
       const side = after[one.kind];
-      if (side)
-        one.draw(answer.time_ms, before?.[one.kind] ?? null, side, one.kind === "reference" ? "1" : answer.unit);
+      if (side) one.draw(answer.time_ms, before?.[one.kind] ?? null, side, one.kind === "reference" ? "" : unit);
     }
     this.noise.hidden = !after.noise;
     if (after.noise) this.noise.textContent = noiseWords(before?.noise ?? null, after.noise);
@@ -200,7 +200,7 @@ function noiseWords(before, after) {
       : range.low === null || range.high === null
         ? plain(range.value, 3)
         : `${plain(range.value, 3)} (${plain(range.low, 3)} … ${plain(range.high, 3)})`;
-  const words = tr("Torque noise, rms, for white noise of 1 at the output: {before} before, {after} after", {
+  const words = tr("Torque noise (rms, for white noise of 1 at the output): {before} before, {after} after", {
     before: one(before),
     after: one(after),
   });
