@@ -211,7 +211,7 @@ function noiseWords(before, after) {
 function remarks({ before, places }, after) {
   return [
     before ? "" : tr("The described loop would be unstable: it has no step."),
-    after.reference.low ? "" : tr("⚠ A plant within the bounds may be unstable: there is no band."),
+    after.reference.low ? "" : tr("⚠ The loop of a plant within the bounds may be unstable: there is no band."),
     places > 1 ? tr("Steps: at the first of {places} places. Torque noise: of the worst.", { places }) : "",
   ]
     .filter(Boolean)
