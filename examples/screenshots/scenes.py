@@ -183,7 +183,7 @@ TRIAL = (
 
 
 def _what_if(studio: Studio, address: str = TRIAL, **options: Any) -> Page:
-    drawn = "() => window.livebode?.bode.drawn['what if'] && document.querySelector('#what-if-margins tbody')"
+    drawn = "() => window.livebode?.bode.drawn['what if'] && livebode.whatIf.steps.answer"
     return studio.page(studio.views([studio.tuned]), address, until=drawn, **options)
 
 
