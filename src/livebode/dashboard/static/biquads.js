@@ -43,19 +43,48 @@ export function lowPassOf(hz, rateHz) {
   return transformed([0, 0, omega ** 2], [1, Math.SQRT2 * omega, omega ** 2], hz, rateHz);
 }
 
+/** Cosine and sine of −2π·f/rate and of twice that, at each frequency. @typedef {Record<"c1" | "s1" | "c2" | "s2", Float64Array>} Turns */
+/** @type {WeakMap<ArrayLike<number>, Turns & {rateHz: number}>} */
+const known = new WeakMap();
+
+/** The frequencies are the same in each frame while a slider moves. @param {ArrayLike<number>} hz @param {number} rateHz @returns {Turns} */
+function turnsOf(hz, rateHz) {
+  const before = known.get(hz);
+  if (before?.rateHz === rateHz && before.c1.length === hz.length) return before;
+  const [c1, s1, c2, s2] = [0, 0, 0, 0].map(() => new Float64Array(hz.length));
+  for (let i = 0; i < hz.length; i++) {
+    const turn = (-2 * Math.PI * hz[i]) / rateHz;
+    c1[i] = Math.cos(turn);
+    s1[i] = Math.sin(turn);
+    c2[i] = Math.cos(2 * turn);
+    s2[i] = Math.sin(2 * turn);
+  }
+  const made = { rateHz, c1, s1, c2, s2 };
+  known.set(hz, made);
+  return made;
+}
+
 /**
- * The response at a frequency.
+ * Multiply values by the response of a biquad, without an allocation per frequency, and add its phase to `rad`.
  *
  * @param {Biquad} biquad
- * @param {number} hz
+ * @param {ArrayLike<number>} hz
  * @param {number} rateHz
- * @returns {[re: number, im: number]}
+ * @param {{re: Float64Array, im: Float64Array, rad?: Float64Array}} values
  */
-export function at({ b, a }, hz, rateHz) {
-  const turn = (-2 * Math.PI * hz) / rateHz,
-    [c1, s1, c2, s2] = [Math.cos(turn), Math.sin(turn), Math.cos(2 * turn), Math.sin(2 * turn)];
-  const above = [b[0] + b[1] * c1 + b[2] * c2, b[1] * s1 + b[2] * s2],
-    below = [1 + a[0] * c1 + a[1] * c2, a[0] * s1 + a[1] * s2],
-    size = below[0] ** 2 + below[1] ** 2;
-  return [(above[0] * below[0] + above[1] * below[1]) / size, (above[1] * below[0] - above[0] * below[1]) / size];
+export function filter({ b: [b0, b1, b2], a: [a1, a2] }, hz, rateHz, { re, im, rad }) {
+  const { c1, s1, c2, s2 } = turnsOf(hz, rateHz);
+  for (let i = 0; i < re.length; i++) {
+    const p = b0 + b1 * c1[i] + b2 * c2[i],
+      q = b1 * s1[i] + b2 * s2[i],
+      u = 1 + a1 * c1[i] + a2 * c2[i],
+      v = a1 * s1[i] + a2 * s2[i],
+      size = u * u + v * v;
+    const c = (p * u + q * v) / size,
+      d = (q * u - p * v) / size,
+      before = re[i];
+    re[i] = before * c - im[i] * d;
+    im[i] = before * d + im[i] * c;
+    if (rad) rad[i] += Math.atan2(d, c);
+  }
 }

@@ -1,7 +1,7 @@
 // @ts-check
 // A trial: other gains and filters for the described loop, and the controller F that they give. Nothing of it is recorded;
 // the server sends the controllers as curves (loop_trial.py), so that F needs no request.
-import { at, lowPassOf, notchOf } from "./biquads.js";
+import { filter, lowPassOf, notchOf } from "./biquads.js";
 
 /** @import { Biquad, Notch } from "./biquads.js" */
 /** @import { Curve, Numbers } from "./curves.js" */
@@ -63,15 +63,33 @@ export function controllers({ terms, outer }, values) {
  * @returns {Complexes}
  */
 export function feedback(parts, hz, facts, trial) {
-  const { re, im } = controllers(parts, { ...facts.values, ...trial.values }),
-    biquads = biquadsOf(trial, facts.rate_hz);
+  const found = controllers(parts, { ...facts.values, ...trial.values });
+  for (const biquad of biquadsOf(trial, facts.rate_hz)) filter(biquad, hz, facts.rate_hz, found);
+  if (trial.delayMs) delay(trial.delayMs, hz, found);
+  return found;
+}
+
+/** Multiply values by the response of a delay, and add its phase to `rad`. @param {number} ms @param {Numbers} hz @param {Complexes & {rad?: Float64Array}} values */
+function delay(ms, hz, { re, im, rad }) {
   for (let i = 0; i < re.length; i++) {
-    const late = (-2 * Math.PI * hz[i] * trial.delayMs) / 1000;
-    const factors = biquads.map((biquad) => at(biquad, hz[i], facts.rate_hz));
-    if (trial.delayMs) factors.push([Math.cos(late), Math.sin(late)]);
-    for (const [c, d] of factors) [re[i], im[i]] = [re[i] * c - im[i] * d, re[i] * d + im[i] * c];
+    const late = (-2 * Math.PI * hz[i] * ms) / 1000,
+      c = Math.cos(late),
+      d = Math.sin(late),
+      before = re[i];
+    re[i] = before * c - im[i] * d;
+    im[i] = before * d + im[i] * c;
+    if (rad) rad[i] += late;
   }
-  return { re, im };
+}
+
+/** The described controllers at the frequencies of the page. @type {WeakMap<LoopFacts, Complexes>} */
+const described = new WeakMap();
+
+/** @param {LoopFacts} facts */
+function describedOf(facts) {
+  const found = described.get(facts) ?? controllers(facts.parts, facts.values);
+  described.set(facts, found);
+  return found;
 }
 
 /** @typedef {Complexes & {deg: Float64Array}} Factor with its phase without jumps of whole turns */
@@ -85,33 +103,22 @@ export function feedback(parts, hz, facts, trial) {
  * @returns {Factor}
  */
 export function factor(facts, trial, { hz, index }) {
-  const [before, after] = [nothing().values, trial.values].map((values) =>
-      controllers(facts.parts, { ...facts.values, ...values }),
-    ),
-    biquads = biquadsOf(trial, facts.rate_hz),
-    [re, im, deg] = [0, 1, 2].map(() => new Float64Array(hz.length));
+  const before = describedOf(facts),
+    after = controllers(facts.parts, { ...facts.values, ...trial.values }),
+    [re, im, rad] = [0, 0, 0].map(() => new Float64Array(hz.length));
+  // Each factor but the delay is within half a turn.
   for (let i = 0; i < hz.length; i++) {
     const k = index[i],
-      size = before.re[k] ** 2 + before.im[k] ** 2,
-      late = (-2 * Math.PI * hz[i] * trial.delayMs) / 1000;
-    /** @type {[number, number][]} */
-    const factors = [
-      [
-        (after.re[k] * before.re[k] + after.im[k] * before.im[k]) / size,
-        (after.im[k] * before.re[k] - after.re[k] * before.im[k]) / size,
-      ],
-      ...biquads.map((biquad) => at(biquad, hz[i], facts.rate_hz)),
-    ];
-    // Each factor but the delay is within half a turn.
-    let turn = late;
-    [re[i], im[i]] = [Math.cos(late), Math.sin(late)];
-    for (const [c, d] of factors) {
-      turn += Math.atan2(d, c);
-      [re[i], im[i]] = [re[i] * c - im[i] * d, re[i] * d + im[i] * c];
-    }
-    deg[i] = (turn * 180) / Math.PI;
+      [a, b, c, d] = [after.re[k], after.im[k], before.re[k], before.im[k]],
+      size = c * c + d * d;
+    re[i] = (a * c + b * d) / size;
+    im[i] = (b * c - a * d) / size;
+    rad[i] = Math.atan2(im[i], re[i]);
   }
-  return { re, im, deg };
+  const found = { re, im, rad };
+  for (const biquad of biquadsOf(trial, facts.rate_hz)) filter(biquad, hz, facts.rate_hz, found);
+  if (trial.delayMs) delay(trial.delayMs, hz, found);
+  return { re, im, deg: rad.map((v) => (v * 180) / Math.PI) };
 }
 
 const round = (/** @type {number} */ v) => String(Number(v.toPrecision(6)));
