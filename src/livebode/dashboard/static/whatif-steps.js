@@ -181,7 +181,7 @@ export class TrialSteps {
       this.plots.replaceChildren();
       this.charts = kinds.map((kind) => new StepChart(this.plots, kind));
     }
-    const unit = answer.unit || tr("output/input");
+    const unit = answer.unit || "y/u";
     for (const one of this.charts) {
       const side = after[one.kind];
       if (side) one.draw(answer.time_ms, before?.[one.kind] ?? null, side, one.kind === "reference" ? "" : unit);
