@@ -90,6 +90,11 @@ class PlantBand:
         dropped = responses.lines.frequency_hz[~use]
         return replace(cls.at_lines(lines, value, radius, sigma, rate_hz), dropped_hz=dropped)
 
+    def only(self, columns: NDArray[np.bool_]) -> PlantBand:
+        """The same at some of the frequencies."""
+        named = ("frequency_hz", "value", "radius", "measured", "above", "spread", "sigma")
+        return replace(self, **{name: getattr(self, name)[..., columns] for name in named})
+
     @classmethod
     def at_lines(cls, lines_hz: Floats, value: Complex, radius: Floats, sigma: Floats, rate_hz: float) -> PlantBand:
         """The same from a radius at each line; shapes (lines,) and (places, lines)."""

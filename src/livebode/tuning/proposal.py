@@ -234,7 +234,7 @@ def _input_noise(problem: TuningProblem, loop: Loop, x: Floats) -> tuple[float, 
 def _limits(best: SearchResult) -> tuple[str, ...]:
     """The points of the curve that touch a limit, one for each limit."""
     problem, x = best.problem, best.x
-    value, _ = problem.clearances(x)
+    value = problem.clearances(x)
     behind = problem.structure.response(x)[0]
     loop = problem.plant.value * behind
     found: dict[str, tuple[float, str]] = {}

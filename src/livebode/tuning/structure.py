@@ -153,6 +153,10 @@ class FeedbackStructure:
         """Column of a parameter; None where the structure does not have it."""
         return self.names.index(name) if name in self.names else None
 
+    def only(self, columns: NDArray[np.bool_]) -> FeedbackStructure:
+        """The same at some of the frequencies."""
+        return FeedbackStructure(self.controller, self.frequency_hz[columns], self.notches_hz, low_pass=self.low_pass)
+
     def response(self, x: Floats) -> tuple[Complex, Complex]:
         """F, shape (frequencies,), and the derivative of log F to each parameter, (parameters, frequencies)."""
         value = dict(zip(self.names, np.exp(x).tolist()))
