@@ -31,6 +31,6 @@ def test_the_step_of_a_known_plant_is_that_of_its_samples() -> None:
     value = plant.response(LINES.frequency_hz)[np.newaxis]
     band = PlantBand.at_lines(LINES.frequency_hz, value, 0 * np.abs(value), 0 * np.abs(value), RATE_HZ)
     step, _ = predicted_steps(band, controller, (np.arange(y.size) + 0.5) / RATE_HZ)
-    np.testing.assert_allclose(step.value, y, atol=0.01)
+    np.testing.assert_allclose(step.value[0], y, atol=0.01)
     first = step.time_s < 2e-3
     assert np.all(step.high[first] - step.low[first] > 0)

@@ -39,8 +39,8 @@ def save_tuning_picture(
 def tuning_figure(found: ControllerProposal, *, title: str = "", dark: bool = False) -> Figure:
     """|L| and its phase, Nyquist and Nichols plot with the limits, the responses to steps of reference and disturbance.
 
-    Bands of L are the discs of all lines together. Bands of the steps are the middle 95 % of 100 plants drawn with the
-    noise of the lines. Dashed: before. Beyond the lines nothing is drawn.
+    Bands of L are the discs of all lines together. The band of the steps holds, for every place, the middle 95 % of 100
+    plants drawn with the noise of the lines. Dashed: before. Beyond the lines nothing is drawn.
     """
     look = style(dark)
     with drawing(look):
@@ -172,7 +172,7 @@ def _db(value: Complex) -> Floats:
 
 
 def _steps(reference: Axes, disturbance: Axes, look: Style, found: ControllerProposal) -> None:
-    """T and G·S of the first place."""
+    """T and G·S of every place."""
     time_s = np.linspace(0, 3 / found.promised.bandwidth_hz, _TIMES)
     for feedback, proposed in _curves(found):
         if not proposed and found.before is None:
@@ -181,7 +181,7 @@ def _steps(reference: Axes, disturbance: Axes, look: Style, found: ControllerPro
         for axes, step in zip((reference, disturbance), predicted_steps(found.plant, feedback, time_s)):
             if proposed:
                 axes.fill_between(1e3 * time_s, step.low, step.high, color=colour, alpha=0.25, linewidth=0)
-            axes.plot(1e3 * time_s, step.value, color=colour, dashes=dashes, linewidth=1.5)
+            axes.plot(1e3 * time_s, step.value.T, color=colour, dashes=dashes, linewidth=1.5)
     reference.set_title(tr("step of the reference"), fontsize=10)
     disturbance.set_title(tr("step of the disturbance at the plant input"), fontsize=10)
     disturbance.set_xlabel(tr("time in ms"))

@@ -120,7 +120,7 @@ def gain_schedule(
 def _alone(loop: Loop, plant: PlantBand, specification: LoopSpecification, place: int, common: Floats) -> Floats:
     """Logarithms of the gains for a place and its neighbours; the common ones where nothing is found for these."""
     near = [i for i in (place - 1, place, place + 1) if 0 <= i < len(plant.value)]
-    found = search(loop.feedback, _rows(plant, near), specification)
+    found = search(loop.feedback, plant.at(near), specification)
     return common if found is None else found.x
 
 
@@ -140,16 +140,11 @@ def _safest(
 def _safe(structure: FeedbackStructure, plant: PlantBand, specification: LoopSpecification, x: Floats) -> bool:
     """Whether the gains keep the limits at every place and between neighbours, with the plants of both."""
     for i in range(len(x) - 1):
-        problem = TuningProblem(structure, _rows(plant, [i, i + 1]), specification)
+        problem = TuningProblem(structure, plant.at([i, i + 1]), specification)
         if not all(problem.feasible(x[i] + part * (x[i + 1] - x[i])) for part in _BETWEEN):
             return False
     return True
 
 
-def _rows(plant: PlantBand, rows: list[int]) -> PlantBand:
-    """The band of some places."""
-    return replace(plant, **{name: getattr(plant, name)[rows] for name in ("value", "radius", "spread", "sigma")})
-
-
 def _promised(structure: FeedbackStructure, plant: PlantBand, x: Floats, place: int) -> PredictedMargins:
-    return margins_of(_rows(plant, [place]), structure.feedback(x).model, 1.0)
+    return margins_of(plant.at([place]), structure.feedback(x).model, 1.0)

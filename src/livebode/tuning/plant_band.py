@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,6 +95,11 @@ class PlantBand:
         """The same at some of the frequencies."""
         named = ("frequency_hz", "value", "radius", "measured", "above", "spread", "sigma")
         return replace(self, **{name: getattr(self, name)[..., columns] for name in named})
+
+    def at(self, places: Sequence[int]) -> PlantBand:
+        """The same at some of the places."""
+        named = ("value", "radius", "spread", "sigma")
+        return replace(self, **{name: getattr(self, name)[places] for name in named})
 
     @classmethod
     def at_lines(cls, lines_hz: Floats, value: Complex, radius: Floats, sigma: Floats, rate_hz: float) -> PlantBand:
