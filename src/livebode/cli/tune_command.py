@@ -65,8 +65,8 @@ def tune_command(
 ) -> None:
     """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
 
-    Writes tune.png, and the filters as filters.h and filters.st, to the run directory; nothing to a machine. The exit
-    code is 2 if no controller meets the specification.
+    Writes tune.png, the gains as gains.toml, and the filters as filters.h and filters.st, to the run directory; nothing
+    to a machine. The exit code is 2 if no controller meets the specification.
     """
     from livebode.analysis.tune_report import feedforward_of, schedule_run, tune_run
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
@@ -74,6 +74,7 @@ def tune_command(
     from livebode.records import to_json
     from livebode.tuning import LoopSpecification
     from livebode.tuning.code_text import c_header, odrive_text, structured_text
+    from livebode.tuning.gains_text import gains_toml
 
     specification = LoopSpecification(
         bandwidth_hz=bandwidth_hz,
@@ -99,6 +100,7 @@ def tune_command(
 
             save_tuning_picture(found, into, title=directory.name)
         (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
+        (into / "gains.toml").write_text(gains_toml(found.feedback.controller), encoding="utf-8")
         if odrive:
             (into / "odrive.txt").write_text(odrive_text(found.feedback), encoding="utf-8")
         if gains is not None:
@@ -113,7 +115,7 @@ def tune_command(
         if gains is not None:
             show_schedule(gains)
         also = {"odrive.txt": odrive, "gains.csv": schedule, "tune.png": can_draw()}
-        written = ["filters.h", "filters.st", *(name for name, use in also.items() if use)]
+        written = ["gains.toml", "filters.h", "filters.st", *(name for name, use in also.items() if use)]
         print(f"\n{into}: {', '.join(written)}")
         tell_how_to_draw()
     if not found.met:
