@@ -98,7 +98,7 @@ def tune_command(
         if can_draw():
             from livebode.report import save_tuning_picture
 
-            save_tuning_picture(found, into, title=directory.name)
+            save_tuning_picture(found, into, gains=gains, feedforward=forward, title=directory.name)
         (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
         (into / "gains.toml").write_text(gains_toml(found.feedback.controller), encoding="utf-8")
         if odrive:

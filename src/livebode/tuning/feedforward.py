@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ _SHARE = (1e-9, 10.0)  # of the size, by which the model may be wrong
 class Feedforward:
     """Torque of a reference motion: inertia·a + viscous·v + coulomb·sign(v) + offset, in the units of the recording.
 
-    Bounds are half-widths of 95 %. Friction is None where no strokes show it.
+    Bounds are half-widths of 95 %. Friction is None where no strokes show it; `curve` is what it is from.
     """
 
     inertia: float
@@ -35,6 +35,7 @@ class Feedforward:
     coulomb_bound: float | None = None
     offset: float | None = None
     offset_bound: float | None = None
+    curve: FrictionCurve | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, responses: Responses, kind: str, friction: FrictionCurve | None = None) -> Feedforward:
@@ -62,16 +63,26 @@ class Feedforward:
         wide = dict(zip(friction.names, friction.bound()))
         names = ("viscous", "coulomb", "offset")
         found = {name: friction[name] for name in names} | {f"{name}_bound": float(wide[name]) for name in names}
-        return cls(inertia, bound, **found)
+        return cls(inertia, bound, **found, curve=friction)
 
     def torque(self, velocity: Floats, acceleration: Floats) -> Floats:
         """Of the reference at these velocities and accelerations."""
         friction = (self.viscous or 0.0) * velocity + (self.coulomb or 0.0) * np.sign(velocity) + (self.offset or 0.0)
         return np.asarray(self.inertia * acceleration + friction)
 
+    def friction(self, velocity: Floats, sign: int) -> tuple[Floats, Floats]:
+        """Viscous and Coulomb friction at velocities of one sign, and its 95 % bound; of a feedforward with a curve."""
+        curve = self.curve
+        assert curve is not None
+        of = [curve.index(name) for name in ("viscous", "coulomb")]
+        row = np.stack([velocity, np.full(velocity.shape, float(sign))])
+        sigma = np.sqrt(np.einsum("iv,ij,jv->v", row, curve.covariance[np.ix_(of, of)], row))
+        factor = t_quantile(0.975, int(curve.dof[of].min()))
+        return np.asarray(curve.value[of] @ row), np.asarray(factor * sigma)
+
     def plain(self) -> dict[str, Any]:
         """For JSON."""
-        return dict(vars(self))
+        return {name: value for name, value in vars(self).items() if name != "curve"}
 
 
 def rigid_inertia(responses: Responses, kind: str) -> tuple[float, float]:

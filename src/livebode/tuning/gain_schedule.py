@@ -40,6 +40,8 @@ class GainSchedule:
         Of the gains and times.
     logarithms
         Shape (places, names).
+    common_logarithms
+        Of the common gains, shape (names,).
     promised
         Margins at each place, of the worst plant within the band.
     """
@@ -49,6 +51,7 @@ class GainSchedule:
     share: float
     names: tuple[str, ...]
     logarithms: Floats
+    common_logarithms: Floats
     promised: tuple[PredictedMargins, ...]
 
     def at(self, position: float) -> PID | Cascade | PositionPD:
@@ -114,7 +117,7 @@ def gain_schedule(
     alone = np.stack([_alone(loop, common.plant, plain, place, whole) for place in range(position.size)])
     share, x = _safest(structure, common.plant, plain, whole, alone)
     promised = tuple(_promised(structure, common.plant, row, place) for place, row in enumerate(x))
-    return GainSchedule(common, position, share, structure.names, x, promised)
+    return GainSchedule(common, position, share, structure.names, x, whole, promised)
 
 
 def _alone(loop: Loop, plant: PlantBand, specification: LoopSpecification, place: int, common: Floats) -> Floats:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,12 +58,9 @@ def predicted_steps(plant: PlantBand, feedback: Model, time_s: Floats) -> tuple[
         Shape (times,).
     """
     behind = feedback.response(plant.frequency_hz)
-    closed = [drawn / (1 + drawn * behind) for drawn in map(partial(_drawn, plant), range(len(plant.value)))]
-    banded = partial(_banded, plant.frequency_hz, time_s)
-    return (
-        PredictedStep.over([banded(one * behind) for one in closed]),
-        PredictedStep.over([banded(one) for one in closed]),
-    )
+    drawn = np.stack([_drawn(plant, place) for place in range(len(plant.value))])
+    closed = drawn / (1 + drawn * behind)
+    return _banded(plant.frequency_hz, closed * behind, time_s), _banded(plant.frequency_hz, closed, time_s)
 
 
 def _drawn(plant: PlantBand, place: int) -> Complex:
@@ -77,15 +73,17 @@ def _drawn(plant: PlantBand, place: int) -> Complex:
     return plants
 
 
-def _banded(frequency_hz: Floats, time_s: Floats, closed: Complex) -> PredictedStep:
-    """The first row is the measured plant, the others are draws.
+def _banded(frequency_hz: Floats, closed: Complex, time_s: Floats) -> PredictedStep:
+    """From shape (places, 1 + draws, frequencies): first the measured plant.
 
     The sum of the impulse response of a sampled loop up to sample n is 1/π times the integral, up to half the rate, of
     Re T(θ)·sin((n + 1/2)·θ)/sin(θ/2): that of `step_response` with a factor.
     """
     half = np.pi / 2 * frequency_hz / frequency_hz[-1]
-    steps = step_response(frequency_hz, closed * half / np.sin(half), time_s)
-    return PredictedStep(time_s, steps[:1], *np.quantile(steps[1:], _BAND, axis=0))
+    rows = (closed * half / np.sin(half)).reshape(-1, frequency_hz.size)
+    steps = step_response(frequency_hz, rows, time_s).reshape(*closed.shape[:2], time_s.size)
+    low, high = np.quantile(steps[:, 1:], _BAND, axis=1)
+    return PredictedStep(time_s, steps[:, 0], low.min(axis=0), high.max(axis=0))
 
 
 def _noise(frequency_hz: Floats, lines_hz: Floats) -> Complex:

@@ -99,9 +99,9 @@ class TuningProblem:
     @cached_property
     def _noise(self) -> Floats:
         """Power of the noise at the output that each point of the grid stands for."""
-        f = self.plant.frequency_hz
-        edges = np.concatenate([f[:1], (f[1:] + f[:-1]) / 2, f[-1:]])
-        return np.asarray(np.diff(edges) / f[-1] * noise_power(f, self.specification.encoder_step, self.structure))
+        return noise_power(
+            self.plant.frequency_hz, self.specification.encoder_step, of_position=self.structure.of_position
+        )
 
     def tracking(self, x: Floats) -> tuple[Floats, Floats]:
         """How far |T| of the worst plant is from −3 dB up to the required bandwidth, positive above; with derivatives.
@@ -146,14 +146,17 @@ class TuningProblem:
         return limit is None or self.noise_gain(x)[0] <= limit * (1 + tolerance)
 
 
-def noise_power(frequency_hz: Floats, encoder_step: float | None, structure: FeedbackStructure) -> Floats:
-    """Power of the noise at the output over that of white noise of 1, up to half the rate.
+def noise_power(frequency_hz: Floats, encoder_step: float | None, *, of_position: bool) -> Floats:
+    """Power of the noise at the output that each point of a grid up to half the rate stands for.
 
-    Rounding to steps q has the variance q²/12 and is white while the axis moves by more than a step in a tick (Widrow
-    and Kollár, Quantization noise, 2008); of a velocity, the differences times the rate count.
+    It is that of white noise of 1, or of an encoder: rounding to steps q has the variance q²/12 and is white while the
+    axis moves by more than a step in a tick (Widrow and Kollár, Quantization noise, 2008); of a velocity, the
+    differences times the rate count.
     """
+    edges = np.concatenate([frequency_hz[:1], (frequency_hz[1:] + frequency_hz[:-1]) / 2, frequency_hz[-1:]])
+    share = np.diff(edges) / frequency_hz[-1]
     if encoder_step is None:
-        return np.ones(frequency_hz.shape)
+        return np.asarray(share)
     rate_hz = 2 * frequency_hz[-1]
     differences = 2 * rate_hz * np.sin(np.pi * frequency_hz / rate_hz)
-    return np.asarray(encoder_step**2 / 12 * (1.0 if structure.of_position else differences**2))
+    return np.asarray(share * encoder_step**2 / 12 * (1.0 if of_position else differences**2))
