@@ -3,8 +3,8 @@
 Each machine has two or three masses, friction and a delay, all drawn at random, and a response at lines with noise
 that gives 95 % bounds of ±5 … 30 % of |G| at each line. What is promised for the worst plant within the bounds is
 compared with the true plant; the bandwidth with that of the same search with the true plant. The second number counts
-the machines at ±10 % whose proposals are only tested for stability; 10000 take about 17 minutes of processor time. They
-can be tested in parts: `python -m studies.tune 0 5000 5000` tests the second half, without the other tables.
+the machines at ±10 % whose proposals are only tested for stability; 10000 take about ten minutes of processor time.
+They can be tested in parts: `python -m studies.tune 0 5000 5000` tests the second half, without the other tables.
 """
 
 from __future__ import annotations

@@ -7,9 +7,10 @@ from math import atan, isfinite, log10, pi, sqrt
 from pathlib import Path
 from typing import Any
 
+from livebode.configuration.toml_file import parse_table
 from livebode.core import LivebodeError, Model
 from livebode.records.inside import read_bytes
-from livebode.tuning.gains_text import read_gains
+from livebode.tuning.gains_text import gains_in
 
 _FILTERS, _GAINS = "filters.h", "gains.toml"
 _BYTES_MAX = 64 << 10
@@ -29,9 +30,16 @@ def proposed_controller(directory: Path, controller: Model) -> dict[str, Any] | 
     filters = None if header is None else _filters(header)
     if filters is None:
         return None
-    gains = read_gains(_text(directory, _GAINS) or "", controller)
+    gains = _gains(directory, controller)
     nothing = gains is None and not filters["notches"] and not filters["low_passes_hz"]
     return None if nothing else {"gains": gains, **filters}
+
+
+def _gains(directory: Path, controller: Model) -> dict[str, float] | None:
+    try:
+        return gains_in(parse_table(read_bytes(directory, _GAINS, _BYTES_MAX), _GAINS), controller)
+    except (OSError, LivebodeError):
+        return None
 
 
 def _text(directory: Path, name: str) -> str | None:

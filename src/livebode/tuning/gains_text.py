@@ -1,9 +1,10 @@
-"""The gains of a controller as a file with the keys of [loop], written and read."""
+"""The gains of a controller with the keys of [loop]: as the text of a file, and from its tables."""
 
 from __future__ import annotations
 
-import tomllib
+from collections.abc import Mapping
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -49,17 +50,13 @@ def gains_toml(controller: Model) -> str:
     return "\n".join([*lines, ""])
 
 
-def read_gains(text: str, controller: Model) -> dict[str, float] | None:
-    """Values of the parameters of a controller; None where the text is not a file of `gains_toml` for it.
+def gains_in(tables: Mapping[str, Any], controller: Model) -> dict[str, float] | None:
+    """Values of the parameters of a controller in the parsed file; None if it is not one of `gains_toml` for it.
 
-    >>> pid = PID(gain=0.2, integral_time_s=0.1, rate_hz=4000)
-    >>> read_gains(gains_toml(pid), pid), read_gains("", pid)
-    ({'gain': 0.2, 'integral_time_s': 0.1}, None)
+    >>> pid = PID(gain=0.2, rate_hz=4000)
+    >>> gains_in({"loop": {"velocity": {"gain": 0.3}}}, pid), gains_in({}, pid)
+    ({'gain': 0.3}, None)
     """
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        return None
     keys, found = parameter_keys(controller), {}
     for name, described in FeedbackParts.of(controller, np.ones(1)).values.items():
         value = _at(tables, keys.get(name, ""))
