@@ -66,7 +66,8 @@ def test_the_lower_row_has_what_was_asked_for(
         assert np.asarray(line.get_xdata()).tolist() == [0, 1, 2]
         if line.get_label() == "gain":
             np.testing.assert_allclose(line.get_ydata(), np.exp(column - first))
-    assert list(bandwidths.lines[0].get_ydata()) == [one.bandwidth_hz for one in gains.promised]
+    for line, promised in zip(bandwidths.lines, (gains.common_promised, gains.promised)):
+        assert list(line.get_ydata()) == [one.bandwidth_hz for one in promised]
     assert "0.005" in friction.get_title()
 
 

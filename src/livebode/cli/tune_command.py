@@ -48,7 +48,8 @@ def tune_command(
         bool, typer.Option("--loop-checked", help="The description of the loop was compared with the machine.")
     ] = False,
     schedule: Annotated[
-        bool, typer.Option("--schedule", help="Also propose gains over the schedule, without filters, as gains.csv.")
+        bool,
+        typer.Option("--schedule", help="Also propose gains over the schedule, with the same filters, as gains.csv."),
     ] = False,
     odrive: Annotated[
         bool,
@@ -144,12 +145,11 @@ def show_proposal(found: ControllerProposal) -> None:
 
 
 def show_schedule(found: GainSchedule) -> None:
-    """Print the gains and the promised bandwidth of each place."""
-    common = found.common.promised.bandwidth_hz
-    print(f"gains over the schedule, without filters (one controller for all places: {common:.4g} Hz)")
-    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz")))
-    for place, row, promised in zip(found.position, found.logarithms, found.promised):
-        numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz)
+    """Print the gains of each place, and the promised bandwidth with these and with one controller."""
+    print("gains over the schedule, with the filters above; bandwidth also with one controller for all places")
+    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz", "one controller")))
+    for place, row, promised, common in zip(found.position, found.logarithms, found.promised, found.common_promised):
+        numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz, common.bandwidth_hz)
         print("  " + "".join(f"{x:>16.5g}" for x in numbers))
     if not found.share:
         print("  no other gains keep the limits between the places")

@@ -76,14 +76,18 @@ def _gains(gains: GainSchedule, axes: Axes, look: Style) -> None:
 
 
 def _bandwidths(gains: GainSchedule, axes: Axes, look: Style) -> None:
-    """Promised bandwidth of each place; dashed: of one controller for all places."""
-    bandwidth_hz = [one.bandwidth_hz for one in gains.promised]
-    axes.plot(gains.position, bandwidth_hz, color=look.run, linewidth=1.5, marker="o", markersize=4)
-    axes.axhline(gains.common.promised.bandwidth_hz, color=look.muted, linewidth=1.5, dashes=(4, 2))
-    axes.set_title(tr("promised bandwidth with these gains"), fontsize=10)
+    """Promised bandwidth of each place; dashed: with one controller for all places."""
+    highest_hz = 0.0
+    for promised, colour, dashes in (
+        (gains.common_promised, look.muted, (4, 2)), (gains.promised, look.run, (1, 0)),
+    ):  # fmt: skip
+        hz = [one.bandwidth_hz for one in promised]
+        axes.plot(gains.position, hz, color=colour, linewidth=1.5, marker="o", markersize=4, dashes=dashes)
+        highest_hz = max(highest_hz, *hz)
+    axes.set_title(tr("promised bandwidth; dashed: one controller"), fontsize=10)
     axes.set_xlabel(tr("position"))
     axes.set_ylabel(tr("bandwidth in Hz"))
-    axes.set_ylim(0, 1.1 * max(bandwidth_hz))
+    axes.set_ylim(0, 1.1 * highest_hz)
     plain(axes)
 
 

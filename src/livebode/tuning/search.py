@@ -13,7 +13,7 @@ from livebode.core import Model
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.problem import TuningProblem
 from livebode.tuning.specification import LoopSpecification
-from livebode.tuning.structure import FeedbackStructure
+from livebode.tuning.structure import FeedbackStructure, TunedFeedback
 
 Floats = NDArray[np.float64]
 
@@ -36,8 +36,12 @@ class SearchResult:
     merit: float
 
 
-def search(controller: Model | None, plant: PlantBand, specification: LoopSpecification) -> SearchResult | None:
+def search(
+    controller: Model | None, plant: PlantBand, specification: LoopSpecification, fixed: TunedFeedback | None = None
+) -> SearchResult | None:
     """The best controller of the described structure, with few filters; None if none keeps the limits.
+
+    The filters of `fixed` are in series, too.
 
     Sequential quadratic programming (SLSQP) over the logarithms of the parameters, with the nearest points of the
     Nyquist plot as constraints, from the fastest feasible of a row of textbook settings. The result is a local
@@ -45,7 +49,7 @@ def search(controller: Model | None, plant: PlantBand, specification: LoopSpecif
     """
     best: SearchResult | None = None
     for notches, low_pass in _filters(plant, specification):
-        structure = FeedbackStructure(controller, plant.frequency_hz, notches, low_pass=low_pass)
+        structure = FeedbackStructure(controller, plant.frequency_hz, notches, low_pass=low_pass, fixed=fixed)
         problem = TuningProblem(structure, plant, specification)
         found = _optimised(problem, best)
         if found is not None and (best is None or found.merit > best.merit + _SIMPLER):
@@ -82,13 +86,15 @@ def _filters(plant: PlantBand, specification: LoopSpecification) -> Iterator[tup
 
 
 def _optimised(problem: TuningProblem, simpler: SearchResult | None) -> SearchResult | None:
-    required = problem.specification.bandwidth_hz is not None
     start = _start(problem)
     if start is None and simpler is not None:
         start = _extended(problem, simpler)
-    if start is None:
-        return None
-    x = start
+    return None if start is None else improved(problem, start)
+
+
+def improved(problem: TuningProblem, x: Floats) -> SearchResult:
+    """The local optimum from a controller that keeps every limit."""
+    required = problem.specification.bandwidth_hz is not None
     for _ in range(_ROUNDS):
         moved = _moved(problem, x, required)
         new = _feasible_part(problem, x, moved)
