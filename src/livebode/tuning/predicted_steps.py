@@ -42,9 +42,10 @@ def predicted_steps(plant: PlantBand, feedback: Model, time_s: Floats) -> tuple[
 
     The reference acts as the feedback does, on all of F: so does the velocity reference of a cascade whose position
     reference is its integral. The band of a place is the middle 95 %, at each time, of 100 plants that are drawn with
-    the noise of the lines; that of several places is the hull of theirs. Above the highest line the plant continues as
-    a sampled integrator, and each drawn one is that times a number of the disc around 1 with radius 1: the first
-    milliseconds are uncertain accordingly. Sample n after the step is at the time (n + 1/2)/rate.
+    the noise of the lines, and between each two lines with the uncertainty of the interpolation; that of several places
+    is the hull of theirs. Above the highest line the plant continues as a sampled integrator, and each drawn one is
+    that times a number of the disc around 1 with radius 1: the first milliseconds are uncertain accordingly. Sample n
+    after the step is at the time (n + 1/2)/rate.
 
     Biased where the plant is not linear, or changes over the range of positions that one place is the mean of.
 
@@ -64,12 +65,13 @@ def predicted_steps(plant: PlantBand, feedback: Model, time_s: Floats) -> tuple[
 
 
 def _drawn(plant: PlantBand, place: int) -> Complex:
-    """The measured plant of a place, then those drawn with its noise, shape (1 + draws, frequencies)."""
+    """The measured plant of a place, then those drawn around it, shape (1 + draws, frequencies)."""
     f, last = plant.frequency_hz, int(np.argmax(plant.above)) - 1
     fall = integral(f, 2 * f[-1], "forward")
     middle = np.where(plant.above, plant.value[place, last] * fall / fall[last], plant.value[place])
     plants = np.concatenate([middle[np.newaxis], middle + plant.sigma[place] * _noise(f, plant.lines_hz)])
-    plants[1:, plant.above] += _in_disc()[:, np.newaxis] * middle[plant.above]
+    gap = np.searchsorted(plant.lines_hz, f)
+    plants[1:] += _in_discs(plant.lines_hz.size + 1)[:, gap] * np.where(plant.above, 1.0, plant.spread[place]) * middle
     return plants
 
 
@@ -82,7 +84,7 @@ def _banded(frequency_hz: Floats, closed: Complex, time_s: Floats) -> PredictedS
     half = np.pi / 2 * frequency_hz / frequency_hz[-1]
     rows = (closed * half / np.sin(half)).reshape(-1, frequency_hz.size)
     steps = step_response(frequency_hz, rows, time_s).reshape(*closed.shape[:2], time_s.size)
-    low, high = np.quantile(steps[:, 1:], _BAND, axis=1)
+    low, high = np.quantile(steps[:, 1:], _BAND, axis=1, method="weibull")
     return PredictedStep(time_s, steps[:, 0], low.min(axis=0), high.max(axis=0))
 
 
@@ -93,7 +95,7 @@ def _noise(frequency_hz: Floats, lines_hz: Floats) -> Complex:
     return np.asarray(between[:_DRAWS] + 1j * between[_DRAWS:])
 
 
-def _in_disc() -> Complex:
-    """Points of the unit disc, evenly drawn, shape (draws,)."""
-    radius, turn = np.random.default_rng(1).random((2, _DRAWS))
+def _in_discs(count: int) -> Complex:
+    """Points of unit discs, evenly drawn, shape (draws, count)."""
+    radius, turn = np.random.default_rng(1).random((2, _DRAWS, count))
     return np.asarray(np.sqrt(radius) * np.exp(2j * np.pi * turn))
