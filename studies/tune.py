@@ -74,14 +74,14 @@ def machines(seed: int) -> Iterator[Machine]:
         yield Machine(plant, rng.uniform(0, 1.5e-3), Loop(described))
 
 
-def measured(machine: Machine, bound: float, seed: int) -> Responses:
+def measured(machine: Machine, bound: float, seed: int, lines: Lines = LINES) -> Responses:
     """One response with circular noise whose 95 % bound at each line is this share of |G|."""
-    truth = machine.response(LINES.frequency_hz)[np.newaxis]
+    truth = machine.response(lines.frequency_hz)[np.newaxis]
     sigma = bound / _TO_95 * np.abs(truth)
     noise = np.random.default_rng(seed).standard_normal((2, *truth.shape)) / np.sqrt(2)
     ones, row = np.ones(truth.shape), np.zeros(1, dtype=np.int64)
     value = truth + sigma * (noise[0] + 1j * noise[1])
-    return Responses(LINES, value, sigma, row + np.inf, ones, ones > 0, row, row, row + 0.0, row + 0.0)
+    return Responses(lines, value, sigma, row + np.inf, ones, ones > 0, row, row, row + 0.0, row + 0.0)
 
 
 def true_margins(machine: Machine, proposal: ControllerProposal) -> PredictedMargins | None:
