@@ -54,7 +54,7 @@ def tune_run(
 def schedule_run(
     directory: Path, specification: LoopSpecification, axis: Axis | None = None, *, loop_checked: bool = False
 ) -> GainSchedule:
-    """The same with gains that follow the schedule of the run, without filters; errors as of `gain_schedule`."""
+    """The same with gains that follow the schedule of the run; errors as of `gain_schedule`."""
     responses, loop, checked = _inputs(directory, axis, loop_checked)
     return gain_schedule(responses, loop, specification, loop_checked=checked)
 

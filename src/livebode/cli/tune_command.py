@@ -48,7 +48,8 @@ def tune_command(
         bool, typer.Option("--loop-checked", help="The description of the loop was compared with the machine.")
     ] = False,
     schedule: Annotated[
-        bool, typer.Option("--schedule", help="Also propose gains over the schedule, without filters, as gains.csv.")
+        bool,
+        typer.Option("--schedule", help="Also propose gains over the schedule, with the same filters, as gains.csv."),
     ] = False,
     odrive: Annotated[
         bool,
@@ -65,8 +66,8 @@ def tune_command(
 ) -> None:
     """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
 
-    Writes tune.png, and the filters as filters.h and filters.st, to the run directory; nothing to a machine. The exit
-    code is 2 if no controller meets the specification.
+    Writes tune.png, the gains as gains.toml, and the filters as filters.h and filters.st, to the run directory; nothing
+    to a machine. The exit code is 2 if no controller meets the specification.
     """
     from livebode.analysis.tune_report import feedforward_of, schedule_run, tune_run
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
@@ -74,6 +75,7 @@ def tune_command(
     from livebode.records import to_json
     from livebode.tuning import LoopSpecification
     from livebode.tuning.code_text import c_header, odrive_text, structured_text
+    from livebode.tuning.gains_text import gains_toml
 
     specification = LoopSpecification(
         bandwidth_hz=bandwidth_hz,
@@ -97,8 +99,9 @@ def tune_command(
         if can_draw():
             from livebode.report import save_tuning_picture
 
-            save_tuning_picture(found, into, title=directory.name)
+            save_tuning_picture(found, into, gains=gains, feedforward=forward, title=directory.name)
         (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
+        (into / "gains.toml").write_text(gains_toml(found.feedback.controller), encoding="utf-8")
         if odrive:
             (into / "odrive.txt").write_text(odrive_text(found.feedback), encoding="utf-8")
         if gains is not None:
@@ -113,7 +116,7 @@ def tune_command(
         if gains is not None:
             show_schedule(gains)
         also = {"odrive.txt": odrive, "gains.csv": schedule, "tune.png": can_draw()}
-        written = ["filters.h", "filters.st", *(name for name, use in also.items() if use)]
+        written = ["gains.toml", "filters.h", "filters.st", *(name for name, use in also.items() if use)]
         print(f"\n{into}: {', '.join(written)}")
         tell_how_to_draw()
     if not found.met:
@@ -142,12 +145,11 @@ def show_proposal(found: ControllerProposal) -> None:
 
 
 def show_schedule(found: GainSchedule) -> None:
-    """Print the gains and the promised bandwidth of each place."""
-    common = found.common.promised.bandwidth_hz
-    print(f"gains over the schedule, without filters (one controller for all places: {common:.4g} Hz)")
-    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz")))
-    for place, row, promised in zip(found.position, found.logarithms, found.promised):
-        numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz)
+    """Print the gains of each place, and the promised bandwidth with these and with one controller."""
+    print("gains over the schedule, with the filters above; bandwidth also with one controller for all places")
+    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz", "one controller")))
+    for place, row, promised, common in zip(found.position, found.logarithms, found.promised, found.common_promised):
+        numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz, common.bandwidth_hz)
         print("  " + "".join(f"{x:>16.5g}" for x in numbers))
     if not found.share:
         print("  no other gains keep the limits between the places")
