@@ -8,7 +8,7 @@ from typing import Any
 from livebode.core import Lines, RecordError
 from livebode.records.matrix_table import MatrixShape
 
-_OF_THE_MATRIX = ("outputs", "inputs", "units", "kinds_of_entries", "experiments")
+_OF_THE_MATRIX = ("outputs", "inputs", "units", "kinds_of_entries")
 
 
 def is_matrix(summary: Mapping[str, Any]) -> bool:
