@@ -202,7 +202,7 @@ def _loop(
         return None, tr("No margins: they need a fitted model, and there is none.")
     try:
         found = loop_report(fit, "the mean", of.overview, described)
-        checked = checked_loop(run.path, section)
+        checked = checked_loop(run.path, section, run.selected)
     except LivebodeError as error:
         return None, tr("No margins: {why}.", why=recognised(str(error)))
     return replace(found, responses=Responses.of(of.response), checked=checked), ""
