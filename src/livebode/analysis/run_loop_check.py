@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.analysis.loop_check import LoopCheck, check_loop
 from livebode.analysis.validation import clean_stretch
@@ -170,8 +171,31 @@ def _checked(run: RunRecord, section: LoopSection, channels: dict[str, Any]) -> 
             rate_hz=block.rate_hz,
             expected_hz=run.lines.rate_hz,
         )
-    signals = LoopSignals.of(block, run.lines, **{role: str(name) for role, name in roles.items()})
+    named = {role: str(name) for role, name in roles.items()}
+    signals = LoopSignals.of(block, run.lines, **named, starts=_settled(run, block) if run.is_matrix else None)
     return check_loop(signals, section)
+
+
+def _settled(run: RunRecord, block: Block) -> NDArray[np.intp]:
+    """Begins of the windows of two periods in the settled part of each experiment of a matrix run.
+
+    Where that part is one period, its window also contains the period before it.
+    """
+    of, period = run.found["experiments"], run.lines.window
+    dwell, settle = of["dwell_periods"], of["settle_periods"]
+    if dwell < 2:
+        raise SignalError(
+            "too-short",
+            "an experiment of one period is too short for a check of the controllers, which needs two",
+            "record with a longer dwell",
+            samples=period,
+            limit=2 * period,
+        )
+    places = np.arange(min(settle, dwell - 2), dwell - 1) * period
+    first = -((block.start - of["start"]) // -(dwell * period)) - 1  # the experiment in which the block begins
+    begins = of["start"] - block.start + dwell * period * np.arange(first, first + len(block) // (dwell * period) + 2)
+    starts = (begins[:, np.newaxis] + places).ravel()
+    return np.asarray(starts[(starts >= 0) & (starts + 2 * period <= len(block))], dtype=np.intp)
 
 
 def store_loop_check(directory: Path, found: LoopCheck, section: LoopSection) -> Path:
@@ -202,7 +226,7 @@ def _longest_stretch(run: RunRecord, words: dict[str, Any], names: list[str]) ->
 
 
 def _of_logs(words: dict[str, Any], names: list[str], where: str) -> Block:
-    used = {key: words[key] for key in ("source", "signals", "monitoring") if key in words}
+    used: dict[str, Any] = {key: words[key] for key in ("source", "signals", "monitoring") if key in words}
     if isinstance(outputs := used.get("signals", {}).get("output"), list):
         used["signals"] = {"output": outputs[0]}  # lists would need the lines and experiments of the matrix
     axis = Axis.of(used, where)
@@ -227,7 +251,8 @@ def _recorded(run: RunRecord, names: list[str]) -> Block | None:
     at = int(np.argmax(lengths))
     first = int(starts[at]) + (0 if clean[starts[at]] else 1)
     stretch = data[:, first : int(starts[at] + lengths[at])]
-    return Block(stretch, tuple(Channel(name) for name in names), float(run.found["rate_hz"]))
+    begin = int(number[first])
+    return Block(stretch, tuple(Channel(name) for name in names), float(run.found["rate_hz"]), start=begin)
 
 
 def _tables(run: RunRecord, names: list[str]) -> Iterator[tuple[Any, Any]]:

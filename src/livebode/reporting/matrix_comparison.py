@@ -10,7 +10,7 @@ from typing import Any
 
 from livebode.configuration.report_section import ReportSection
 from livebode.core import FitError, GridError, MatrixResponses
-from livebode.core.document import Document, Finding, Section
+from livebode.core.document import Document, Finding, Section, Tone
 from livebode.language import recognised, tr
 from livebode.mimo import compare_gantries, compare_matrices
 from livebode.records import RunRecord
@@ -101,7 +101,8 @@ class MatrixComparison:
         runs = tr("{before} and {after}", before=run_name(first.found.runs[0]), after=run_name(first.found.runs[1]))
         title = header.machine or runs
         findings = [Finding(f.tone, f"{_arrow(name)}: {f.text}") for name, one in named for f in one.sentences]
-        findings += [Finding("open", recognised(sentence)) for sentence in self.whole]
+        tone: Tone = "differs" if first.found.overall.differs.any() else "ok"
+        findings = [*(Finding(tone, f"{recognised(sentence)}.") for sentence in self.whole), *findings]
         return Document(
             kind=tr("Before and after"),
             title=title,
