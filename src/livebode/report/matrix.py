@@ -89,12 +89,12 @@ def singular_values_figure(responses: MatrixResponses, *, title: str = "", dark:
     with drawing(look):
         from livebode.drawing.scales import frequency_axis
 
-        figure = new_figure(9.0, 4.8)
+        figure, bounds = new_figure(9.0, 4.8), tr("bounds: {percent:.1f} %", percent=100 * PROBABILITY)
         heading(
             figure,
             look,
             title or tr("Singular values"),
-            f"{tr('bounds: {percent:.1f} %', percent=100 * PROBABILITY)} · {_facts(responses)}",
+            f"{bounds} · {_facts(responses)}",
             0.085,
         )
         axes = figure.add_axes((0.085, 0.115, 0.79, 0.72))
@@ -154,7 +154,7 @@ def _entry(pair: Sequence[Axes], look: Style, responses: MatrixResponses, at: tu
 def _label(axes: Axes, units: tuple[str, ...]) -> None:
     """The label of the magnitudes of one output, with their unit if they have one in common."""
     common = units[0] if len(set(units)) == 1 else ""
-    label = tr("magnitude in dB\nre 1 {unit}", unit=shortened(common, 26)) if common else tr("magnitude in dB")
+    label = tr("magnitude in dB") + (f"\nre 1 {shortened(common, 26)}" if common else "")
     axes.set_ylabel(label)
 
 
