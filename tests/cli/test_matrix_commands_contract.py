@@ -13,6 +13,7 @@ import scipy.io
 import xarray as xr
 
 from livebode.core import Block
+from livebode.dashboard.run_entry import entry
 from livebode.records import RunRecord
 from tests.support.command import livebode
 from tests.support.gantry_runs import NAMES, RATE_HZ, gantry_block, gantry_log
@@ -102,7 +103,7 @@ def test_one_run_of_several_outputs(folder: Path) -> None:
     assert json.loads((folder / "outputs" / "run.json").read_text())["found"]["outputs"] == ["velocity1", "velocity2"]
 
 
-@pytest.mark.parametrize("command", [["margins"], ["shaper"], ["tune"], ["report", "--check", "--template", "LIMITS"]])
+@pytest.mark.parametrize("command", [["margins"], ["tune"], ["report", "--check", "--template", "LIMITS"]])
 def test_a_missing_entry_is_answered_by_the_names(folder: Path, command: list[str]) -> None:
     (folder / "limits.toml").write_text(LIMITS)
     found = livebode(*(folder / "limits.toml" if word == "LIMITS" else word for word in command), folder / "before")
@@ -267,3 +268,16 @@ def test_each_controller_of_a_matrix_is_checked_with_its_own_signals(folder: Pat
     assert "no controller of the described structure" in livebode(*tune, "velocity1/u1").err
     assert "no controller joins velocity1 and u2" in livebode(*tune, "velocity1/u2").err
     assert "no controller is described" in livebode("check-loop", folder / "before").err
+
+
+@pytest.mark.parametrize("command", [["shaper"], ["learn", "--out", "baseline.json"]])
+def test_what_needs_a_single_response_refuses_a_matrix_in_one_sentence(folder: Path, command: list[str]) -> None:
+    found = livebode(*command, folder / "before")
+    assert found.code == 2
+    assert "is a matrix run" in found.err
+    assert len(found.err.strip().splitlines()) == 1
+
+
+def test_the_list_of_runs_names_the_channels_of_a_matrix(folder: Path) -> None:
+    row = entry(folder / "before")
+    assert (row.state, row.signals) == ("finished", "velocity1, velocity2 / u1, u2 / w1, w2")

@@ -68,6 +68,16 @@ def entry_missing(path: str, summary: Mapping[str, Any]) -> RecordError:
     )
 
 
+def matrix_unsupported(path: str, what: str) -> RecordError:
+    """The error where a whole run with one response is needed, and no entry can be chosen."""
+    return RecordError(
+        "matrix-unsupported",
+        f"{path!r} is a matrix run, and {what} needs a run with one response",
+        "run the recording with one output and one input",
+        path=path,
+    )
+
+
 def entry_summary(summary: Mapping[str, Any], output: str, input: str) -> dict[str, Any]:
     """run.json as that of a run with one output and one input."""
     found = dict(summary["found"])
