@@ -42,13 +42,13 @@ def shaper_command(
     from livebode.tuning.input_shaper import ModeRange, chosen, shapers
     from livebode.tuning.shaper_text import KLIPPER_KINDS, c_header, klipper_text, structured_text
 
+    run = RunRecord.open(directory, matrix=True)
+    if run.is_matrix:
+        raise matrix_unsupported(run.place, "an input shaper")
     where = ModeRange.of(modes_by_place(directory), mode)
     found = shapers(where, tolerance)
     best = chosen(found, tolerance)
     for_klipper = chosen(tuple(one for one in found if one.kind in KLIPPER_KINDS), tolerance)
-    run = RunRecord.open(directory, matrix=True)
-    if run.is_matrix:
-        raise matrix_unsupported(run.place, "an input shaper")
     rate_hz = run.lines.rate_hz
     into = results_directory(directory)
     with writing(into, RecordError):
