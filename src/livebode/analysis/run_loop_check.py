@@ -117,7 +117,7 @@ def _check_decentral(section: LoopSection, inputs: list[str]) -> None:
         raise UsageError(
             "missing",
             "no controller is described, so there is nothing to check",
-            "describe each under [[loop.controllers]], in the configuration of the run or in --axis",
+            "describe each under [[loop.controllers]], in the configuration of the run or in another file",
             argument="feedback",
         )
     for name in names:

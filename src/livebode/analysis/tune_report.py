@@ -79,7 +79,7 @@ def _tune_entry(
         raise TuneError(
             "no-controller",
             f"no controller joins {output} and {input}, so there is none to tune",
-            "describe all controllers under [[loop.controllers]], in the configuration of the run or in --axis",
+            "describe all controllers under [[loop.controllers]], in the configuration of the run or in another file",
             entry=entry,
         )
     check_controllers(section, outputs, inputs)
