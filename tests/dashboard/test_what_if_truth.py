@@ -223,7 +223,7 @@ def test_sliders_follow_keys_and_fields_and_the_address_keeps_them(tab: Tab) -> 
     assert tab.js("JSON.stringify(whatIf.trial)") == shown
     page.locator("#what-if-reset").click()
     tab.until("!bode.curves['what if'] && !location.hash.includes('what-if')")
-    page.get_by_role("button", name="filters proposed by livebode tune").click()
+    page.get_by_role("button", name="proposed by livebode tune").click()
     found = tab.js("whatIf.trial.notches.map(({hz, depthDb, damping}) => [hz, depthDb, damping])")
     assert np.allclose(found, NOTCHES)
     assert tab.js("whatIf.trial.values") == TRIAL

@@ -181,7 +181,7 @@ export class WhatIfCard {
         { class: "row" },
         this.adding(),
         ...(this.trial.lowPassHz ? [] : [this.act(tr("add a low-pass"), () => this.addLowPass())]),
-        ...(proposed ? [this.act(tr("filters proposed by livebode tune"), () => this.propose(proposed))] : []),
+        ...(proposed ? [this.act(tr("proposed by livebode tune"), () => this.propose(proposed))] : []),
       ),
     );
   }
