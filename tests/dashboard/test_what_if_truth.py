@@ -146,6 +146,7 @@ def compared(tab: Tab, plant: np.ndarray, hz: np.ndarray) -> dict[str, Any]:
     )
 
 
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # python-control with NumPy 2.5
 @pytest.mark.parametrize(("gain", "is_stable"), [(0.5, True), (1.2, True), (2.5, False)])
 def test_margins_of_a_known_loop_are_those_of_python_control(tab: Tab, gain: float, is_stable: bool) -> None:
     """L = K/(s·(1 + s)²) at 200 Hz, between whose poles and zeros nothing is hidden."""
