@@ -1,6 +1,6 @@
 """Reference pages of the Python names, from the packages' `__all__` and the docstrings: one page per package.
 
-A name that `livebode` itself offers is documented on its page, every other name on the page of its package.
+A name that `livebode` itself offers is documented on its page, every other name on the page of the package that has it.
 """
 
 from __future__ import annotations
@@ -29,16 +29,25 @@ def packages() -> dict[str, ModuleType]:
 
 def page(name: str, module: ModuleType) -> str:
     """The page of one package in reStructuredText."""
-    elsewhere = [] if module is livebode else sorted(set(module.__all__) & set(livebode.__all__))
+    homes = {own: _home(own, name, module) for own in sorted(module.__all__, key=str.lower)}
     title = f"``{name}``" if module is livebode else name
     first = (inspect.getdoc(module) or "").split("\n\n")[0]
     parts = [title, "=" * len(title), "", first, ""]
-    if elsewhere:
-        parts += ["In :mod:`livebode`: " + ", ".join(f":py:obj:`~livebode.{n}`" for n in elsewhere) + ".", ""]
+    for home in sorted(set(homes.values()) - {name}):
+        there = ", ".join(f":py:obj:`~{home}.{own}`" for own, its in sorted(homes.items()) if its == home)
+        parts += [f"In :mod:`{home}`: {there}.", ""]
     parts += [f".. py:module:: {name}", ""]
-    for own in sorted(set(module.__all__) - set(elsewhere), key=str.lower):
+    for own in (own for own, home in homes.items() if home == name):
         parts += [_entry(name, own, getattr(module, own)), ""]
     return "\n".join(parts)
+
+
+def _home(own: str, name: str, module: ModuleType) -> str:
+    """The package on whose page this name of a package is documented."""
+    if own in livebode.__all__:
+        return "livebode"
+    package = ".".join((getattr(getattr(module, own), "__module__", None) or name).split(".")[:2])
+    return package if own in getattr(import_module(package), "__all__", ()) else name
 
 
 def _entry(package: str, name: str, value: object) -> str:

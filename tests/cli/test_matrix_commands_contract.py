@@ -13,12 +13,21 @@ import scipy.io
 import xarray as xr
 
 from livebode.core import Block
+from livebode.dashboard.run_entry import entry
 from livebode.records import RunRecord
 from tests.support.command import livebode
 from tests.support.gantry_runs import NAMES, RATE_HZ, gantry_block, gantry_log
 
 SHARED = ["--lines", "10:60:5", "--window", "800", "--hop", "200"]
 EVERY = "velocity1/u1, velocity1/u2, velocity2/u1, velocity2/u2"
+
+
+LIMITS = """
+[[report.limits]]
+quantity = "|G|"
+max = 40
+band_hz = [10, 60]
+"""
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +103,10 @@ def test_one_run_of_several_outputs(folder: Path) -> None:
     assert json.loads((folder / "outputs" / "run.json").read_text())["found"]["outputs"] == ["velocity1", "velocity2"]
 
 
-@pytest.mark.parametrize("command", [["margins"], ["report"]])
+@pytest.mark.parametrize("command", [["margins"], ["tune"], ["report", "--check", "--template", "LIMITS"]])
 def test_a_missing_entry_is_answered_by_the_names(folder: Path, command: list[str]) -> None:
-    found = livebode(*command, folder / "before")
+    (folder / "limits.toml").write_text(LIMITS)
+    found = livebode(*(folder / "limits.toml" if word == "LIMITS" else word for word in command), folder / "before")
     assert found.code == 2
     assert f"choose an entry: {EVERY}" in found.err
     assert len(found.err.strip().splitlines()) == 1
@@ -187,8 +197,87 @@ def test_a_report_of_one_entry(folder: Path) -> None:
     found = livebode("report", folder / "before", *options)
     assert found.code == 0, found.err
     page = (folder / "entry.html").read_text()
-    assert "velocity2" in page
+    assert "<h1>before.parquet · velocity2 ← u1</h1>" in page
+    end_s = 4 * 2 * 6 * 800 / RATE_HZ  # of the recording: the average is from all of it
+    assert f"the average up to {end_s:g} s" in page
     assert "velocity1" not in page
     refused = livebode("report", folder / "before", *options, "--force", "--on", folder / "after.parquet")
     assert refused.code == 2
     assert "livebode validate RUN --entry" in refused.err
+
+
+def test_a_report_of_the_whole_matrix_has_every_entry_and_its_figures(folder: Path) -> None:
+    done = livebode("report", folder / "before", "--out", folder / "whole-report", "--json")
+    assert done.code == 0, done.err
+    page = (folder / "whole-report.html").read_text()
+    assert page.count("<figure>") == 2  # singular values, and one block of Bode plots
+    newest = RunRecord.open(folder / "before", matrix=True).matrix().newest()
+    for o, i in np.ndindex(2, 2):
+        one = newest.entry(o, i)
+        row = page[page.index(f"<td>{newest.outputs[o]} ← {newest.inputs[i]}</td>") :].split("</tr>")[0]
+        assert "11 of 11" in row
+        assert f">{one.magnitude_db[0].max():.2f}<" in row
+    assert f">{newest.condition[0].max():.3g}<" in page
+    assert "livebode report before --entry velocity2/u2" in page
+    refused = livebode("report", folder / "before", "--on", folder / "after.parquet")
+    assert refused.code == 2
+    assert "has no --on" in refused.err
+
+
+@pytest.mark.parametrize(("language", "word"), [("de", "Konditionszahl der Eingänge"), ("zh-CN", "输入的条件数")])
+def test_the_report_of_the_matrix_speaks_the_language_of_its_reader(folder: Path, language: str, word: str) -> None:
+    out = folder / f"whole-{language}"
+    assert livebode("report", folder / "before", "--out", out, "--language", language).code == 0
+    page = out.with_suffix(".html").read_text()
+    assert word in page
+    assert "singular values" not in page
+
+
+def test_a_comparison_of_matrices_is_a_document_with_every_entry(folder: Path) -> None:
+    done = livebode("compare", folder / "before", folder / "after", "--out", folder / "both")
+    assert done.code == 0, done.err
+    page = (folder / "both.html").read_text()
+    assert [page.count(f"<h2>{o} ← {i}</h2>") for o in ("velocity1", "velocity2") for i in ("u1", "u2")] == [1] * 4
+    assert page.count("<figure>") == 4
+
+
+CONTROLLERS = "".join(
+    f"""
+    [[loop.controllers]]
+    output = "velocity{n}"
+    input = "u{n}"
+    velocity = {{ gain = GAIN, integral_time_s = 0.05, rate_hz = 4000 }}
+    """
+    for n in (1, 2)
+)
+
+
+def test_each_controller_of_a_matrix_is_checked_with_its_own_signals(folder: Path) -> None:
+    words = (folder / "before.toml").read_text()
+    for name, gain in (("right", "0.3"), ("wrong", "0.33")):
+        (folder / f"{name}.toml").write_text(words + CONTROLLERS.replace("GAIN", gain))
+    found = json.loads(livebode("check-loop", folder / "before", "--axis", folder / "wrong.toml", "--json").out)
+    for one in found["controllers"].values():
+        assert one["verdict"] == "one change"
+        assert abs(one["explanations"][0]["value"] - 0.3) < 1e-4
+    tune = ("tune", folder / "before", "--axis", folder / "right.toml", "--entry")
+    assert "livebode check-loop" in livebode(*tune, "velocity1/u1").err  # another description was checked
+    found = json.loads(livebode("check-loop", folder / "before", "--axis", folder / "right.toml", "--json").out)
+    assert [one["verdict"] for one in found["controllers"].values()] == ["as described"] * 2
+    # With these bounds no controller keeps the limits, and it is refused as for a single response.
+    assert "no controller of the described structure" in livebode(*tune, "velocity1/u1").err
+    assert "no controller joins velocity1 and u2" in livebode(*tune, "velocity1/u2").err
+    assert "no controller is described" in livebode("check-loop", folder / "before").err
+
+
+@pytest.mark.parametrize("command", [["shaper"], ["learn", "--out", "baseline.json"]])
+def test_what_needs_a_single_response_refuses_a_matrix_in_one_sentence(folder: Path, command: list[str]) -> None:
+    found = livebode(*command, folder / "before")
+    assert found.code == 2
+    assert "is a matrix run" in found.err
+    assert len(found.err.strip().splitlines()) == 1
+
+
+def test_the_list_of_runs_names_the_channels_of_a_matrix(folder: Path) -> None:
+    row = entry(folder / "before")
+    assert (row.state, row.signals) == ("finished", "velocity1, velocity2 / u1, u2 / w1, w2")

@@ -53,6 +53,8 @@ def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
     assert "--strokes" in done.out  # the axis was at standstill
     assert (run / "tune.png").stat().st_size > 20_000
     assert "LIVEBODE_FILTERS" in (run / "filters.h").read_text(encoding="utf-8")
+    velocity = tomllib.loads((run / "gains.toml").read_text(encoding="utf-8"))["loop"]["velocity"]
+    assert f"{velocity['gain']:.5g}" in done.out
 
 
 def test_gains_for_odrive_count_turns_and_have_no_filters(run: Path) -> None:

@@ -25,6 +25,7 @@ from livebode.margins import Biquad, low_pass, notch
 from livebode.margins.stability import stable
 from livebode.records import RunRecord
 from livebode.tuning.code_text import c_header
+from livebode.tuning.gains_text import gains_toml
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.predicted import predicted
 from livebode.tuning.predicted_steps import predicted_steps
@@ -52,6 +53,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("what-if") / "run"
     with Watched(directory) as watched:
         watched.go(8000)
+    (directory / "gains.toml").write_text(gains_toml(tried_controllers()), encoding="ascii")
     (directory / "filters.h").write_text(c_header([notch(f, d, z, RATE_HZ) for f, d, z in NOTCHES]), encoding="ascii")
     return directory
 
@@ -72,14 +74,17 @@ def described() -> Cascade:
     return feedback
 
 
-def tried() -> Model:
-    """The controllers and filters of `ADDRESS` in Python."""
+def tried_controllers() -> Cascade:
     before = described()
     velocity = replace(before.velocity, gain=TRIAL["gain"], integral_time_s=TRIAL["integral_time_s"])
     assert isinstance(before.position, PID)
-    controllers = Cascade(velocity, replace(before.position, gain=TRIAL["position_gain"]))
+    return Cascade(velocity, replace(before.position, gain=TRIAL["position_gain"]))
+
+
+def tried() -> Model:
+    """The controllers and filters of `ADDRESS` in Python."""
     filters = [notch(f, depth, damping, RATE_HZ) for f, depth, damping in NOTCHES]
-    return reduce(lambda f, filter: f * filter, [*filters, low_pass(LOW_PASS_HZ, RATE_HZ)], controllers)
+    return reduce(lambda f, filter: f * filter, [*filters, low_pass(LOW_PASS_HZ, RATE_HZ)], tried_controllers())
 
 
 def late(f: np.ndarray) -> np.ndarray:
@@ -201,6 +206,7 @@ def compared(tab: Tab, plant: np.ndarray, hz: np.ndarray) -> dict[str, Any]:
     )
 
 
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # python-control with NumPy 2.5
 @pytest.mark.parametrize(("gain", "is_stable"), [(0.5, True), (1.2, True), (2.5, False)])
 def test_margins_of_a_known_loop_are_those_of_python_control(tab: Tab, gain: float, is_stable: bool) -> None:
     """L = K/(s·(1 + s)²) at 200 Hz, between whose poles and zeros nothing is hidden."""
@@ -278,9 +284,10 @@ def test_sliders_follow_keys_and_fields_and_the_address_keeps_them(tab: Tab) -> 
     assert tab.js("JSON.stringify(whatIf.trial)") == shown
     page.locator("#what-if-reset").click()
     tab.until("!bode.curves['what if'] && !location.hash.includes('what-if')")
-    page.get_by_role("button", name="filters proposed by livebode tune").click()
+    page.get_by_role("button", name="proposed by livebode tune").click()
     found = tab.js("whatIf.trial.notches.map(({hz, depthDb, damping}) => [hz, depthDb, damping])")
     assert np.allclose(found, NOTCHES)
+    assert tab.js("whatIf.trial.values") == TRIAL
     page.keyboard.press("Escape")
     page.locator("#what-if-card").wait_for(state="hidden")
     assert page.evaluate("() => document.activeElement.id") == "what-if"

@@ -151,7 +151,7 @@ def test_a_controller_that_could_stay_excited_is_refused(hal: Hal, known: Path) 
     prepare(experiment)
     with pytest.raises(MeasurementError, match=r"no streamer\.2 is loaded"):
         prepare(Experiment.read(write_experiment(known, measure="streamer = 2")))
-    hal.play(np.zeros(5 * RATE_HZ))
+    hal.play(np.zeros(60 * RATE_HZ))
     with pytest.raises(MeasurementError, match=r"another program plays through streamer\.0"):
         prepare(experiment)
 

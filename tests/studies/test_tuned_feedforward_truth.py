@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ from studies.tune_feedforward import compared
 TRUE_KG_M2 = 0.0028 + 6.7 * 0.019**2
 
 
-def responses(lines: Lines, share: float, seed: int) -> Responses:
+def responses(lines: Lines, share: float | np.ndarray, seed: int) -> Responses:
     """Of the belt of Table I, with this sigma over |G|."""
     model = TwoMass(radius_m=0.019)
     values = [{"Js": 0.0028, "mL": 6.7, "Keff": 5e5, "bs": 130.0}.get(name, 0.0) for name in model.names]
@@ -32,6 +34,18 @@ def test_the_bound_of_the_inertia_covers_it() -> None:
     assert np.median(found[:, 1]) < 0.1 * TRUE_KG_M2
     with pytest.raises(SignalError, match="excite lower lines"):
         rigid_inertia(responses(Lines.parse("30:160:2", 4000.0, 2000), 0.02, 0), "velocity")
+
+
+def test_the_bound_covers_the_inertia_where_the_model_is_wrong_and_three_lines_have_little_noise() -> None:
+    """The plant is 1 % beside two masses, not known to sigma. Of 100 runs at least 88, as above."""
+    lines = Lines.parse("2:160:2", 4000.0, 2000)
+    share = np.where(np.isin(lines.frequency_hz, (6, 12, 18)), 1e-5, 1e-2)
+    covered = 0
+    for seed in range(100):
+        one = responses(lines, np.hypot(share, 1e-2), seed)
+        inertia, bound = rigid_inertia(replace(one, sigma=share * np.abs(one.value)), "velocity")
+        covered += abs(inertia - TRUE_KG_M2) <= bound
+    assert covered >= 88
 
 
 def test_feedforward_reduces_the_tracking_error() -> None:

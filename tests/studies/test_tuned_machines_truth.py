@@ -15,7 +15,7 @@ from livebode.tuning.code_text import c_header, structured_text
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.problem import TuningProblem
 from livebode.tuning.structure import FeedbackStructure
-from studies.tune import LIMITS, keeps, machines, measured, promises, proposed, true_margins, unstable_proposals
+from studies.tune import LIMITS, keeps, machines, measured, promises, proposed, stability, true_margins
 
 VELOCITY = PID(gain=0.2, integral_time_s=0.1, derivative_time_s=1e-3, derivative_filter_s=1e-3, rate_hz=4000)
 CASCADE = Cascade(PID(gain=0.2, integral_time_s=0.1, rate_hz=4000), PID(gain=5.0, rate_hz=2000, rate_divider=2))
@@ -38,9 +38,12 @@ def test_promises_hold_on_the_true_machine_and_the_bandwidth_is_near_the_best() 
 
 
 def test_no_proposal_is_unstable() -> None:
-    wrong, made = unstable_proposals(25, seed=7)
-    assert wrong == 0
-    assert made >= 20
+    *_, first = stability(15, seed=7)
+    *_, second = stability(10, first=15, seed=7)
+    total = first + second
+    assert total.machines == 25
+    assert total.unstable == 0
+    assert total.refused <= 5
 
 
 @pytest.mark.parametrize("controller", [VELOCITY, CASCADE])
@@ -67,15 +70,15 @@ def test_the_slopes_of_the_limits_are_exact() -> None:
         plant,
         LoopSpecification(bandwidth_hz=10.0, noise_gain=1.0),
     )
-    x, at = problem.structure.start, np.zeros(plant.value.shape, dtype=bool)
-    at[:, ::17] = True
-    value, slope = problem.clearances(x, at)
-    assert slope is not None
+    x, some = problem.structure.start, np.arange(plant.frequency_hz.size) % 17 == 0
+    value, slope = problem.only(some).sloped_clearances(x)
+    np.testing.assert_allclose(value, problem.clearances(x)[:, some], rtol=1e-12)
     tracking, bend = problem.tracking(x)
     for i in range(len(x)):
         step = np.zeros(len(x))
         step[i] = 1e-6
-        np.testing.assert_allclose(slope[:, i], (problem.clearances(x + step, at)[0] - value) / 1e-6, atol=1e-4)
+        moved = problem.clearances(x + step)[:, some]
+        np.testing.assert_allclose(slope[..., i], (moved - value) / 1e-6, atol=1e-4)
         np.testing.assert_allclose(bend[:, i], (problem.tracking(x + step)[0] - tracking) / 1e-6, atol=1e-2, rtol=1e-4)
         rise = np.log(problem.noise_gain(x + step)[0] / problem.noise_gain(x)[0]) / 1e-6
         np.testing.assert_allclose(problem.noise_gain(x)[1][i], rise, atol=1e-4)

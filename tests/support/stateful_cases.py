@@ -23,6 +23,7 @@ from livebode.fleet.axis_stream import AxisStream
 from livebode.fleet.message import write_message
 from livebode.mimo import (
     MatrixExcitation,
+    MatrixMonitor,
     MatrixResponses,
     MatrixSettings,
     MatrixTracker,
@@ -176,6 +177,27 @@ def matrix_tracker() -> Case:
         lambda: MatrixTracker(settings),
         [lambda stage, part=part: step(stage, part) for part in parts],
         [lambda: MatrixTracker(replace(settings, memory=3))],
+    )
+
+
+def matrix_monitor() -> Case:
+    """Matrices with windows of their own, of which the last two differ from the baseline: one alarm."""
+    example = example_matrix_responses()
+    span = int(example.sample[-1] - example.first[-1]) + 1
+
+    def later(number: int, factor: float) -> MatrixResponses:
+        one, shift = example[-1:], number * span
+        return replace(one, value=factor * one.value, first=one.first + shift, sample=one.sample + shift)
+
+    parts = [later(number, factor) for number, factor in enumerate((1.0, 2.0, 2.0), 1)]
+
+    def step(stage: MatrixMonitor, part: MatrixResponses) -> object:
+        return [alarm.sentence for alarm in stage.process(part)], stage.alarmed
+
+    return Case(
+        lambda: MatrixMonitor(example),
+        [lambda stage, part=part: step(stage, part) for part in parts],
+        [lambda: MatrixMonitor(example, false_alarm_interval_s=60.0), lambda: MatrixMonitor(later(0, 2.0))],
     )
 
 
@@ -400,7 +422,8 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, direct_tracker, successive_trackers, matrix_tracker, matrix_columns, local_polynomial, welch_average,
+        tracker, direct_tracker, successive_trackers, matrix_tracker, matrix_columns, matrix_monitor,
+        local_polynomial, welch_average,
         spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
         run_counts, readiness, sequencer, axis_stream, stream_position,

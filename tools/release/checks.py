@@ -131,9 +131,11 @@ def formats(root: Path) -> str:
 
 
 def stored(root: Path) -> str:
+    """Whether a run of the newest version is stored, of ordinary responses or of matrices."""
     newest = format_versions(text(root, FORMATS)).get("run directory", "")
-    folder = root / "tests/records/stored" / newest
-    return "" if newest and (folder / "expected.json").is_file() else f"there is no run of format version {newest}"
+    folder = root / "tests/records/stored"
+    found = newest and any((folder / name / "expected.json").is_file() for name in (newest, f"matrix-{newest}"))
+    return "" if found else f"there is no run of format version {newest}"
 
 
 def measured(root: Path) -> str:

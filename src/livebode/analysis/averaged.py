@@ -110,14 +110,13 @@ class _Counted:
         self._window, self._hop = run.lines.window, int(run.found.get("hop", run.lines.window))
         self._movement, self.moved = Movement(max(1, self._window // self._hop)), False
         self._rate_hz, self.begin_s = run.lines.rate_hz, np.nan
+        self._experiments = run.found.get("experiments")
         self.rows, self.incomplete = 0, 0
         self.valid = np.zeros(len(run.lines), dtype=np.int64)
         self.spans_s, self.spans = (np.nan, np.nan), (np.nan, np.nan)
 
     def add(self, part: Responses) -> None:
-        if not self.rows and len(part):
-            # The first response is of one window, whose time is its centre; of a later average it is not.
-            self.begin_s = float(part.time_s[0] - (part.first[0] + part.sample[0]) / 2 / self._rate_hz)
+        self._find_begin(part)
         self.rows += len(part)
         self.valid += np.count_nonzero(part.valid, axis=0)
         self.incomplete += int(np.count_nonzero(~part.valid.all(axis=1)))
@@ -127,6 +126,18 @@ class _Counted:
             self.spans_s = _wider(self.spans_s, part.time_s[rows])
             self.spans = _wider(self.spans, part.schedule[rows])
             self._follow(part.sample[rows], part.schedule[rows])
+
+    def _find_begin(self, part: Responses) -> None:
+        """The time of sample 0. A response's time is the centre of its windows, whose extent a later average hides."""
+        if self._experiments is None and not self.rows and len(part):
+            self.begin_s = float(part.time_s[0] - (part.first[0] + part.sample[0]) / 2 / self._rate_hz)
+        if self._experiments is None or np.isfinite(self.begin_s):
+            return
+        # Of a matrix, the first valid one is of a window of each experiment.
+        for row in np.flatnonzero(part.valid.any(axis=1))[:1]:
+            between = self._experiments["dwell_periods"] * self._window * (self._experiments["number"] - 1)
+            centre = part.sample[row] - (self._window - 1) / 2 - between / 2
+            self.begin_s = float(part.time_s[row] - centre / self._rate_hz)
 
     def _follow(self, sample: NDArray[np.int64], schedule: NDArray[np.float64]) -> None:
         places = max(1, self._window // self._hop)

@@ -32,13 +32,18 @@ NOT_CHECKED = CheckedLoop("not checked", "loop not checked: its description was 
 CHANGED = CheckedLoop("not checked", "loop not checked: another description was compared with the signals")
 
 
-def checked_loop(directory: Path, section: LoopSection) -> CheckedLoop:
-    """What is known of this description of a run's loop: the newest check, if it was of the same description."""
+def checked_loop(directory: Path, section: LoopSection, entry: tuple[str, str] | None = None) -> CheckedLoop:
+    """What is known of this description of a run's loop: the newest check, if it was of the same description.
+
+    With the output and the input of an `entry` of a matrix run, `section` describes its controller alone.
+    """
     stored = read_loop_check(directory)
     if stored is None:
         return NOT_CHECKED
     try:
         of = LoopSection.model_validate(without_null(stored["loop"]))
-    except (ValidationError, AttributeError):
+        if entry is not None:
+            of, stored = of.of_controller(*entry), stored["controllers"]["/".join(entry)]
+    except (ValidationError, AttributeError, KeyError, TypeError):
         return CHANGED
     return CheckedLoop(str(stored.get("verdict")), str(stored["sentence"])) if of == section else CHANGED

@@ -26,6 +26,7 @@ from livebode.monitoring import (
     places,
 )
 from livebode.records import RunRecord
+from livebode.records.matrix_run import matrix_unsupported
 from livebode.records.stored_precision import in_stored_precision
 
 _ROLES = ("output", "input", "excitation", "schedule")
@@ -64,7 +65,10 @@ def learn(
     if not paths:
         raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
     with ExitStack() as copies:
-        runs = [RunRecord.open(copies.enter_context(local_copy(path))) for path in paths]
+        runs = [RunRecord.open(copies.enter_context(local_copy(path)), matrix=True) for path in paths]
+        for run in runs:
+            if run.is_matrix:
+                raise matrix_unsupported(run.place, "a baseline")
         axes = [learnable_axis(recorded_configuration(run.summary), run.place) for run in runs]
         _check_once(runs, axes)
         return learn_from(runs, axes, report)

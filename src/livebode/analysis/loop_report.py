@@ -133,7 +133,7 @@ def loop_of_run(
     found, words = fit_run(directory, section, entry)
     responses = Responses.join(list(run.steady_batches()))  # the fitted responses
     report = loop_report(found, words, responses, loop.build(responses.lines.rate_hz), peak_sensitivity)
-    return replace(report, checked=checked_loop(directory, loop))
+    return replace(report, checked=checked_loop(directory, loop, run.selected))
 
 
 def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sensitivity: float = 2.0) -> LoopReport:

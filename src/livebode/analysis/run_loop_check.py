@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.analysis.loop_check import LoopCheck, check_loop
 from livebode.analysis.validation import clean_stretch
 from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Block, Channel, RecordError, SignalError
+from livebode.core import Block, Channel, RecordError, SignalError, UsageError
 from livebode.records import RunRecord
 from livebode.records.loop_check_file import write_loop_check
 from livebode.records.sample_table import channels_of
@@ -21,6 +22,7 @@ from livebode.sources import open_log
 from livebode.validation import LoopSignals
 
 _SAMPLES_MAX = 10_000_000  # of a long live run: its first ones
+_VERDICTS = ("as described", "one change", "not explained")
 _WORDS = {
     "excitation": "the excitation w (signals.excitation)",
     "input": "the plant input u (signals.input)",
@@ -57,16 +59,99 @@ def check_loop_of_run(
     words = recorded_configuration(run.summary)
     if section is None:
         section = LoopSection.model_validate(words.get("loop", {}))
-    section.build(run.lines.rate_hz)
     given = {role: name for role, name in (channels or {}).items() if name}
-    roles = {role: {**words.get("signals", {}), **given}.get(role) for role in _WORDS}
+    return _checked(run, section, {**words.get("signals", {}), **given}), section
+
+
+def check_controllers_of_run(
+    directory: Path, section: LoopSection | None = None
+) -> tuple[dict[str, LoopCheck], LoopSection]:
+    """Check each controller of a matrix run against its own signals, by the name "output/input".
+
+    The equation u = E·w − F·y of an input contains the other inputs only by the measured output, so one controller is
+    checked as that of a single loop.
+
+    Parameters
+    ----------
+    directory
+        Of the run.
+    section
+        Another description of the loop.
+
+    Raises
+    ------
+    UsageError
+        If no controller is described, or two act on one input.
+    LivebodeError
+        As of `check_loop_of_run`.
+    """
+    run = RunRecord.open(directory, matrix=True)
+    words = recorded_configuration(run.summary)
+    if section is None:
+        section = LoopSection.model_validate(words.get("loop", {}))
+    roles: dict[str, list[str]] = {
+        role: [names] if isinstance(names, str) else names or []
+        for role in ("input", "excitation")
+        for names in [words.get("signals", {}).get(role)]
+    }
+    if not roles["input"] or not roles["excitation"]:
+        raise RecordError(
+            "not-tracked",
+            "the run does not name its plant inputs and its excitations, which a check of its controllers needs",
+            "run again with signals.input and signals.excitation",
+            path=str(directory),
+        )
+    _check_decentral(section, roles["input"])
+    found = {}
+    for one in section.controllers:
+        at = roles["input"].index(one.input)
+        channels = {"output": one.output, "input": one.input, "excitation": roles["excitation"][at]}
+        own = section.of_controller(one.output, one.input)
+        found[f"{one.output}/{one.input}"] = _checked(run, own, channels)
+    return found, section
+
+
+def _check_decentral(section: LoopSection, inputs: list[str]) -> None:
+    names = [one.input for one in section.controllers]
+    if not names:
+        raise UsageError(
+            "missing",
+            "no controller is described, so there is nothing to check",
+            "describe each under [[loop.controllers]], in the configuration of the run or in another file",
+            argument="feedback",
+        )
+    for name in names:
+        if name not in inputs:
+            raise UsageError(
+                "unknown-name",
+                f"a controller acts on {name!r}, which is not an input of the run",
+                f"choose {', '.join(inputs)}",
+                argument="input",
+                value=name,
+                allowed=inputs,
+            )
+        if names.count(name) > 1:
+            raise UsageError(
+                "conflict",
+                f"{names.count(name)} controllers act on the input {name!r}, and a check compares one with its signals",
+                "check a loop with one controller for each input",
+                argument="loop.controllers",
+                value=name,
+            )
+
+
+def _checked(run: RunRecord, section: LoopSection, channels: dict[str, Any]) -> LoopCheck:
+    """The check of one controller against the channels of its roles."""
+    words = recorded_configuration(run.summary)
+    section.build(run.lines.rate_hz)
+    roles = {role: channels.get(role) for role in _WORDS}
     for role, name in roles.items():
         if name is None:
             raise RecordError(
                 "not-tracked",
                 f"the run does not name {_WORDS[role]}, which a check of its loop needs",
                 f"run again with signals.{role}, or name the channel here",
-                path=str(directory),
+                path=str(run.path),
                 role=role,
             )
     names = list(dict.fromkeys(str(name) for name in roles.values()))
@@ -86,13 +171,44 @@ def check_loop_of_run(
             rate_hz=block.rate_hz,
             expected_hz=run.lines.rate_hz,
         )
-    signals = LoopSignals.of(block, run.lines, **{role: str(name) for role, name in roles.items()})
-    return check_loop(signals, section), section
+    named = {role: str(name) for role, name in roles.items()}
+    signals = LoopSignals.of(block, run.lines, **named, starts=_settled(run, block) if run.is_matrix else None)
+    return check_loop(signals, section)
+
+
+def _settled(run: RunRecord, block: Block) -> NDArray[np.intp]:
+    """Begins of the windows of two periods in the settled part of each experiment of a matrix run.
+
+    Where that part is one period, its window also contains the period before it.
+    """
+    of, period = run.found["experiments"], run.lines.window
+    dwell, settle = of["dwell_periods"], of["settle_periods"]
+    if dwell < 2:
+        raise SignalError(
+            "too-short",
+            "an experiment of one period is too short for a check of the controllers, which needs two",
+            "record with a longer dwell",
+            samples=period,
+            limit=2 * period,
+        )
+    places = np.arange(min(settle, dwell - 2), dwell - 1) * period
+    first = -((block.start - of["start"]) // -(dwell * period)) - 1  # the experiment in which the block begins
+    begins = of["start"] - block.start + dwell * period * np.arange(first, first + len(block) // (dwell * period) + 2)
+    starts = (begins[:, np.newaxis] + places).ravel()
+    return np.asarray(starts[(starts >= 0) & (starts + 2 * period <= len(block))], dtype=np.intp)
 
 
 def store_loop_check(directory: Path, found: LoopCheck, section: LoopSection) -> Path:
     """Write the result and the description that it belongs to into a directory."""
     return write_loop_check(directory, {**found.plain(), "loop": section.model_dump(mode="json")})
+
+
+def store_controller_checks(directory: Path, found: dict[str, LoopCheck], section: LoopSection) -> Path:
+    """Write the results for the controllers of a matrix, and the description that they belong to."""
+    worst = max(found.values(), key=lambda one: _VERDICTS.index(one.verdict))
+    whole = {"verdict": worst.verdict, "sentence": worst.sentence}
+    each = {name: one.plain() for name, one in found.items()}
+    return write_loop_check(directory, {**whole, "controllers": each, "loop": section.model_dump(mode="json")})
 
 
 def _longest_stretch(run: RunRecord, words: dict[str, Any], names: list[str]) -> Block:
@@ -110,7 +226,10 @@ def _longest_stretch(run: RunRecord, words: dict[str, Any], names: list[str]) ->
 
 
 def _of_logs(words: dict[str, Any], names: list[str], where: str) -> Block:
-    axis = Axis.of({key: words[key] for key in ("source", "signals", "monitoring") if key in words}, where)
+    used: dict[str, Any] = {key: words[key] for key in ("source", "signals", "monitoring") if key in words}
+    if isinstance(outputs := used.get("signals", {}).get("output"), list):
+        used["signals"] = {"output": outputs[0]}  # lists would need the lines and experiments of the matrix
+    axis = Axis.of(used, where)
     given, ready = axis.source, axis.ready
     found = []
     for log in given.logs:
@@ -132,7 +251,8 @@ def _recorded(run: RunRecord, names: list[str]) -> Block | None:
     at = int(np.argmax(lengths))
     first = int(starts[at]) + (0 if clean[starts[at]] else 1)
     stretch = data[:, first : int(starts[at] + lengths[at])]
-    return Block(stretch, tuple(Channel(name) for name in names), float(run.found["rate_hz"]))
+    begin = int(number[first])
+    return Block(stretch, tuple(Channel(name) for name in names), float(run.found["rate_hz"]), start=begin)
 
 
 def _tables(run: RunRecord, names: list[str]) -> Iterator[tuple[Any, Any]]:

@@ -9,12 +9,15 @@ from livebode.analysis.places import by_place
 from livebode.analysis.strokes import read_strokes
 from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
+from livebode.configuration.matrix import check_controllers, matrix_loop
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import PID, Cascade, LivebodeError, Loop, PositionPD, Responses, SignalError, TuneError
 from livebode.locations import Location
+from livebode.mimo import equivalent_plant, mean_matrix
 from livebode.motion.friction_curve import FrictionCurve, friction_curve
 from livebode.motion.smooth_motion import OutputKind
 from livebode.records import RunRecord
+from livebode.records.matrix_run import entry_named
 from livebode.tuning import ControllerProposal, LoopSpecification, tune
 from livebode.tuning.feedforward import Feedforward
 from livebode.tuning.gain_schedule import GainSchedule, gain_schedule
@@ -23,11 +26,17 @@ _CONTRADICTED = ("one change", "not explained")
 
 
 def tune_run(
-    directory: Path, specification: LoopSpecification, axis: Axis | None = None, *, loop_checked: bool = False
+    directory: Path,
+    specification: LoopSpecification,
+    axis: Axis | None = None,
+    *,
+    loop_checked: bool = False,
+    entry: str | None = None,
 ) -> ControllerProposal:
     """The proposal for a run; the loop is from `axis`, else from its configuration.
 
-    The responses are the mean of the run, or with a schedule the means at twelve places.
+    The responses are the mean of the run, or with a schedule the means at twelve places. Of an entry of a matrix run
+    they are the plant that its controller sees while the others are active as described (`equivalent_plant`).
 
     Parameters
     ----------
@@ -39,6 +48,8 @@ def tune_run(
         Another description of the loop.
     loop_checked
         The description was verified otherwise, where no `livebode check-loop` of the run confirms it.
+    entry
+        Of a matrix run: the controller, "output/input".
 
     Raises
     ------
@@ -47,14 +58,48 @@ def tune_run(
     UsageError
         If the loop's feedback is missing.
     """
+    if entry is not None:
+        return _tune_entry(directory, specification, axis, loop_checked, entry)
     responses, loop, checked = _inputs(directory, axis, loop_checked)
     return tune(responses, loop, specification, loop_checked=checked)
+
+
+def _tune_entry(
+    directory: Path, specification: LoopSpecification, axis: Axis | None, loop_checked: bool, entry: str
+) -> ControllerProposal:
+    run = RunRecord.open(directory, matrix=True)
+    output, input = entry_named(str(directory), run.summary, entry)
+    section = axis.loop if axis is not None else None
+    if section is None:
+        section = LoopSection.model_validate(recorded_configuration(run.summary).get("loop", {}))
+    responses = mean_matrix(run.matrix())
+    rate_hz, (outputs, inputs) = responses.lines.rate_hz, (responses.outputs, responses.inputs)
+    own = section.of_controller(output, input).build(rate_hz)
+    if own.feedback is None:
+        raise TuneError(
+            "no-controller",
+            f"no controller joins {output} and {input}, so there is none to tune",
+            "describe all controllers under [[loop.controllers]], in the configuration of the run or in another file",
+            entry=entry,
+        )
+    check_controllers(section, outputs, inputs)
+    plant = equivalent_plant(responses, matrix_loop(section, list(inputs), list(outputs), rate_hz), output, input)
+    found = tune(plant, own, specification, loop_checked=_confirmed(directory, section) or loop_checked)
+    if found.before is None:
+        # Then the other loops alone may be unstable, and what the lines show does not tell a stable proposal.
+        raise TuneError(
+            "loop-contradicted",
+            f"with the measured matrix the controller {entry} does not come out as stable, as it is on the machine",
+            "add lines at low frequencies and around the crossover, or correct [[loop.controllers]]",
+            key="loop.controllers",
+        )
+    return found
 
 
 def schedule_run(
     directory: Path, specification: LoopSpecification, axis: Axis | None = None, *, loop_checked: bool = False
 ) -> GainSchedule:
-    """The same with gains that follow the schedule of the run, without filters; errors as of `gain_schedule`."""
+    """The same with gains that follow the schedule of the run; errors as of `gain_schedule`."""
     responses, loop, checked = _inputs(directory, axis, loop_checked)
     return gain_schedule(responses, loop, specification, loop_checked=checked)
 
@@ -71,13 +116,16 @@ def _inputs(directory: Path, axis: Axis | None, loop_checked: bool) -> tuple[Res
 
 
 def feedforward_of(
-    directory: Path, controller: PID | Cascade | PositionPD, strokes: Location | None = None
+    directory: Path, controller: PID | Cascade | PositionPD, strokes: Location | None = None, entry: str | None = None
 ) -> Feedforward | None:
     """Feedforward for a run: inertia from its responses, friction from `strokes` or else the run's own recording.
 
     None where the lines do not show the inertia, or it is not known whether the output is a position or a velocity.
-    Without friction where the run's own recording has no strokes in both directions.
+    Without friction where the run's own recording has no strokes in both directions. None of an entry of a matrix run:
+    several motors share the inertia.
     """
+    if entry is not None:
+        return None
     run = RunRecord.open(directory)
     kind = _kind(run.kinds.output, controller)
     if kind is None:

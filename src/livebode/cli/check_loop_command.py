@@ -9,10 +9,12 @@ import typer
 
 from livebode.cli.options import Excitation, Json, Output
 from livebode.cli.remote import results_directory
+from livebode.core import UsageError
 from livebode.locations import location
 
 if TYPE_CHECKING:
     from livebode.analysis.loop_check import LoopCheck
+    from livebode.configuration.loop_section import LoopSection
 
 _LISTED_MAX = 6
 
@@ -30,14 +32,20 @@ def check_loop_command(
     """Compare the described controllers with the recorded signals: as described, or the change that explains them.
 
     Needs excitation, input and output in the samples of the run; the channels default to those of the run. Writes
-    loop-check.json to the run directory: `livebode margins` and `livebode report` show the result.
+    loop-check.json to the run directory: `livebode margins` and `livebode report` show the result. Of a matrix run each
+    of [[loop.controllers]] is compared with its own signals.
     """
     from livebode.analysis.run_loop_check import check_loop_of_run, store_loop_check
     from livebode.configuration import Axis
-    from livebode.records import to_json
+    from livebode.records import RunRecord, to_json
 
     section = None if axis is None else Axis.read(axis).loop
     channels = {"output": output, "input": input, "excitation": excitation}
+    if RunRecord.open(directory, lambda _: None, matrix=True).is_matrix:
+        if any(channels.values()):
+            raise _no_channels()
+        _check_controllers(directory, section, as_json)
+        return
     found, described = check_loop_of_run(directory, section, channels)
     written = store_loop_check(results_directory(directory), found, described)
     if as_json:
@@ -45,6 +53,31 @@ def check_loop_command(
         return
     show_loop_check(found)
     print(f"\n{written}")
+
+
+def _check_controllers(directory: Path, section: LoopSection | None, as_json: bool) -> None:
+    from livebode.analysis.run_loop_check import check_controllers_of_run, store_controller_checks
+    from livebode.records import to_json
+
+    found, described = check_controllers_of_run(directory, section)
+    written = store_controller_checks(results_directory(directory), found, described)
+    if as_json:
+        print(to_json({"controllers": {name: one.plain() for name, one in found.items()}}))
+        return
+    for name, one in found.items():
+        print(f"controller {name}:")
+        show_loop_check(one)
+        print()
+    print(written)
+
+
+def _no_channels() -> UsageError:
+    return UsageError(
+        "conflict",
+        "each controller of a matrix run is compared with the channels of its own signals",
+        "leave out --output, --input and --excitation",
+        options=["--output", "--input", "--excitation"],
+    )
 
 
 def show_loop_check(found: LoopCheck) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from math import inf
 from pathlib import Path
@@ -30,6 +31,7 @@ from livebode.core import UsageError
 from livebode.locations import location
 
 if TYPE_CHECKING:
+    from livebode.reporting.compare_report import Comparison
     from livebode.reporting.matrix_comparison import MatrixComparison
 
 
@@ -75,8 +77,8 @@ def compare_command(
 
     A line differs if chance does not explain it; with --ignore-below only if |after/before − 1| is that large too.
     Runs with a schedule, such as a position, are compared by place and direction, and over all places. Of two matrix
-    runs all entries are compared; files show one of them (--entry). The first page of the files is as in `livebode
-    report`; limits apply to AFTER.
+    runs all entries are compared, or one of them (--entry). The first page of the files is as in `livebode report`;
+    limits apply to AFTER.
     """
     from livebode.cli.documents import write_documents
     from livebode.configuration.recorded import recorded_report
@@ -85,42 +87,55 @@ def compare_command(
     from livebode.reporting.compare_report import Comparison
     from livebode.reporting.matrix_comparison import MatrixComparison, both_matrices
 
-    if entry is None and out is None and (pair := both_matrices(before, after)) is not None:
-        machine_options = _described(gantry, cart)
-        _show_matrices(MatrixComparison.of(*pair, ignore_below=_share(ignore_below), **machine_options), as_json)
-        return
-    if gantry is not None or cart is not None:
-        raise UsageError(
-            "conflict",
-            "a gantry is compared by all entries of two matrix runs",
-            "leave out --gantry and --cart, or --out and --entry",
-            argument="gantry",
-        )
-    found = Comparison.of(before, after, ignore_below=_share(ignore_below), entry=entry)
-    files: list[Path] = []
-    remark = ""
     options = {
         "machine": machine, "serial_number": serial_number, "operator": operator, "company": company,
         "customer": customer, "conditions": conditions, "logo": logo, "paper": paper,
     }  # fmt: skip
     if out is None and (template is not None or ask or appendix or language or any(options.values())):
         raise _needs_out()
+    share, pair = _share(ignore_below), both_matrices(before, after) if entry is None else None
+    found: Comparison | MatrixComparison
+    if pair is not None:
+        found, later = MatrixComparison.of(*pair, ignore_below=share, **_described(gantry, cart)), pair[1]
+    elif gantry is not None or cart is not None:
+        raise _one_response()
+    else:
+        found = Comparison.of(before, after, ignore_below=share, entry=entry)
+        later = found.found.runs[1]
+    files: list[Path] = []
+    remark = ""
     if out is not None:
-        first = header(recorded_report(found.found.runs[1].summary), template, ask, options)
+        first = header(recorded_report(later.summary), template, ask, options)
         with in_language(language or first.language or "en"):
             document = found.document(datetime.now(UTC), header=first, appendix=appendix)
             files, remark = write_documents(document, out, force=force)
     if as_json:
         print(to_json(found.plain()))
         return
-    for finding in found.sentences:
-        print(finding.text)
-    for table in found.tables:
-        print(f"\n{table}")
-    if not found.changes.parameters:
-        print(found.changes.parameter_words)
-    for line in filter(None, (*files, remark)):
+    for line in (*_printed(found), *filter(None, (*files, remark))):
         print(line)
+
+
+def _printed(found: Comparison | MatrixComparison) -> Iterator[str]:
+    """Verdict and tables, and why there are no parameters."""
+    from livebode.reporting.matrix_comparison import MatrixComparison
+
+    if isinstance(found, MatrixComparison):
+        yield from found.sentences
+    else:
+        yield from (finding.text for finding in found.sentences)
+    yield from (f"\n{table}" for table in found.tables)
+    if not isinstance(found, MatrixComparison) and not found.changes.parameters:
+        yield found.changes.parameter_words
+
+
+def _one_response() -> UsageError:
+    return UsageError(
+        "conflict",
+        "a gantry is compared by all entries of two matrix runs",
+        "leave out --gantry and --cart, or --entry",
+        argument="gantry",
+    )
 
 
 def _described(gantry: Path | None, cart: str | None) -> dict[str, Any]:
@@ -145,18 +160,6 @@ def _described(gantry: Path | None, cart: str | None) -> dict[str, Any]:
             value=cart,
         ) from None
     return {"gantry": read_gantry(gantry), "cart_m": (before, after)}
-
-
-def _show_matrices(found: MatrixComparison, as_json: bool) -> None:
-    from livebode.records import to_json
-
-    if as_json:
-        print(to_json(found.plain()))
-        return
-    for sentence in found.sentences:
-        print(sentence)
-    for table in found.tables:
-        print(f"\n{table}")
 
 
 def _needs_out() -> UsageError:

@@ -29,6 +29,7 @@ from livebode.cli.report_options import (
 from livebode.locations import location
 
 if TYPE_CHECKING:
+    from livebode.analysis.acceptance import Accepted
     from livebode.reporting.report_data import Judged
 
 _NOT_ALL_MET = 4
@@ -73,17 +74,21 @@ def report_command(
 
     The first page and the limits are from the [report] of the axis.toml with which the run was recorded, from
     --template, and from the options. An existing report in the run directory is replaced. The PDF needs the extra
-    `pdf`. Without --check the exit code does not depend on the limits. Of a matrix run the report is on one --entry.
+    `pdf`. Without --check the exit code does not depend on the limits. The report of a matrix run shows all entries;
+    with --entry it is that of one response, with its limits.
     """
     from livebode.cli.documents import write_documents
     from livebode.configuration.recorded import recorded_report
     from livebode.core.clock import moments_by
     from livebode.language import in_language
     from livebode.records import RunRecord, to_json
+    from livebode.records.matrix_run import entry_missing
+    from livebode.reporting.matrix_data import read_matrix
+    from livebode.reporting.matrix_report import matrix_report
     from livebode.reporting.report_data import read
     from livebode.reporting.run_report import report_of
 
-    run = RunRecord.open(directory, on_damage=lambda _: None, entry=entry)
+    run = RunRecord.open(directory, on_damage=lambda _: None, matrix=True, entry=entry)
     options = {
         "machine": machine, "serial_number": serial_number, "operator": operator, "company": company,
         "customer": customer, "conditions": conditions, "logo": logo, "paper": paper,
@@ -91,19 +96,25 @@ def report_command(
     first = header(recorded_report(run.summary), template, ask, options)
     if check and not first.limits:
         raise _no_limits()
-    if on is not None and entry is not None:
+    if on is not None and (run.is_matrix or entry is not None):
         raise _not_on_an_entry()
+    if check and run.is_matrix:
+        raise entry_missing(str(directory), run.summary)
     judged = None if on is None else _judged(directory, on)
     with moments_by(run.clock), in_language(language or first.language or "en"):
-        of = read(directory, judged, first, entry)
-        document = report_of(of, made=datetime.now(UTC), appendix=appendix)
+        accepted: tuple[Accepted, ...] = ()
+        if run.is_matrix:
+            document = matrix_report(read_matrix(directory, first), made=datetime.now(UTC), appendix=appendix)
+        else:
+            of = read(directory, judged, first, entry)
+            document, accepted = report_of(of, made=datetime.now(UTC), appendix=appendix), of.accepted
         files, remark = write_documents(
             document, out or results_directory(directory) / "report", force=force or out is None
         )
-    results = [a.result for a in of.accepted]
+    results = [a.result for a in accepted]
     if as_json:
         found = {"files": list(map(str, files)), "verdict": document.result[0].tone}
-        print(to_json(found | ({"limits": [a.plain() for a in of.accepted]} if of.accepted else {})))
+        print(to_json(found | ({"limits": [a.plain() for a in accepted]} if accepted else {})))
     else:
         for line in filter(None, (*files, remark, _counted(results))):
             print(line)
@@ -133,7 +144,7 @@ def _not_on_an_entry() -> Exception:
 
     return UsageError(
         "conflict",
-        "--on and --entry exclude each other in a report: the other inputs of a matrix move in the recording, too",
+        "a report of a matrix run, or of its --entry, has no --on: the other inputs move in the recording, too",
         "compare the entry with another run by `livebode validate RUN --entry OUTPUT/INPUT --on RUN`",
         options=["--on", "--entry"],
     )

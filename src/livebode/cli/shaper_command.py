@@ -38,14 +38,18 @@ def shaper_command(
     """
     from livebode.analysis.place_fits import modes_by_place
     from livebode.records import RunRecord, to_json
+    from livebode.records.matrix_run import matrix_unsupported
     from livebode.tuning.input_shaper import ModeRange, chosen, shapers
     from livebode.tuning.shaper_text import KLIPPER_KINDS, c_header, klipper_text, structured_text
 
+    run = RunRecord.open(directory, matrix=True)
+    if run.is_matrix:
+        raise matrix_unsupported(run.place, "an input shaper")
     where = ModeRange.of(modes_by_place(directory), mode)
     found = shapers(where, tolerance)
     best = chosen(found, tolerance)
     for_klipper = chosen(tuple(one for one in found if one.kind in KLIPPER_KINDS), tolerance)
-    rate_hz = RunRecord.open(directory).lines.rate_hz
+    rate_hz = run.lines.rate_hz
     into = results_directory(directory)
     with writing(into, RecordError):
         (into / "shaper.h").write_text(c_header(best, rate_hz), encoding="utf-8")

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.options import Json
+from livebode.cli.options import Entry, Json
 from livebode.cli.remote import results_directory
-from livebode.core import RecordError, TuneError
+from livebode.core import RecordError, TuneError, UsageError
 from livebode.core.writing import writing
 from livebode.locations import location
 
@@ -48,7 +48,8 @@ def tune_command(
         bool, typer.Option("--loop-checked", help="The description of the loop was compared with the machine.")
     ] = False,
     schedule: Annotated[
-        bool, typer.Option("--schedule", help="Also propose gains over the schedule, without filters, as gains.csv.")
+        bool,
+        typer.Option("--schedule", help="Also propose gains over the schedule, with the same filters, as gains.csv."),
     ] = False,
     odrive: Annotated[
         bool,
@@ -61,19 +62,25 @@ def tune_command(
             help="Usual strokes in both directions, for the feedforward of friction. \\[default: the run's recording]",
         ),
     ] = None,
+    entry: Entry = None,
     as_json: Json = False,
 ) -> None:
     """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
 
-    Writes tune.png, and the filters as filters.h and filters.st, to the run directory; nothing to a machine. The exit
-    code is 2 if no controller meets the specification.
+    Writes tune.png, the gains as gains.toml, and the filters as filters.h and filters.st, to the run directory; nothing
+    to a machine. The exit code is 2 if no controller meets the specification. With --entry of a matrix run it is the
+    controller between that output and input, and the plant that it sees while the other [[loop.controllers]] are active
+    as described.
     """
+    if entry is not None and (schedule or strokes is not None):
+        raise _not_of_an_entry()
     from livebode.analysis.tune_report import feedforward_of, schedule_run, tune_run
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.configuration import Axis
     from livebode.records import to_json
     from livebode.tuning import LoopSpecification
     from livebode.tuning.code_text import c_header, odrive_text, structured_text
+    from livebode.tuning.gains_text import gains_toml
 
     specification = LoopSpecification(
         bandwidth_hz=bandwidth_hz,
@@ -89,16 +96,19 @@ def tune_command(
         coherence=coherence,
     )
     other = None if axis is None else Axis.read(axis)
-    found = tune_run(directory, specification, other, loop_checked=loop_checked)
-    forward = feedforward_of(directory, found.feedback.controller, None if strokes is None else location(strokes))
+    found = tune_run(directory, specification, other, loop_checked=loop_checked, entry=entry)
+    moves = None if strokes is None else location(strokes)
+    forward = feedforward_of(directory, found.feedback.controller, moves, entry)
     gains = schedule_run(directory, specification, other, loop_checked=loop_checked) if schedule else None
     into = results_directory(directory)
     with writing(into, RecordError):
         if can_draw():
             from livebode.report import save_tuning_picture
 
-            save_tuning_picture(found, into, title=directory.name)
+            title = directory.name if entry is None else f"{directory.name}: {entry}"
+            save_tuning_picture(found, into, gains=gains, feedforward=forward, title=title)
         (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
+        (into / "gains.toml").write_text(gains_toml(found.feedback.controller), encoding="utf-8")
         if odrive:
             (into / "odrive.txt").write_text(odrive_text(found.feedback), encoding="utf-8")
         if gains is not None:
@@ -109,11 +119,14 @@ def tune_command(
         print(to_json(found.plain() | {name: None if one is None else one.plain() for name, one in more.items()}))
     else:
         show_proposal(found)
-        show_feedforward(forward)
+        if entry is None:
+            show_feedforward(forward)
+        else:
+            print(f"of the controller {entry} alone: the other controllers are active as described, and do not change")
         if gains is not None:
             show_schedule(gains)
         also = {"odrive.txt": odrive, "gains.csv": schedule, "tune.png": can_draw()}
-        written = ["filters.h", "filters.st", *(name for name, use in also.items() if use)]
+        written = ["gains.toml", "filters.h", "filters.st", *(name for name, use in also.items() if use)]
         print(f"\n{into}: {', '.join(written)}")
         tell_how_to_draw()
     if not found.met:
@@ -124,6 +137,15 @@ def tune_command(
             bandwidth_hz=found.promised.bandwidth_hz,
             limited_by=list(found.limited_by),
         )
+
+
+def _not_of_an_entry() -> UsageError:
+    return UsageError(
+        "conflict",
+        "--entry has no --schedule and no --strokes: a matrix has one place, and several motors share the inertia",
+        "leave them out",
+        options=["--entry", "--schedule", "--strokes"],
+    )
 
 
 def show_proposal(found: ControllerProposal) -> None:
@@ -142,12 +164,11 @@ def show_proposal(found: ControllerProposal) -> None:
 
 
 def show_schedule(found: GainSchedule) -> None:
-    """Print the gains and the promised bandwidth of each place."""
-    common = found.common.promised.bandwidth_hz
-    print(f"gains over the schedule, without filters (one controller for all places: {common:.4g} Hz)")
-    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz")))
-    for place, row, promised in zip(found.position, found.logarithms, found.promised):
-        numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz)
+    """Print the gains of each place, and the promised bandwidth with these and with one controller."""
+    print("gains over the schedule, with the filters above; bandwidth also with one controller for all places")
+    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz", "one controller")))
+    for place, row, promised, common in zip(found.position, found.logarithms, found.promised, found.common_promised):
+        numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz, common.bandwidth_hz)
         print("  " + "".join(f"{x:>16.5g}" for x in numbers))
     if not found.share:
         print("  no other gains keep the limits between the places")

@@ -144,6 +144,15 @@ class LoopSection(ConfigurationSection):
     position_pd: PositionPDSection | None = None
     controllers: Annotated[list[ControllerSection], Field(max_length=CHANNELS_MAX**2)] = []
 
+    def of_controller(self, output: str, input: str) -> LoopSection:
+        """The description of the controller between two signals of a matrix alone; without one if there is none."""
+        shared = {name: getattr(self, name) for name in ("input_logged", "excitation_logged", "output_logged")}
+        for one in self.controllers:
+            if (one.output, one.input) == (output, input):
+                parts = ("velocity", "position", "velocity_differenced", "position_pd")
+                return LoopSection(**shared, **{name: getattr(one, name) for name in parts})
+        return LoopSection(**shared)
+
     def build(self, rate_hz: float) -> Loop:
         """The Loop of this description, recorded at `rate_hz`; ConfigError if its parts do not form one."""
         for name in ("velocity", "position", "position_pd"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pydantic import BaseModel
@@ -10,7 +11,7 @@ from livebode.core import ConfigError, Lines, Model
 
 if TYPE_CHECKING:
     from livebode.configuration.axis import Axis
-    from livebode.configuration.loop_section import ControllerSection
+    from livebode.configuration.loop_section import ControllerSection, LoopSection
     from livebode.mimo import MatrixLoop, MatrixSettings
 
 _USED = {
@@ -115,16 +116,19 @@ def _check_signals(axis: Axis) -> None:
             "describe them in [[loop.controllers]], or use the joint estimator",
             key="loop.controllers",
         )
-    for controller in axis.loop.controllers:
-        _check_controller(controller, signals.listed("output"), inputs, excitations)
+    check_controllers(axis.loop, signals.listed("output"), inputs or excitations)
 
 
-def _check_controller(
-    controller: ControllerSection, outputs: list[str], inputs: list[str], excitations: list[str]
-) -> None:
+def check_controllers(loop: LoopSection, outputs: Sequence[str], inputs: Sequence[str]) -> None:
+    """ConfigError if a controller joins signals that the matrix does not have."""
+    for controller in loop.controllers:
+        _check_controller(controller, outputs, inputs)
+
+
+def _check_controller(controller: ControllerSection, outputs: Sequence[str], inputs: Sequence[str]) -> None:
     for role, name, names in (
         ("output", controller.output, outputs),
-        ("input", controller.input, inputs or excitations),
+        ("input", controller.input, inputs),
     ):
         if name not in names:
             raise ConfigError(
@@ -161,7 +165,9 @@ def matrix_settings(axis: Axis, rate_hz: float, hop: int | None = None) -> Matri
         input=signals.listed("input"),
         excitation=signals.listed("excitation"),
         estimator=axis.tracking.estimator,  # type: ignore[arg-type] # check_matrix has refused the others
-        loop=_loop(axis, rate_hz),
+        loop=matrix_loop(
+            axis.loop, signals.listed("input") or signals.listed("excitation"), signals.listed("output"), rate_hz
+        ),
         experiments=of.number,
         dwell=of.dwell_periods,
         settle=of.settle_periods,
@@ -173,11 +179,10 @@ def matrix_settings(axis: Axis, rate_hz: float, hop: int | None = None) -> Matri
     )
 
 
-def _loop(axis: Axis, rate_hz: float) -> MatrixLoop:
+def matrix_loop(loop: LoopSection, inputs: list[str], outputs: list[str], rate_hz: float) -> MatrixLoop:
+    """The loop of these [[loop.controllers]], recorded at `rate_hz`; ConfigError if a controller cannot be built."""
     from livebode.mimo import MatrixLoop
 
-    loop, signals = axis.loop, axis.signals
-    inputs, outputs = signals.listed("input") or signals.listed("excitation"), signals.listed("output")
     feedback: list[list[Model | None]] = [[None] * len(outputs) for _ in inputs]
     for controller in loop.controllers:
         feedback[inputs.index(controller.input)][outputs.index(controller.output)] = controller.build(rate_hz)

@@ -18,12 +18,13 @@ from livebode.analysis.checked_loop import checked_loop
 from livebode.analysis.places import by_place
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import PID, Cascade, Gain, LivebodeError, Model, PositionPD, Responses
+from livebode.core import Cascade, Gain, LivebodeError, Model, Responses
 from livebode.dashboard.overlays import grid_hz
 from livebode.dashboard.past import Past
-from livebode.dashboard.proposed_filters import proposed_filters
+from livebode.dashboard.proposal_files import proposed_controller
 from livebode.dashboard.quantities import Quantities
 from livebode.tuning.feedback_parts import FeedbackParts, FeedbackTerm
+from livebode.tuning.gains_text import parameter_keys
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.specification import LoopSpecification
 
@@ -49,12 +50,12 @@ def loop_trial(
         "described": feedback is not None,
         "verdict": checked.verdict,
         "sentence": checked.sentence,
-        "tables": _tables(model),
+        "tables": parameter_keys(model),
         "values": dict(parts.values),
         "rate_hz": filter_rate_hz(model, rate_hz),
         "frequency_hz": drawn_hz.tolist(),
         "parts": _parts(parts),
-        "proposed": proposed_filters(past.directory),
+        "proposed": proposed_controller(past.directory, model),
         **_band(plant, model),
     }
 
@@ -104,16 +105,6 @@ def _responses(past: Past) -> Responses:
 
 def _size_bytes(directory: Path) -> int:
     return sum(path.stat().st_size for path in directory.rglob("responses*.parquet"))
-
-
-def _tables(model: Model) -> dict[str, str]:
-    """The key of each parameter under [loop]."""
-    if isinstance(model, PositionPD):
-        return {"gain": "loop.position_pd.velocity_gain", "position_gain": "loop.position_pd.position_gain"}
-    if not isinstance(model, PID | Cascade):
-        return {}
-    of = {name: f"loop.velocity.{name}" for name in ("gain", "integral_time_s", "derivative_time_s")}
-    return of | {"position_gain": "loop.position.gain"}
 
 
 def filter_rate_hz(model: Model, rate_hz: float) -> float:

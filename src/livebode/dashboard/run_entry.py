@@ -123,7 +123,7 @@ def _readable(run: Path, summary: dict[str, Any], size: int, newest: dict[str, f
         message=message,
         machine=_machine(configuration),
         recording=Path("".join(_texts(configuration.get("source", {}), ("log",)))).name,
-        signals=" / ".join(_texts(configuration.get("signals", {}), ("output", "input", "excitation"))),
+        signals=" / ".join(_channels(configuration.get("signals", {}))),
         begun=_begun(run, summary),
         duration_s=recorded_s,
         lines=len(frequencies),
@@ -161,6 +161,15 @@ def _machine(configuration: Mapping[str, Any]) -> str:
 
 def _texts(section: Mapping[str, Any], names: tuple[str, ...]) -> list[str]:
     return [section[name][:200] for name in names if isinstance(section.get(name), str) and section[name]]
+
+
+def _channels(signals: Mapping[str, Any]) -> Iterator[str]:
+    """Output, input and excitation; of a matrix run each is a list of channels."""
+    for role in ("output", "input", "excitation"):
+        names = signals.get(role)
+        text = ", ".join(filter(None, _leaves(names)))[:200]
+        if text:
+            yield text
 
 
 def _leaves(value: object) -> Iterator[str]:

@@ -160,15 +160,18 @@ class RunsPages:
 
     def _compared(self, before: Path, after: Path, code: str) -> str:
         from livebode.configuration.recorded import recorded_report
+        from livebode.records.summary_file import read_summary
         from livebode.report.html import to_html
         from livebode.reporting.compare_report import Comparison
         from livebode.reporting.first_page import trusted
+        from livebode.reporting.matrix_comparison import MatrixComparison, both_matrices
 
         key = code, *((path.name, (path / "run.json").stat().st_mtime_ns) for path in (before, after))
         if key not in self._comparisons:
             with in_language(code):
-                found = Comparison.of(before, after)
-                header = trusted(recorded_report(found.found.runs[1].summary), after)
+                pair = both_matrices(before, after)
+                found = Comparison.of(before, after) if pair is None else MatrixComparison.of(*pair)
+                header = trusted(recorded_report(read_summary(after)[0]), after)
                 self._comparisons[key] = to_html(found.document(datetime.now(UTC), header=header))
             while len(self._comparisons) > _COMPARISONS_MAX:
                 self._comparisons.popitem(last=False)

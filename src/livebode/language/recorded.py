@@ -5,6 +5,15 @@ kinds of events, the names of parameters and the statuses here with those of the
 """
 
 SENTENCES = (
+    "column {name} is invalid at {where}: a window contains a start, a gap or an excluded sample",
+    "column {name} is invalid at {where}: the input does not move",
+    "excite it there",
+    "column {name} is invalid at {where}: the input moves together with others in all experiments",
+    "use as many different experiments as inputs",
+    "{count} lines from {low} to {high} Hz",
+    "all entries: {rest}",
+    "response {entry} changed at {line} Hz by {percent} ± {bound} %",
+    "no entry changed by more than chance explains ({lines} lines, false alarms {percent} %)",
     "{runs} runs with a value, and a trend needs {needed}",
     "the runs span {days} days, and a trend needs {needed}",
     "the covariates cannot be separated from each other or from the time",
@@ -362,6 +371,7 @@ NAMES = (
     "suppressed", "suppression-ended",
     "uneven-clock", "unit-changed", "unshelved", "waiting", "window-doubtful", "wrong-rate", "a delay",
     "viscous friction at the motor (B)", "viscous friction at the load (BL)", "a lag",
-    "the compliance of modes above the band", "a further mode", "output", "plant input",
+    "the compliance of modes above the band", "a further mode", "output", "plant input", "incomplete", "not excited",
+    "not separated",
 )  # fmt: skip
 """Names and phrases without values."""

@@ -7,6 +7,7 @@ from livebode.on_first_use import on_first_use
 
 if TYPE_CHECKING:
     from livebode.mimo.change import EntryChange, MatrixChange, compare_matrices
+    from livebode.mimo.equivalent import equivalent_plant
     from livebode.mimo.example import example_matrix_responses
     from livebode.mimo.excitation import MatrixExcitation
     from livebode.mimo.gantry_change import Cause, GantryChange, compare_gantries
@@ -22,6 +23,7 @@ __getattr__ = on_first_use(
     __name__,
     {
         "change": ("EntryChange", "MatrixChange", "compare_matrices"),
+        "equivalent": ("equivalent_plant",),
         "example": ("example_matrix_responses",),
         "excitation": ("MatrixExcitation",),
         "gantry_change": ("Cause", "GantryChange", "compare_gantries"),
@@ -53,6 +55,7 @@ __all__ = [
     "MatrixTracker",
     "compare_gantries",
     "compare_matrices",
+    "equivalent_plant",
     "example_matrix_responses",
     "fit_gantry",
     "fit_matrix",

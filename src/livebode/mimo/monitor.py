@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
 
-from livebode.core import FitError, MatrixResponses, UsageError
+from livebode.core import FitError, MatrixResponses, Stage, StatefulBase, UsageError
 from livebode.mimo.change import EntryChange, MatrixPair
 from livebode.mimo.gantry_change import Cause, compare_gantries
 from livebode.mimo.mean import mean_matrix
@@ -44,12 +45,13 @@ class MatrixAlarm:
         return f"Since {self.time_s:.1f} s: {what}"
 
 
-class MatrixMonitor:
+class MatrixMonitor(StatefulBase):
     """Compares matrices with those of a healthy machine, as they are measured.
 
     Each matrix that shares no window with the one judged before is compared with the mean of the baseline by Wilks' Λ
     over all entries and lines (`compare_matrices`). The limit of its probability is the time of a matrix's windows over
-    the interval of false alarms. An alarm is reported once, until a matrix is within the limit again.
+    the interval of false alarms. An alarm is reported once, until a matrix is within the limit again. A monitor that is
+    restored from a snapshot continues with the same alarms as one that was not stopped.
 
     Delay: that of the matrices; a change shows in full when all their windows are after it. Bias: none.
 
@@ -74,6 +76,9 @@ class MatrixMonitor:
     >>> MatrixMonitor(responses[:2]).process(responses[2:])
     []
     """
+
+    _stage = Stage("matrix-monitor", 1)
+    _STATE = ("_judged", "alarmed")
 
     def __init__(
         self,
@@ -113,6 +118,13 @@ class MatrixMonitor:
                 found.append(self._alarm(one, pair))
             self.alarmed = differs
         return found
+
+    @property
+    def _identity(self) -> str:
+        b = self._baseline
+        content = b"".join(getattr(b, name).tobytes() for name in ("value", "noise", "spread", "dof", "reason"))
+        learned = hashlib.sha256(content).hexdigest()
+        return repr((b.lines, b.outputs, b.inputs, learned, self._interval_s, self._description))
 
     def _alarm(self, one: MatrixResponses, pair: MatrixPair) -> MatrixAlarm:
         entry = min(pair.entries(), key=lambda changed: changed.probability)

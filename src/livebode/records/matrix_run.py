@@ -8,7 +8,7 @@ from typing import Any
 from livebode.core import Lines, RecordError
 from livebode.records.matrix_table import MatrixShape
 
-_OF_THE_MATRIX = ("outputs", "inputs", "units", "kinds_of_entries", "experiments")
+_OF_THE_MATRIX = ("outputs", "inputs", "units", "kinds_of_entries")
 
 
 def is_matrix(summary: Mapping[str, Any]) -> bool:
@@ -65,6 +65,16 @@ def entry_missing(path: str, summary: Mapping[str, Any]) -> RecordError:
         path=path,
         allowed=entries,
         argument="entry",
+    )
+
+
+def matrix_unsupported(path: str, what: str) -> RecordError:
+    """The error where a whole run with one response is needed, and no entry can be chosen."""
+    return RecordError(
+        "matrix-unsupported",
+        f"{path!r} is a matrix run, and {what} needs a run with one response",
+        "run the recording with one output and one input",
+        path=path,
     )
 
 

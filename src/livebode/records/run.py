@@ -193,6 +193,11 @@ class RunRecord:
         """Output and input of each entry of a matrix run, by its name "output/input"; none of an ordinary run."""
         return entries_of(self.summary)
 
+    @property
+    def entry_name(self) -> str | None:
+        """Of a view of one entry its name, "output/input"; None of another run."""
+        return None if self.selected is None else "/".join(self.selected)
+
     def entry(self, output: str, input: str) -> RunRecord:
         """The view of one entry of a matrix run as an ordinary run.
 

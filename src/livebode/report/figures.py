@@ -47,6 +47,14 @@ def _figure(picture: Picture) -> Figure:
         from livebode.report.year import years_figure
 
         return years_figure(**picture.data)
+    if picture.what == "matrix":
+        from livebode.report.matrix import matrix_figure
+
+        return matrix_figure(**picture.data, title=tr("Matrix of responses"), width_in=WIDTH_IN)
+    if picture.what == "singular values":
+        from livebode.report.matrix import singular_values_figure
+
+        return singular_values_figure(**picture.data, title=tr("Singular values"))
     if picture.what == "comparison":
         from livebode.report.comparison import comparison_figure
 

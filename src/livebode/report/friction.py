@@ -69,8 +69,8 @@ def friction_figure(found: FrictionCurves, *, title: str = "", dark: bool = Fals
             )
         axes.axhline(0.0, color=look.grid, linewidth=0.8, zorder=0)
         axes.axvline(0.0, color=look.grid, linewidth=0.8, zorder=0)
-        axes.set_xlabel(_labelled("speed", _speed_unit(curve)))
-        axes.set_ylabel(_labelled("friction", curve.units[curve.index("coulomb")]))
+        axes.set_xlabel(labelled("speed", speed_unit(curve)))
+        axes.set_ylabel(labelled("friction", curve.units[curve.index("coulomb")]))
         axes.legend(loc="upper left")
         if found.places is not None:
             places = figure.add_subplot(grid[0, 1])
@@ -80,7 +80,7 @@ def friction_figure(found: FrictionCurves, *, title: str = "", dark: bool = Fals
                 markersize=4, capsize=3, linewidth=1.4,
             )  # fmt: skip
             places.set_xlabel("position")
-            places.set_ylabel(_labelled("Coulomb friction", curve.units[curve.index("coulomb")]))
+            places.set_ylabel(labelled("Coulomb friction", curve.units[curve.index("coulomb")]))
     return figure
 
 
@@ -94,12 +94,14 @@ def _with_offset(each: FrictionCurve, curve: FrictionCurve, v: NDArray[np.float6
     return np.asarray(each.at(v)[0] + each["offset"] - curve["offset"])
 
 
-def _speed_unit(curve: FrictionCurve) -> str:
+def speed_unit(curve: FrictionCurve) -> str:
+    """Unit of the speed, from that of viscous friction; empty without one."""
     unit = curve.units[curve.index("viscous")]
     return unit.rpartition("/(")[2].removesuffix(")") if unit else ""
 
 
-def _labelled(name: str, unit: str) -> str:
+def labelled(name: str, unit: str) -> str:
+    """A label with its unit, if there is one."""
     return f"{name}, {unit}" if unit else name
 
 

@@ -14,9 +14,11 @@ from livebode.core import REASONS, MatrixResponses
 from livebode.core.clock import moment
 from livebode.drawing import bound_db, decibels
 from livebode.drawing.panel import FEW_LINES, alone, bound
+from livebode.language import recognised, tr
 from livebode.report.pictures import save
 from livebode.report.style import Style, drawing, heading, new_figure, plain, shortened, style
 from livebode.report.summary import BOUND_C, PROBABILITY
+from livebode.report.words import lines_phrase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,19 +51,22 @@ def save_matrix_pictures(
         return [save(figure, Path(directory) / name, look) for name, figure in pictures.items()]
 
 
-def matrix_figure(responses: MatrixResponses, *, title: str = "", dark: bool = False) -> Figure:
+def matrix_figure(
+    responses: MatrixResponses, *, title: str = "", dark: bool = False, width_in: float | None = None
+) -> Figure:
     """A Bode plot of each entry: outputs down, inputs across, with the 99.7 % bounds of the newest matrix.
 
     Lines at which a column is invalid are shaded in its plots, with the reason where there is none that is valid.
+    Without `width_in`, the width follows the number of inputs.
     """
     look, (down, across) = style(dark), responses.value.shape[2:]
     with drawing(look):
         from livebode.drawing.scales import frequency_axis
 
-        width, height = max(9.0, 1.05 + 3.4 * across), 1.8 + 3.2 * down
+        width, height = width_in or max(9.0, 1.05 + 3.4 * across), 1.8 + 3.2 * down
         figure = new_figure(width, height)
         left = _LEFT_IN / width
-        heading(figure, look, title or "Bode plots", _facts(responses), left)
+        heading(figure, look, title or tr("Bode plots"), _facts(responses), left)
         _key(figure, look, left, bool((responses.reason != 0).any()))
         panels = _panels(figure, down, across)
         responses.plot(axes=panels, c=BOUND_C, color=look.newest)
@@ -69,11 +74,12 @@ def matrix_figure(responses: MatrixResponses, *, title: str = "", dark: bool = F
             for i in range(across):
                 _entry(list(panels[2 * o : 2 * o + 2, i]), look, responses, (o, i))
             _label(panels[2 * o, 0], responses.units[o] if responses.units else ("",))
+            panels[2 * o + 1, 0].set_ylabel(tr("phase in degrees"))
         for axes in panels.ravel():
             plain(axes)
             frequency_axis(axes, responses.frequency_hz, labels=axes in panels[-1])
         for axes in panels[-1]:
-            axes.set_xlabel("frequency in Hz")
+            axes.set_xlabel(tr("frequency in Hz"))
     return figure
 
 
@@ -83,12 +89,12 @@ def singular_values_figure(responses: MatrixResponses, *, title: str = "", dark:
     with drawing(look):
         from livebode.drawing.scales import frequency_axis
 
-        figure = new_figure(9.0, 4.8)
+        figure, bounds = new_figure(9.0, 4.8), tr("bounds: {percent:.1f} %", percent=100 * PROBABILITY)
         heading(
             figure,
             look,
-            title or "Singular values",
-            f"singular values with {100 * PROBABILITY:.1f} % bounds · {_facts(responses)}",
+            title or tr("Singular values"),
+            f"{bounds} · {_facts(responses)}",
             0.085,
         )
         axes = figure.add_axes((0.085, 0.115, 0.79, 0.72))
@@ -100,13 +106,13 @@ def singular_values_figure(responses: MatrixResponses, *, title: str = "", dark:
         plain(axes)
         frequency_axis(axes, f, labels=True)
         _shade(axes, look, responses, ~responses.valid[-1].all(axis=1))
-        axes.set_xlabel("frequency in Hz")
+        axes.set_xlabel(tr("frequency in Hz"))
         axes.set_ylabel(_singular_label(responses))
         if np.isfinite(values).any():
             axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
         else:
             axes.set_yticks([])
-            _note(axes, look, "no line where all columns are valid")
+            _note(axes, look, tr("no line where all columns are valid"))
     return figure
 
 
@@ -133,14 +139,14 @@ def _entry(pair: Sequence[Axes], look: Style, responses: MatrixResponses, at: tu
     o, i = at
     magnitude, phase = pair
     units = responses.units[o] if responses.units else ()
-    unit = f", re 1 {units[i]}" if len(set(units)) > 1 and units[i] else ""
+    unit = f", re 1 {units[i]}" if len(set(units)) > 1 and units[i] else ""  # a symbol in every language
     magnitude.set_title(shortened(f"{responses.inputs[i]} → {responses.outputs[o]}{unit}", 44), fontsize="medium")
     invalid = ~responses.valid[-1, :, i]
     for axes in pair:
         _shade(axes, look, responses, invalid)
     if invalid.all():
-        words = sorted({REASONS[number] for number in responses.reason[-1, :, i]})
-        _note(magnitude, look, f"not valid: {', '.join(words)}")
+        words = sorted({recognised(REASONS[number]) for number in responses.reason[-1, :, i]})
+        _note(magnitude, look, tr("not valid: {why}", why=", ".join(words)))
     if i:
         phase.set_ylabel("")
 
@@ -148,7 +154,8 @@ def _entry(pair: Sequence[Axes], look: Style, responses: MatrixResponses, at: tu
 def _label(axes: Axes, units: tuple[str, ...]) -> None:
     """The label of the magnitudes of one output, with their unit if they have one in common."""
     common = units[0] if len(set(units)) == 1 else ""
-    axes.set_ylabel("magnitude in dB" + (f"\nre 1 {shortened(common, 26)}" if common else ""))
+    label = tr("magnitude in dB") + (f"\nre 1 {shortened(common, 26)}" if common else "")
+    axes.set_ylabel(label)
 
 
 def _singular_value(axes: Axes, look: Style, f: Floats, n: int, value: Floats, low: Floats, high: Floats) -> None:
@@ -178,8 +185,10 @@ def _limits(axes: Axes, db: Floats, ends: Floats) -> None:
 def _singular_label(responses: MatrixResponses) -> str:
     units = {unit for row in responses.units for unit in row} - {""}
     if len(units) > 1:
-        return "singular value in dB (entries have different units)"
-    return "singular value in dB" + (f" re 1 {shortened(units.pop(), 40)}" if units else "")
+        return tr("singular value in dB (entries have different units)")
+    if not units:
+        return tr("singular value in dB")
+    return tr("singular value in dB re 1 {unit}", unit=shortened(units.pop(), 40))
 
 
 def _shade(axes: Axes, look: Style, responses: MatrixResponses, invalid: NDArray[np.bool_]) -> None:
@@ -197,11 +206,9 @@ def _note(axes: Axes, look: Style, text: str) -> None:
 
 
 def _facts(responses: MatrixResponses) -> str:
-    f = responses.frequency_hz
-    return (
-        f"newest matrix, at {moment(responses.time_s[-1], 2)} · {len(responses.outputs)} outputs × "
-        f"{len(responses.inputs)} inputs · {f.size} lines, {f[0]:g}–{f[-1]:g} Hz"
-    )
+    size = tr("{outputs} outputs × {inputs} inputs", outputs=len(responses.outputs), inputs=len(responses.inputs))
+    newest = tr("newest matrix, at {time}", time=moment(responses.time_s[-1], 2))
+    return f"{newest} · {size} · {lines_phrase(responses)}"
 
 
 def _key(figure: Figure, look: Style, left: float, invalid: bool) -> None:
@@ -209,10 +216,15 @@ def _key(figure: Figure, look: Style, left: float, invalid: bool) -> None:
     from matplotlib.patches import Patch
 
     handles: list[Line2D | Patch] = [Line2D([], [], color=look.newest, linewidth=1.6)]
-    texts = [f"response; {100 * PROBABILITY:.1f} % bounds of each entry alone, as bars where larger than the marker"]
+    texts = [
+        tr(
+            "response; {percent:.1f} % bounds of each entry alone, as bars where larger than the marker",
+            percent=100 * PROBABILITY,
+        )
+    ]
     if invalid:
         handles.append(Patch(facecolor=look.nothing, alpha=0.6))
-        texts.append("not valid")
+        texts.append(tr("not valid"))
     place = (left, 1 - 0.74 / figure.get_size_inches()[1])
     figure.legend(
         handles, texts, loc="upper left", bbox_to_anchor=place, ncols=2, borderpad=0.0, borderaxespad=0.0,

@@ -14,7 +14,10 @@ from livebode.language import number, tr
 from livebode.report.loop import round_numbers
 from livebode.report.pictures import save
 from livebode.report.style import Style, drawing, heading, new_figure, plain, style
+from livebode.report.tuning_extras import extra_panels
 from livebode.tuning import ControllerProposal
+from livebode.tuning.feedforward import Feedforward
+from livebode.tuning.gain_schedule import GainSchedule
 from livebode.tuning.predicted_steps import predicted_steps
 
 if TYPE_CHECKING:
@@ -27,26 +30,49 @@ Complex = NDArray[np.complex128]
 _REACH = 2.2
 _LOWEST_DEG = -460.0
 _TIMES = 400
+_BELOW_IN = 3.6
 
 
 def save_tuning_picture(
-    found: ControllerProposal, directory: str | PathLike[str], *, title: str = "", dark: bool = False
+    found: ControllerProposal,
+    directory: str | PathLike[str],
+    *,
+    gains: GainSchedule | None = None,
+    feedforward: Feedforward | None = None,
+    title: str = "",
+    dark: bool = False,
 ) -> Path:
     """Write tune.png to an existing directory."""
-    return save(tuning_figure(found, title=title, dark=dark), Path(directory) / "tune.png", style(dark))
+    figure = tuning_figure(found, gains=gains, feedforward=feedforward, title=title, dark=dark)
+    return save(figure, Path(directory) / "tune.png", style(dark))
 
 
-def tuning_figure(found: ControllerProposal, *, title: str = "", dark: bool = False) -> Figure:
+def tuning_figure(
+    found: ControllerProposal,
+    *,
+    gains: GainSchedule | None = None,
+    feedforward: Feedforward | None = None,
+    title: str = "",
+    dark: bool = False,
+) -> Figure:
     """|L| and its phase, Nyquist and Nichols plot with the limits, the responses to steps of reference and disturbance.
 
-    Bands of L are the discs of all lines together. Bands of the steps are the middle 95 % of 100 plants drawn with the
-    noise of the lines. Dashed: before. Beyond the lines nothing is drawn.
+    Bands of L are the discs of all lines together. The band of the steps holds, for every place, the middle 95 % of 100
+    plants drawn with the noise of the lines. Dashed: before. Beyond the lines nothing is drawn.
+
+    Below them, what was asked for: the noise of the plant input (a limit or the step of the encoder was specified), the
+    gains over the position with their bandwidths, and the friction of the feedforward.
     """
     look = style(dark)
+    panels = extra_panels(found, gains, feedforward)
     with drawing(look):
-        figure = new_figure(18.0, 6.4)
+        below_in = _BELOW_IN if panels else 0.0
+        figure = new_figure(18.0, 6.4 + below_in)
+        height_in = figure.get_size_inches()[1]
+        sides = {"left": 0.05, "right": 0.985}
+        top, bottom = (below_in + 5.25) / height_in, (below_in + 0.58) / height_in
         grid = figure.add_gridspec(
-            2, 4, width_ratios=[1.15, 1, 1, 1], left=0.05, right=0.985, top=0.82, bottom=0.09, hspace=0.28, wspace=0.2
+            2, 4, width_ratios=[1.15, 1, 1, 1], top=top, bottom=bottom, hspace=0.28, wspace=0.2, **sides
         )
         heading(figure, look, title or tr("Loop"), _facts(found), 0.05)
         magnitude = figure.add_subplot(grid[0, 0])
@@ -55,6 +81,11 @@ def tuning_figure(found: ControllerProposal, *, title: str = "", dark: bool = Fa
         _nyquist(figure.add_subplot(grid[:, 1]), look, found)
         _nichols(figure.add_subplot(grid[:, 2]), look, found)
         _steps(figure.add_subplot(grid[0, 3]), figure.add_subplot(grid[1, 3]), look, found)
+        if panels:
+            top, bottom = (below_in - 0.4) / height_in, 0.58 / height_in
+            row = figure.add_gridspec(1, 4, top=top, bottom=bottom, wspace=0.2, **sides)
+            for column, draw in enumerate(panels):
+                draw(figure.add_subplot(row[0, column]), look)
         _legend(figure, look)
     return figure
 
@@ -172,7 +203,7 @@ def _db(value: Complex) -> Floats:
 
 
 def _steps(reference: Axes, disturbance: Axes, look: Style, found: ControllerProposal) -> None:
-    """T and G·S of the first place."""
+    """T and G·S of every place."""
     time_s = np.linspace(0, 3 / found.promised.bandwidth_hz, _TIMES)
     for feedback, proposed in _curves(found):
         if not proposed and found.before is None:
@@ -181,7 +212,7 @@ def _steps(reference: Axes, disturbance: Axes, look: Style, found: ControllerPro
         for axes, step in zip((reference, disturbance), predicted_steps(found.plant, feedback, time_s)):
             if proposed:
                 axes.fill_between(1e3 * time_s, step.low, step.high, color=colour, alpha=0.25, linewidth=0)
-            axes.plot(1e3 * time_s, step.value, color=colour, dashes=dashes, linewidth=1.5)
+            axes.plot(1e3 * time_s, step.value.T, color=colour, dashes=dashes, linewidth=1.5)
     reference.set_title(tr("step of the reference"), fontsize=10)
     disturbance.set_title(tr("step of the disturbance at the plant input"), fontsize=10)
     disturbance.set_xlabel(tr("time in ms"))
@@ -214,4 +245,5 @@ def _legend(figure: Figure, look: Style) -> None:
         Patch(facecolor=look.run, alpha=0.25),
     ]
     texts = [tr("before"), tr("proposed"), tr("95 % band")]
-    figure.legend(handles, texts, loc="upper left", bbox_to_anchor=(0.05, 0.89), ncols=3, borderpad=0.0)
+    at = (0.05, 1 - 0.7 / figure.get_size_inches()[1])
+    figure.legend(handles, texts, loc="upper left", bbox_to_anchor=at, ncols=3, borderpad=0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import Response, Responses
+from livebode.core import MatrixResponses, Response, Responses
 from livebode.core.clock import moment, moment_of_start
 from livebode.drawing.ticks import frequency_label
 from livebode.language import marked, numerals, recognised, tr, trn
@@ -36,7 +36,7 @@ def decibel_label(unit: str) -> str:
     return tr("magnitude in dB re 1 {unit}", unit=unit) if unit else tr("magnitude in dB")
 
 
-def lines_phrase(responses: Responses) -> str:
+def lines_phrase(responses: Responses | MatrixResponses) -> str:
     """Number of lines and their range."""
     f = responses.lines.frequency_hz
     if len(f) == 1:

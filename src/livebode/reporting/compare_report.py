@@ -24,10 +24,10 @@ from livebode.records.grouped_events import event_counts
 from livebode.reporting import first_page
 from livebode.reporting.comparison_verdict import detectable, verdict
 from livebode.reporting.limits import limits
-from livebode.reporting.report_data import read, written
+from livebode.reporting.report_data import entry_title, read, written
 from livebode.reporting.wording import BOUND_95, decibels, pairs, polar, signed, with_bound
 
-_TONES = {**TONES, "ok": marked("no difference shown")}
+TONES_OF_A_COMPARISON = {**TONES, "ok": marked("no difference shown")}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40
 
 
@@ -111,30 +111,32 @@ class Comparison:
         """
         one, other = self.found.runs
         header = recorded_report(other.summary) if header is None else header
-        accepted = read(other.path, header=header).accepted if header.limits else ()
-        title = header.machine or tr("{before} and {after}", before=_name(one), after=_name(other))
+        accepted = read(other.path, header=header, entry=other.entry_name).accepted if header.limits else ()
+        runs = header.machine or tr("{before} and {after}", before=run_name(one), after=run_name(other))
+        title = " · ".join(filter(None, (runs, entry_title(other))))
         sections = [
-            limits(accepted), self._response(), self._places(), self._parameters(), self._how(), self._events(),
+            limits(accepted), self.response(), self._places(), self._parameters(), self.how(), self.events(),
         ]  # fmt: skip
         return Document(
             kind=tr("Before and after"),
             title=title,
-            facts=first_page.facts(header, title, self._facts(), made),
+            facts=first_page.facts(header, title, self.facts(), made),
             verdict=self.sentences,
             sections=tuple(section for section in sections if section is not None),
             foot=" · ".join(filter(None, (title, header.serial_number, header.company))),
             heading=tr("What changed"),
-            tones=_TONES,
+            tones=TONES_OF_A_COMPARISON,
             result=first_page.result(self.sentences, accepted),
-            picture=self._picture(),
+            picture=self.picture(),
             signatures=first_page.signatures(header),
-            appendix=self._appendix() if appendix else (),
+            appendix=self.appendix() if appendix else (),
             logo=first_page.logo_of(header),
             paper=header.paper,
             made=made,
         )
 
-    def _appendix(self) -> tuple[Section, ...]:
+    def appendix(self) -> tuple[Section, ...]:
+        """The settings that differ, and what the report does not contain."""
         absent = (
             (self.changes.parameter_words, self.changes.parameters), (self.changes.margin_words, self.changes.margins),
         )  # fmt: skip
@@ -143,9 +145,10 @@ class Comparison:
         found = (Section(tr("Details of the measurement"), (paths,)), _settings(*self.found.runs))
         return (*found, Section(tr("Not in this report"), parts)) if parts else found
 
-    def _facts(self) -> list[tuple[str, str]]:
+    def facts(self) -> list[tuple[str, str]]:
+        """Rows of the title block."""
         rows = [
-            (tr("before"), _name(self.found.runs[0])), (tr("after"), _name(self.found.runs[1])),
+            (tr("before"), run_name(self.found.runs[0])), (tr("after"), run_name(self.found.runs[1])),
             *((words, _measured(run, average)) for words, run, average in zip(
                 (tr("before measured"), tr("after measured")), self.found.runs, self.found.averages
             )),
@@ -155,7 +158,8 @@ class Comparison:
         ]  # fmt: skip
         return [(name, value) for name, value in rows if value]
 
-    def _picture(self) -> Picture:
+    def picture(self) -> Picture:
+        """Both responses, and their ratio."""
         d = self.found.overall
         how = tr("means of the runs")
         if self.found.places:
@@ -168,7 +172,8 @@ class Comparison:
         data = {"before": d.before, "after": d.after, "ratio": d.ratio, "bound": d.bound, "differs": d.differs}
         return Picture("comparison", data, caption)
 
-    def _how(self) -> Section:
+    def how(self) -> Section:
+        """How the runs were compared."""
         words = tr(
             "The means of both runs are compared. A change is reported only if chance does not explain it. "
             "“Detectable” is the smallest change that this comparison finds with a probability of 95 %: a smaller one "
@@ -176,7 +181,8 @@ class Comparison:
         )  # fmt: skip
         return Section(tr("How it was compared"), (Paragraph(words), Paragraph(_how_tested(self.found.overall.m))))
 
-    def _response(self) -> Section:
+    def response(self) -> Section:
+        """Both responses and their ratio at each line."""
         d = self.found.overall
         radius = [r.bound(BOUND_95) for r in (d.before, d.after)]
         rows = [
@@ -253,7 +259,8 @@ class Comparison:
                 parts.append(PrintedTable(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8, 9), note))
         return Section(tr("Parameters and margins"), tuple(parts))
 
-    def _events(self) -> Section:
+    def events(self) -> Section:
+        """Events of both runs."""
         counts = [sum(map(event_counts, run.each_event_and_damage()), Counter[str]()) for run in self.found.runs]
         kinds = sorted(counts[0].keys() | counts[1].keys())
         rows = tuple((recognised(kind), *(number(count[kind], ",") for count in counts)) for kind in kinds)
@@ -312,7 +319,7 @@ def _seen(share: float) -> str:
     return number(100 * share, ".2g") if isfinite(share) else "—"
 
 
-def _name(run: RunRecord) -> str:
+def run_name(run: RunRecord) -> str:
     return str(run.path.resolve().name)
 
 

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from livebode.configuration.report_section import ReportSection
 from livebode.core import FitError, GridError, MatrixResponses
+from livebode.core.document import Document, Finding, Section, Tone
+from livebode.language import recognised, tr
 from livebode.mimo import compare_gantries, compare_matrices
 from livebode.records import RunRecord
-from livebode.reporting.compare_report import Comparison
+from livebode.reporting import first_page
+from livebode.reporting.compare_report import TONES_OF_A_COMPARISON, Comparison, run_name
 from livebode.simulation import Gantry
 
 
@@ -79,6 +84,42 @@ class MatrixComparison:
             if comparison.found.overall.differs.any()
         ]
 
+    def document(self, made: datetime, *, header: ReportSection, appendix: bool = False) -> Document:
+        """The report: the verdict on all entries, and each entry with its picture and its lines.
+
+        Parameters
+        ----------
+        made
+            Time of the report.
+        header
+            The first page. Its limits apply to one response, so they are judged in the report of an entry.
+        appendix
+            Add the settings that differ.
+        """
+        named = sorted(self.entries.items(), key=lambda one: not one[1].found.overall.differs.any())
+        first = named[0][1]
+        runs = tr("{before} and {after}", before=run_name(first.found.runs[0]), after=run_name(first.found.runs[1]))
+        title = header.machine or runs
+        findings = [Finding(f.tone, f"{_arrow(name)}: {f.text}") for name, one in named for f in one.sentences]
+        tone: Tone = "differs" if first.found.overall.differs.any() else "ok"
+        findings = [*(Finding(tone, f"{recognised(sentence)}.") for sentence in self.whole), *findings]
+        return Document(
+            kind=tr("Before and after"),
+            title=title,
+            facts=first_page.facts(header, title, first.facts(), made),
+            verdict=tuple(findings),
+            sections=(*(_section(name, one) for name, one in named), first.how(), first.events()),
+            foot=" · ".join(filter(None, (title, header.serial_number, header.company))),
+            heading=tr("What changed"),
+            tones=TONES_OF_A_COMPARISON,
+            result=first_page.result(findings),
+            signatures=first_page.signatures(header),
+            appendix=first.appendix() if appendix else (),
+            logo=first_page.logo_of(header),
+            paper=header.paper,
+            made=made,
+        )
+
     def plain(self) -> dict[str, Any]:
         """For JSON."""
         return {
@@ -86,6 +127,16 @@ class MatrixComparison:
             "differing": [name for name, one in self.entries.items() if one.found.overall.differs.any()],
             "sentences": self.sentences,
         }
+
+
+def _arrow(name: str) -> str:
+    """An entry as in the report of a matrix run: "output ← input"."""
+    return name.replace("/", " ← ")
+
+
+def _section(name: str, one: Comparison) -> Section:
+    """Picture and lines of an entry, under its name."""
+    return Section(_arrow(name), (one.picture(), *one.response().parts))
 
 
 def _whole(

@@ -8,7 +8,7 @@ from livebode.core.clock import moment
 from livebode.core.document import Paragraph, Section
 from livebode.language import listed, marked, number, recognised, tr, trn
 from livebode.locations import location, resolved
-from livebode.reporting.report_data import ReportData, recordings
+from livebode.reporting.report_data import ReportData, RunData, recordings
 from livebode.reporting.wording import duration, pairs
 
 _ESTIMATOR = {
@@ -39,16 +39,43 @@ _ROLES = {
 def how(of: ReportData) -> Section:
     """The section "How it was measured"."""
     found, tracking = of.run.found, of.configuration.get("tracking", {})
-    window_s = found["window"] / found["rate_hz"]
     noise = found.get("judged", {}).get("noise", tracking.get("noise", ""))
-    f = of.run.lines.frequency_hz
     rows = [
-        *((recognised(_ROLES[role]), of.channels[role]) for role in _ROLES if role in of.channels),
-        (tr("rate"), f"{number(found['rate_hz'], 'g')} Hz" + _rate_from(found)),
-        (tr("samples"), listed((number(of.samples, ","), duration(of.samples / found["rate_hz"])))),
-        (tr("run's clock"), " … ".join(moment(at_s, 2) for at_s in of.of.spans_s)),
-        (tr("responses"), number(of.of.count, ",")),
+        *signal_rows(of),
         (tr("quantity"), _quantity(found)),
+        *grid_rows(of),
+        (tr("bounds from"), recognised(_NOISE.get(noise, ""))),
+        (tr("options"), listed(_options(tracking, of))),
+    ]
+    return Section(tr("How it was measured"), (Paragraph(_in_words(of)), pairs(rows), Paragraph(about_bounds())))
+
+
+def about_bounds() -> str:
+    """What a bound contains."""
+    return tr(
+        "The effective time of a response is the centre of its window. A bound contains the true response with the "
+        "stated probability. It covers noise, and distortion where it is detected; "
+        "it does not cover a systematic error that the signals do not show."
+    )
+
+
+def signal_rows(of: RunData) -> list[tuple[str, str]]:
+    """Names and values of the signals: channels, rate, samples and responses."""
+    rate_hz = of.run.found["rate_hz"]
+    return [
+        *((recognised(_ROLES[role]), of.channels[role]) for role in _ROLES if role in of.channels),
+        (tr("rate"), f"{number(rate_hz, 'g')} Hz" + _rate_from(of.run.found)),
+        (tr("samples"), listed((number(of.samples, ","), duration(of.samples / rate_hz)))),
+        (tr("run's clock"), " … ".join(moment(at_s, 2) for at_s in of.extent.spans_s)),
+        (tr("responses"), number(of.extent.count, ",")),
+    ]
+
+
+def grid_rows(of: RunData) -> list[tuple[str, str]]:
+    """Names and values of the lines, the window, the hop and the estimator."""
+    found, f = of.run.found, of.run.lines.frequency_hz
+    window_s = found["window"] / found["rate_hz"]
+    return [
         (tr("lines"), trn(
             "{n:,} line, {low:g} … {high:g} Hz on a grid of {step:.4g} Hz",
             "{n:,} lines, {low:g} … {high:g} Hz on a grid of {step:.4g} Hz",
@@ -59,33 +86,46 @@ def how(of: ReportData) -> Section:
             samples=found["window"], ms=1000 * window_s,
         )),
         (tr("hop"), _hop(found)),
-        (tr("estimator"), recognised(_ESTIMATOR.get(tracking.get("estimator", ""), ""))),
-        (tr("bounds from"), recognised(_NOISE.get(noise, ""))),
-        (tr("options"), listed(_options(tracking, of))),
+        (tr("estimator"), recognised(_ESTIMATOR.get(of.configuration.get("tracking", {}).get("estimator", ""), ""))),
     ]  # fmt: skip
-    bounds = tr(
-        "The effective time of a response is the centre of its window. A bound contains the true response with the "
-        "stated probability. It covers noise, and distortion where it is detected; "
-        "it does not cover a systematic error that the signals do not show."
-    )
-    return Section(tr("How it was measured"), (Paragraph(_in_words(of)), pairs(rows), Paragraph(bounds)))
 
 
 def _in_words(of: ReportData) -> str:
+    if of.entry:
+        return matrix_in_words(of)
+    return (
+        _added(of)
+        + " "
+        + tr(
+            "Each response is computed from one window of the signals. The report shows the mean of all responses. ± "
+            "is the bound within which the true value is with a probability of 95 %, unless another one is stated."
+        )
+    )
+
+
+def matrix_in_words(of: RunData) -> str:
+    """How a matrix of responses was measured, in two sentences."""
+    return (
+        _added(of)
+        + " "
+        + tr(
+            "Each matrix of responses is computed from several experiments, one after the other, in which the inputs "
+            "move differently. ± is the bound within which the true value is with a probability of 95 %, unless "
+            "another one is stated."
+        )
+    )
+
+
+def _added(of: RunData) -> str:
     if "excitation" in of.channels:
-        first = tr(
+        return tr(
             "A small excitation was added in the control loop while the machine was in operation. From the signals, "
             "livebode computed how the machine responds at each excited frequency (line)."
         )
-    else:
-        first = tr("From the signals of the machine, livebode computed how it responds at each frequency (line).")
-    return first + " " + tr(
-        "Each response is computed from one window of the signals. The report shows the mean of all responses. ± is "
-        "the bound within which the true value is with a probability of 95 %, unless another one is stated."
-    )  # fmt: skip
+    return tr("From the signals of the machine, livebode computed how it responds at each frequency (line).")
 
 
-def details(of: ReportData) -> Section:
+def details(of: RunData) -> Section:
     """Where the signals came from, and the described controllers with the keys of the configuration."""
     source = of.configuration.get("source", {})
     rows = [

@@ -22,7 +22,7 @@ from livebode.configuration.report_section import ReportSection
 from livebode.core import LivebodeError, Responses
 from livebode.core.clock import date_and_time
 from livebode.fitting import Fit
-from livebode.language import recognised, tr
+from livebode.language import listed, recognised, tr
 from livebode.records import RunRecord
 from livebode.reporting.event_summary import EventSummary
 
@@ -39,40 +39,37 @@ class Judged:
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class ReportData:
-    """The data of a run that a report needs.
+@dataclass(frozen=True)
+class Extent:
+    """How much a run has: number of responses, of those with an invalid line, first and last time at a valid response,
+    and the newest sample of them."""
+
+    count: int
+    incomplete: int
+    spans_s: tuple[float, float]
+    sample: int
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunData:
+    """What the report of any run needs.
 
     Attributes
     ----------
     run, configuration
         The run and its complete configuration.
-    of
-        Its mean response.
-    fit, fit_words
-        The model fitted to the mean and the data of the fit; or None and the reason.
-    loop, loop_words
-        Margins of the described loop; or None and the reason.
-    tracks
-        Parameters and margins over the run, by model.
+    extent
+        How much it has.
     event_summary
         Its events.
-    judged
-        The validation, if requested.
     header
         The first page and the limits.
     """
 
     run: RunRecord
     configuration: dict[str, Any]
-    of: Averaged
-    fit: Fit | None
-    fit_words: str
-    loop: LoopReport | None
-    loop_words: str
-    tracks: dict[str, Track]
+    extent: Extent
     event_summary: EventSummary
-    judged: Judged | None = None
     header: ReportSection = field(default_factory=ReportSection)
 
     @property
@@ -87,6 +84,50 @@ class ReportData:
             name = tr("simulated belt axis")
         return str(name or self.run.path.name)
 
+    @property
+    def samples(self) -> int:
+        """Number of tracked samples; of a run that does not contain it (unfinished), up to its last response."""
+        counted = self.run.summary.get("counts", {}).get("samples")
+        return int(self.extent.sample + 1 if counted is None else counted)
+
+    @property
+    def channels(self) -> dict[str, str]:
+        """Channel names by their role."""
+        signals = self.configuration.get("signals", {})
+        return {role: listed(name) if isinstance(name, list) else str(name) for role, name in signals.items()}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReportData(RunData):
+    """The data of a run with one response, or of one entry of a matrix run.
+
+    Attributes
+    ----------
+    of
+        Its mean response.
+    fit, fit_words
+        The model fitted to the mean and the data of the fit; or None and the reason.
+    loop, loop_words
+        Margins of the described loop; or None and the reason.
+    tracks
+        Parameters and margins over the run, by model.
+    judged
+        The validation, if requested.
+    """
+
+    of: Averaged
+    fit: Fit | None
+    fit_words: str
+    loop: LoopReport | None
+    loop_words: str
+    tracks: dict[str, Track]
+    judged: Judged | None = None
+
+    @property
+    def entry(self) -> str:
+        """The entry of a matrix run, "output ← input"; empty of an ordinary run."""
+        return entry_title(self.run)
+
     @cached_property
     def accepted(self) -> tuple[Accepted, ...]:
         """The results of the limits."""
@@ -98,17 +139,6 @@ class ReportData:
     def described(self) -> bool:
         """Whether the configuration describes the controllers."""
         return any(name in self.configuration.get("loop", {}) for name in ("velocity", "position", "position_pd"))
-
-    @property
-    def samples(self) -> int:
-        """Number of tracked samples; of a run that does not contain it (unfinished), up to its last response."""
-        counted = self.run.summary.get("counts", {}).get("samples")
-        return int(self.of.response.sample + 1 if counted is None else counted)
-
-    @property
-    def channels(self) -> dict[str, str]:
-        """Channel names by their role."""
-        return {role: str(name) for role, name in self.configuration.get("signals", {}).items()}
 
 
 def read(
@@ -128,7 +158,25 @@ def read(
     over = tracks(run, of.overview.sample, of.overview.time_s)
     event_summary = EventSummary.of(run.each_event_and_damage())
     own = recorded_report(run.summary) if header is None else header
-    return ReportData(run, configuration, of, fit, fit_words, loop, loop_words, over, event_summary, judged, own)
+    return ReportData(
+        run=run,
+        configuration=configuration,
+        extent=Extent(of.count, of.incomplete, of.spans_s, int(of.response.sample)),
+        event_summary=event_summary,
+        header=own,
+        of=of,
+        fit=fit,
+        fit_words=fit_words,
+        loop=loop,
+        loop_words=loop_words,
+        tracks=over,
+        judged=judged,
+    )
+
+
+def entry_title(run: RunRecord) -> str:
+    """The entry that a view of a matrix run shows, "output ← input"; empty of an ordinary run."""
+    return "" if run.selected is None else " ← ".join(run.selected)
 
 
 def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
@@ -154,7 +202,7 @@ def _loop(
         return None, tr("No margins: they need a fitted model, and there is none.")
     try:
         found = loop_report(fit, "the mean", of.overview, described)
-        checked = checked_loop(run.path, section)
+        checked = checked_loop(run.path, section, run.selected)
     except LivebodeError as error:
         return None, tr("No margins: {why}.", why=recognised(str(error)))
     return replace(found, responses=Responses.of(of.response), checked=checked), ""

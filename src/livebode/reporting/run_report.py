@@ -12,7 +12,7 @@ from livebode.reporting import first_page, sections
 from livebode.reporting.distortion import distortion
 from livebode.reporting.limits import limits
 from livebode.reporting.measured import details, how
-from livebode.reporting.report_data import Judged, ReportData, read, recordings, written
+from livebode.reporting.report_data import Judged, ReportData, RunData, entry_title, read, recordings, written
 from livebode.reporting.verdict import verdict
 from livebode.reporting.wording import duration
 
@@ -63,10 +63,7 @@ def report_of(of: ReportData, *, made: datetime, appendix: bool = False) -> Docu
     found = [make(of) for make in _SECTIONS]
     absent = tuple(Paragraph(reason) for reason in found if isinstance(reason, str))
     there = [limits(of.accepted), *(section for section in found if isinstance(section, Section))]
-    findings, title = verdict(of), of.header.machine or of.title
-    not_judged = (
-        "" if _judged(of) else tr("The machine was measured, but not judged: no limits and no baseline were specified.")
-    )
+    findings, title = verdict(of), " · ".join(filter(None, (of.header.machine or of.title, of.entry)))
     return Document(
         kind=tr("Acceptance report") if of.accepted else tr("Measurement report"),
         title=title,
@@ -75,7 +72,7 @@ def report_of(of: ReportData, *, made: datetime, appendix: bool = False) -> Docu
         sections=tuple(section for section in there if section is not None),
         heading=tr("Findings"),
         foot=" · ".join(filter(None, (title, of.header.serial_number, of.header.company))),
-        result=first_page.result(findings, of.accepted, not_judged),
+        result=first_page.result(findings, of.accepted, not_judged(of)),
         picture=sections.average(of),
         signatures=first_page.signatures(of.header),
         appendix=_appendix(of, absent) if appendix else (),
@@ -85,20 +82,27 @@ def report_of(of: ReportData, *, made: datetime, appendix: bool = False) -> Docu
     )
 
 
-def _judged(of: ReportData) -> bool:
-    """Whether the run was compared with a baseline."""
-    return bool(of.run.summary.get("monitoring", {}).get("judged_s"))
+def not_judged(of: RunData) -> str:
+    """The sentence that replaces the verdict of a run that was not compared with a baseline; empty of another one."""
+    if of.run.summary.get("monitoring", {}).get("judged_s"):
+        return ""
+    return tr("The machine was measured, but not judged: no limits and no baseline were specified.")
 
 
 def _appendix(of: ReportData, absent: tuple[Paragraph, ...]) -> tuple[Section, ...]:
-    found = [section for make in _APPENDIX if (section := make(of)) is not None]
-    return (*found, Section(tr("Not in this report"), absent)) if absent else tuple(found)
+    found = record_appendix(of)
+    return (*found, Section(tr("Not in this report"), absent)) if absent else found
 
 
-def facts(of: ReportData) -> tuple[tuple[str, str], ...]:
+def record_appendix(of: RunData) -> tuple[Section, ...]:
+    """Details of the measurement, the complete configuration and the versions."""
+    return tuple(section for make in _APPENDIX if (section := make(of)) is not None)
+
+
+def facts(of: RunData) -> tuple[tuple[str, str], ...]:
     """When it was measured, and how long."""
     source = of.configuration.get("source", {})
-    files, first_s = recordings(source), of.of.spans_s[0]
+    files, first_s = recordings(source), of.extent.spans_s[0]
     measured = first_page.measured_at(of.run, first_s)
     rows = (
         (tr("measured"), measured),
@@ -106,5 +110,6 @@ def facts(of: ReportData) -> tuple[tuple[str, str], ...]:
         (tr("run written"), "" if measured else written(of.run.path / "run.json")),
         (tr("duration"), duration(of.samples / of.run.lines.rate_hz)),
         (tr("run"), of.run.path.resolve().name),
+        (tr("entry"), entry_title(of.run)),
     )
     return tuple((name, value) for name, value in rows if value)

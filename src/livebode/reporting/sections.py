@@ -15,7 +15,7 @@ from livebode.fitting import Fit
 from livebode.language import listed, marked, number, recognised, tr
 from livebode.margins.margins import WORDS
 from livebode.reporting.alarms import alarms
-from livebode.reporting.report_data import ReportData, by_schedule
+from livebode.reporting.report_data import ReportData, RunData, by_schedule
 from livebode.reporting.wording import (
     BOUND_95,
     lines_of,
@@ -197,7 +197,7 @@ def _about_description(loop: LoopReport) -> str:
     )
 
 
-def events(of: ReportData) -> Section:
+def events(of: RunData) -> Section:
     """Alarms and other events."""
     monitoring = of.run.summary.get("monitoring", {})
     words = alarms(of.run, of.event_summary)[0].text
@@ -214,9 +214,9 @@ def events(of: ReportData) -> Section:
     return Section(tr("Alarms and events"), (Paragraph(words), *of.event_summary.parts()))
 
 
-def quality(of: ReportData) -> Section:
+def quality(of: RunData) -> Section:
     """Gaps, bad samples and invalid responses."""
-    counts = of.run.summary.get("counts", {})
+    counts, extent = of.run.summary.get("counts", {}), of.extent
     rows = [
         (tr("samples"), number(of.samples, ",")),
         *(
@@ -224,8 +224,8 @@ def quality(of: ReportData) -> Section:
             for key, words in _COUNTS.items()
             if counts.get(key) is not None
         ),
-        (tr("responses"), number(of.of.count, ",")),
-        (tr("with an invalid line"), f"{number(of.of.incomplete, ',')} ({share(of.of.incomplete, of.of.count)})"),
+        (tr("responses"), number(extent.count, ",")),
+        (tr("with an invalid line"), f"{number(extent.incomplete, ',')} ({share(extent.incomplete, extent.count)})"),
     ]
     table = pairs(rows)
     parts: list[Part] = [table]
@@ -234,7 +234,7 @@ def quality(of: ReportData) -> Section:
     return Section(tr("Data quality"), tuple(parts))
 
 
-def source_state(of: ReportData) -> Section | None:
+def source_state(of: RunData) -> Section | None:
     """The state of the source at the end, and the speed; None if neither was recorded."""
     parts: list[Part] = []
     if source := of.run.summary.get("source"):
@@ -283,12 +283,12 @@ def validation(of: ReportData) -> Section | str:
     return Section(tr("Validation"), tuple(parts))
 
 
-def settings(of: ReportData) -> Section:
+def settings(of: RunData) -> Section:
     """The complete configuration as TOML, with all defaults."""
     return Section(tr("Settings"), (Listing(to_toml(of.configuration) or "# none"),))
 
 
-def versions(of: ReportData) -> Section:
+def versions(of: RunData) -> Section:
     """Versions of the software."""
     rows = [(name.replace("_", " "), str(value)) for name, value in of.run.summary.get("versions", {}).items()]
     return Section(tr("Versions"), (pairs(rows),))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import isfinite
 
 from livebode.analysis.parameter_track import MARGINS, failed
@@ -9,7 +10,7 @@ from livebode.core.document import Finding, Tone
 from livebode.language import listed, number, recognised, tr, trn
 from livebode.margins import worst
 from livebode.reporting.alarms import alarms
-from livebode.reporting.report_data import ReportData
+from livebode.reporting.report_data import ReportData, RunData
 from livebode.reporting.wording import lines_of, share
 
 _URGENT: dict[Tone, int] = {"alarm": 0, "differs": 0, "check": 1, "open": 2, "ok": 3}
@@ -22,20 +23,20 @@ _TRUSTED: dict[str, Tone] = {"passes": "ok", "small error": "ok", "fails": "chec
 
 def verdict(of: ReportData) -> tuple[Finding, ...]:
     """The findings, the most urgent first."""
-    found = [
-        *alarms(of.run, of.event_summary),
-        *_record(of),
-        *_ready(of),
-        *_signals(of),
-        *_valid(of),
-        *_fits(of),
-        *_margins(of),
-        *_validated(of),
-    ]
+    return by_urgency([*about_record(of), *_valid(of), *_fits(of), *_margins(of), *_validated(of)])
+
+
+def by_urgency(found: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The findings, the most urgent first."""
     return tuple(sorted(found, key=lambda f: _URGENT[f.tone]))
 
 
-def _record(of: ReportData) -> list[Finding]:
+def about_record(of: RunData) -> list[Finding]:
+    """The findings about alarms, the record and its signals."""
+    return [*alarms(of.run, of.event_summary), *_record(of), *_ready(of), *_signals(of)]
+
+
+def _record(of: RunData) -> list[Finding]:
     found = []
     if not of.run.finished:
         found.append(
@@ -63,7 +64,7 @@ def _record(of: ReportData) -> list[Finding]:
     return found
 
 
-def _ready(of: ReportData) -> list[Finding]:
+def _ready(of: RunData) -> list[Finding]:
     """How long the machine was not ready; with a baseline, the summary of the monitoring contains it."""
     suppressed_s = of.run.summary.get("readiness", {}).get("suppressed_s")
     if not suppressed_s or of.run.summary.get("monitoring", {}).get("baseline") is not None:
@@ -71,7 +72,7 @@ def _ready(of: ReportData) -> list[Finding]:
     return [Finding("open", tr("Not assessed for {time:.1f} s: the machine was not ready.", time=suppressed_s))]
 
 
-def _signals(of: ReportData) -> list[Finding]:
+def _signals(of: RunData) -> list[Finding]:
     counts = of.run.summary.get("counts", {})
     found = []
     if counts.get("gaps"):

@@ -52,33 +52,34 @@ class ForbiddenRegion:
 
     def clearance(self, loop: Complex) -> tuple[Floats, Complex]:
         """Distance to the region (negative within a disk), and the unit vector that points away from it."""
-        distances, directions = zip(*self._each(loop))
-        distance = np.stack(distances)
+        aways, radii = zip(*self._each(loop))
+        away = np.stack(aways)
+        size = np.maximum(np.abs(away), 1e-300)
+        distance = size - np.array(radii).reshape(-1, *[1] * loop.ndim)
         nearest = np.argmin(distance, axis=0)[np.newaxis]
         return (
             np.take_along_axis(distance, nearest, 0)[0],
-            np.take_along_axis(np.stack(directions), nearest, 0)[0],
+            np.take_along_axis(away / size, nearest, 0)[0],
         )
+
+    def distance(self, loop: Complex) -> Floats:
+        """Distance to the region, negative within a disk."""
+        return np.asarray(np.min([np.abs(away) - radius for away, radius in self._each(loop)], axis=0))
 
     def nearest(self, point: complex) -> str:
         """The limit that a point is nearest to, for people."""
         names = ["limit of Ms", *["disk margin"] * (self.disk is not None), "gain margin", "phase margin"]
-        distances = [float(distance[0]) for distance, _ in self._each(np.array([point]))]
+        distances = [abs(away[0]) - radius for away, radius in self._each(np.array([point]))]
         return names[int(np.argmin(distances))]
 
-    def _each(self, loop: Complex) -> list[tuple[Floats, Complex]]:
-        found = [_from_disk(loop, -1.0, self.sensitivity_radius)]
+    def _each(self, loop: Complex) -> list[tuple[Complex, float]]:
+        """The vector from the nearest centre, and the radius around it, for each part of the region."""
+        found = [(loop + 1.0, self.sensitivity_radius)]
         if self.disk is not None:
-            found.append(_from_disk(loop, *self.disk))
+            found.append((loop - self.disk[0], self.disk[1]))
         on_segment = np.clip(loop.real, -1.0, max(-1 / self.gain - _HALF_WIDTH, -1.0))
-        found.append(_from_disk(loop, on_segment, _HALF_WIDTH))
+        found.append((loop - on_segment, _HALF_WIDTH))
         half = max(self.phase_rad - _HALF_WIDTH, 0.0)
         on_arc = -np.exp(1j * np.clip(np.angle(-loop), -half, half))
-        found.append(_from_disk(loop, on_arc, _HALF_WIDTH))
+        found.append((loop - on_arc, _HALF_WIDTH))
         return found
-
-
-def _from_disk(loop: Complex, centre: Complex | Floats | float, radius: float) -> tuple[Floats, Complex]:
-    away = loop - centre
-    size = np.maximum(np.abs(away), 1e-300)
-    return np.asarray(size - radius), np.asarray(away / size)

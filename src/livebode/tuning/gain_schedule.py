@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import PID, Cascade, Loop, PositionPD, Responses, UsageError
+from livebode.core import Loop, Responses, UsageError
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.predicted import PredictedMargins
 from livebode.tuning.problem import TuningProblem
 from livebode.tuning.proposal import ControllerProposal, margins_of, tune
-from livebode.tuning.search import search
+from livebode.tuning.search import improved, search
 from livebode.tuning.specification import LoopSpecification
-from livebode.tuning.structure import FeedbackStructure
+from livebode.tuning.structure import FeedbackStructure, TunedFeedback
 
 Floats = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class GainSchedule:
     Attributes
     ----------
     common
-        The proposal of one controller for all places.
+        The proposal of one controller for all places; its filters are those of every place.
     position
         Of the places, ascending, shape (places,).
     share
@@ -40,8 +40,10 @@ class GainSchedule:
         Of the gains and times.
     logarithms
         Shape (places, names).
-    promised
-        Margins at each place, of the worst plant within the band.
+    common_logarithms
+        Of the common gains, shape (names,).
+    promised, common_promised
+        Margins at each place, of the worst plant within the band, with its gains and with the common ones.
     """
 
     common: ControllerProposal
@@ -49,12 +51,14 @@ class GainSchedule:
     share: float
     names: tuple[str, ...]
     logarithms: Floats
+    common_logarithms: Floats
     promised: tuple[PredictedMargins, ...]
+    common_promised: tuple[PredictedMargins, ...]
 
-    def at(self, position: float) -> PID | Cascade | PositionPD:
-        """The controller at a position; beyond the places that of the nearest one."""
+    def at(self, position: float) -> TunedFeedback:
+        """The controller and its filters at a position; beyond the places that of the nearest one."""
         x = np.array([np.interp(position, self.position, column) for column in self.logarithms.T])
-        return FeedbackStructure(self.common.feedback.controller, self.common.plant.frequency_hz).feedback(x).controller
+        return _structure(self.common).feedback(x)
 
     def csv(self) -> str:
         """A line for each place: position, gains and times."""
@@ -67,17 +71,19 @@ class GainSchedule:
             "share": self.share,
             "position": self.position.tolist(),
             **{name: np.exp(column).tolist() for name, column in zip(self.names, self.logarithms.T)},
-            "promised": [
-                {name: value if np.isfinite(value) else None for name, value in asdict(one).items()}
-                for one in self.promised
-            ],
+            "promised": [_plain(one) for one in self.promised],
+            "common_promised": [_plain(one) for one in self.common_promised],
         }
+
+
+def _plain(one: PredictedMargins) -> dict[str, float | None]:
+    return {name: value if np.isfinite(value) else None for name, value in asdict(one).items()}
 
 
 def gain_schedule(
     responses: Responses, loop: Loop, specification: LoopSpecification, *, loop_checked: bool
 ) -> GainSchedule:
-    """Gains for each place that keep the limits also with the plants of its neighbours; without filters.
+    """Gains for each place that keep the limits also with the plants of its neighbours; filters do not change.
 
     Between two places, the interpolated gains keep the limits with every plant within the bounds of either place,
     tested at five points. Where they do not, the gains are lowered by up to 10 %,
@@ -89,7 +95,7 @@ def gain_schedule(
     responses
         Of the plant, a row for each place, with a schedule.
     loop, specification, loop_checked
-        As of `tune`; no filters are added.
+        As of `tune`.
 
     Raises
     ------
@@ -107,21 +113,30 @@ def gain_schedule(
             "set signals.schedule to the position, and move the axis",
             argument="responses",
         )
+    common = tune(responses, loop, specification, loop_checked=loop_checked)
     plain = replace(specification, notches=0, low_pass=False)
-    common = tune(responses, loop, plain, loop_checked=loop_checked)
-    structure = FeedbackStructure(common.feedback.controller, common.plant.frequency_hz)
+    structure = _structure(common)
     whole = structure.start
-    alone = np.stack([_alone(loop, common.plant, plain, place, whole) for place in range(position.size)])
+    alone = np.stack([_alone(common, plain, place, whole) for place in range(position.size)])
     share, x = _safest(structure, common.plant, plain, whole, alone)
-    promised = tuple(_promised(structure, common.plant, row, place) for place, row in enumerate(x))
-    return GainSchedule(common, position, share, structure.names, x, promised)
+    places = range(position.size)
+    promised = tuple(_promised(structure, common.plant, x[place], place) for place in places)
+    common_promised = tuple(_promised(structure, common.plant, whole, place) for place in places)
+    return GainSchedule(common, position, share, structure.names, x, whole, promised, common_promised)
 
 
-def _alone(loop: Loop, plant: PlantBand, specification: LoopSpecification, place: int, common: Floats) -> Floats:
-    """Logarithms of the gains for a place and its neighbours; the common ones where nothing is found for these."""
-    near = [i for i in (place - 1, place, place + 1) if 0 <= i < len(plant.value)]
-    found = search(loop.feedback, _rows(plant, near), specification)
-    return common if found is None else found.x
+def _structure(common: ControllerProposal) -> FeedbackStructure:
+    """The gains of the proposed controller, with its filters as they are."""
+    found = common.feedback
+    return FeedbackStructure(found.controller, common.plant.frequency_hz, fixed=found)
+
+
+def _alone(common: ControllerProposal, specification: LoopSpecification, place: int, whole: Floats) -> Floats:
+    """Logarithms of the gains for a place and its neighbours: the better of two searches, one from the common gains."""
+    plant = common.plant.at([i for i in (place - 1, place, place + 1) if 0 <= i < len(common.plant.value)])
+    nearby = improved(TuningProblem(_structure(common), plant, specification), whole)
+    found = search(common.loop.feedback, plant, specification, common.feedback)
+    return nearby.x if found is None or found.merit < nearby.merit else found.x
 
 
 def _safest(
@@ -140,16 +155,11 @@ def _safest(
 def _safe(structure: FeedbackStructure, plant: PlantBand, specification: LoopSpecification, x: Floats) -> bool:
     """Whether the gains keep the limits at every place and between neighbours, with the plants of both."""
     for i in range(len(x) - 1):
-        problem = TuningProblem(structure, _rows(plant, [i, i + 1]), specification)
+        problem = TuningProblem(structure, plant.at([i, i + 1]), specification)
         if not all(problem.feasible(x[i] + part * (x[i + 1] - x[i])) for part in _BETWEEN):
             return False
     return True
 
 
-def _rows(plant: PlantBand, rows: list[int]) -> PlantBand:
-    """The band of some places."""
-    return replace(plant, **{name: getattr(plant, name)[rows] for name in ("value", "radius", "spread", "sigma")})
-
-
 def _promised(structure: FeedbackStructure, plant: PlantBand, x: Floats, place: int) -> PredictedMargins:
-    return margins_of(_rows(plant, [place]), structure.feedback(x).model, 1.0)
+    return margins_of(plant.at([place]), structure.feedback(x).model, 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,6 +90,16 @@ class PlantBand:
         radius = responses.bound(c)[:, use]
         dropped = responses.lines.frequency_hz[~use]
         return replace(cls.at_lines(lines, value, radius, sigma, rate_hz), dropped_hz=dropped)
+
+    def only(self, columns: NDArray[np.bool_]) -> PlantBand:
+        """The same at some of the frequencies."""
+        named = ("frequency_hz", "value", "radius", "measured", "above", "spread", "sigma")
+        return replace(self, **{name: getattr(self, name)[..., columns] for name in named})
+
+    def at(self, places: Sequence[int]) -> PlantBand:
+        """The same at some of the places."""
+        named = ("value", "radius", "spread", "sigma")
+        return replace(self, **{name: getattr(self, name)[places] for name in named})
 
     @classmethod
     def at_lines(cls, lines_hz: Floats, value: Complex, radius: Floats, sigma: Floats, rate_hz: float) -> PlantBand:

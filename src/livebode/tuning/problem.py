@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -45,28 +45,39 @@ class TuningProblem:
         near = 1.0 if self.region.disk is None else -(self.region.disk[0] + self.region.disk[1])
         return min(1 - self.region.sensitivity_radius, 1 / self.region.gain, near)
 
-    def clearances(self, x: Floats, at: NDArray[np.bool_] | None = None) -> tuple[Floats, Floats | None]:
-        """Clearance less radius, shape (places, frequencies), and with `at`, its derivatives there, (at, parameters).
+    def clearances(self, x: Floats) -> Floats:
+        """Clearance less radius, shape (places, frequencies).
 
         It is divided by the size 1 + |L|, so that points far from −1 do not dominate.
         """
+        return self._values(self.structure.response(x)[0])
+
+    def _values(self, behind: Complex) -> Floats:
+        loop = self.plant.value * behind
+        value = self._values_of(loop, np.abs(behind) * self.plant.radius, self.region.distance(loop))
+        return np.asarray(value / (1 + np.abs(loop)))
+
+    def _values_of(self, loop: Complex, radius: Floats, distance: Floats) -> Floats:
+        """Clearance less radius; above the highest line, what |L| is below its limit there."""
+        return np.where(self.plant.above, self._limit_above - np.abs(loop), distance - radius)
+
+    def sloped_clearances(self, x: Floats) -> tuple[Floats, Floats]:
+        """The clearances and their derivatives, shape (places, frequencies) and (places, frequencies, parameters)."""
         f, slopes = self.structure.response(x)
         loop = self.plant.value * f
-        size = np.abs(f)
+        radius = np.abs(f) * self.plant.radius
         distance, away = self.region.clearance(loop)
-        above = self.plant.above
-        radius = size * self.plant.radius
-        value = np.where(above, self._limit_above - np.abs(loop), distance - radius)
-        scale = 1 + np.abs(loop)
-        if at is None:
-            return value / scale, None
-        place, column = np.nonzero(at)
-        part, turn, weight = slopes[:, column], loop[place, column], scale[place, column]
-        along = np.real(np.conj(away[place, column]) * turn * part) - radius[place, column] * part.real
-        falling = -np.abs(turn) * part.real
-        derivative = np.where(above[column], falling, along) / weight
-        derivative -= value[place, column] / weight**2 * np.abs(turn) * part.real
-        return value[place, column] / weight, derivative.T
+        value, scale = self._values_of(loop, radius, distance), 1 + np.abs(loop)
+        part = slopes[:, np.newaxis]
+        along = np.real(np.conj(away) * loop * part) - radius * part.real
+        derivative = np.where(self.plant.above, -np.abs(loop) * part.real, along) / scale
+        derivative -= value / scale**2 * np.abs(loop) * part.real
+        return value / scale, np.moveaxis(derivative, 0, -1)
+
+    def only(self, columns: NDArray[np.bool_]) -> TuningProblem:
+        """The same at some frequencies: for clearances, which need no neighbours."""
+        plant = self.plant.only(columns)
+        return replace(self, structure=self.structure.only(columns), plant=plant)
 
     def noise_gain(self, x: Floats) -> tuple[float, Floats]:
         """Rms of the plant input for the noise at the output, worst place, and its logarithmic derivative.
@@ -88,9 +99,9 @@ class TuningProblem:
     @cached_property
     def _noise(self) -> Floats:
         """Power of the noise at the output that each point of the grid stands for."""
-        f = self.plant.frequency_hz
-        edges = np.concatenate([f[:1], (f[1:] + f[:-1]) / 2, f[-1:]])
-        return np.asarray(np.diff(edges) / f[-1] * noise_power(f, self.specification.encoder_step, self.structure))
+        return noise_power(
+            self.plant.frequency_hz, self.specification.encoder_step, of_position=self.structure.of_position
+        )
 
     def tracking(self, x: Floats) -> tuple[Floats, Floats]:
         """How far |T| of the worst plant is from −3 dB up to the required bandwidth, positive above; with derivatives.
@@ -109,15 +120,14 @@ class TuningProblem:
         derivative -= _HALF_POWER * (np.conj((1 + loop) / away)[..., np.newaxis] * loop[..., np.newaxis] * slope).real
         return value.ravel(), derivative.reshape(-1, len(x))
 
-    def stable(self, x: Floats) -> bool:
+    def _stable(self, behind: Complex) -> bool:
         """Whether the loop of the measured plant is stable at every place, by Nyquist's criterion."""
-        f, _ = self.structure.response(x)
-        return bool(stable(self.plant.value * f, self.plant.frequency_hz).all())
+        return bool(stable(self.plant.value * behind, self.plant.frequency_hz).all())
 
-    def _between_points(self, x: Floats) -> bool:
+    def _between_points(self, behind: Complex) -> bool:
         """Whether gain and phase margin are kept where the curve crosses axis and unit circle between two points."""
         at = ~self.plant.above
-        f = self.structure.response(x)[0][at]
+        f = behind[at]
         radius = self.plant.radius[:, at] * np.abs(f)
         return all(
             gain_margin_db(row, r) >= self.specification.gain_margin_db - _ROUNDING
@@ -127,20 +137,26 @@ class TuningProblem:
 
     def feasible(self, x: Floats, tolerance: float = 1e-6) -> bool:
         """Whether every limit is kept, and the loop is stable, for every plant within the band."""
-        if float(np.min(self.clearances(x)[0])) < -tolerance or not self.stable(x) or not self._between_points(x):
+        behind = self.structure.response(x)[0]
+        if float(np.min(self._values(behind))) < -tolerance:
+            return False
+        if not self._stable(behind) or not self._between_points(behind):
             return False
         limit = self.specification.noise_limit
         return limit is None or self.noise_gain(x)[0] <= limit * (1 + tolerance)
 
 
-def noise_power(frequency_hz: Floats, encoder_step: float | None, structure: FeedbackStructure) -> Floats:
-    """Power of the noise at the output over that of white noise of 1, up to half the rate.
+def noise_power(frequency_hz: Floats, encoder_step: float | None, *, of_position: bool) -> Floats:
+    """Power of the noise at the output that each point of a grid up to half the rate stands for.
 
-    Rounding to steps q has the variance q²/12 and is white while the axis moves by more than a step in a tick (Widrow
-    and Kollár, Quantization noise, 2008); of a velocity, the differences times the rate count.
+    It is that of white noise of 1, or of an encoder: rounding to steps q has the variance q²/12 and is white while the
+    axis moves by more than a step in a tick (Widrow and Kollár, Quantization noise, 2008); of a velocity, the
+    differences times the rate count.
     """
+    edges = np.concatenate([frequency_hz[:1], (frequency_hz[1:] + frequency_hz[:-1]) / 2, frequency_hz[-1:]])
+    share = np.diff(edges) / frequency_hz[-1]
     if encoder_step is None:
-        return np.ones(frequency_hz.shape)
+        return np.asarray(share)
     rate_hz = 2 * frequency_hz[-1]
     differences = 2 * rate_hz * np.sin(np.pi * frequency_hz / rate_hz)
-    return np.asarray(encoder_step**2 / 12 * (1.0 if structure.of_position else differences**2))
+    return np.asarray(share * encoder_step**2 / 12 * (1.0 if of_position else differences**2))

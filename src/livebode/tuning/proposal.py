@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Lines, Loop, Model, Responses, TuneError
+from livebode.core import Lines, Loop, Model, PositionPD, Responses, TuneError
 from livebode.tuning.coverage import check_coverage, missing_resonances
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.predicted import PredictedMargins, predicted
-from livebode.tuning.problem import TuningProblem
+from livebode.tuning.problem import TuningProblem, noise_power
 from livebode.tuning.search import SearchResult, search
 from livebode.tuning.specification import LoopSpecification
 from livebode.tuning.structure import TunedFeedback
@@ -80,6 +80,14 @@ class ControllerProposal:
     def open_loop(self, feedback: Model) -> Complex:
         """L with a feedback on the grid of `plant`, shape (places, frequencies)."""
         return np.asarray(self.plant.value * feedback.response(self.plant.frequency_hz))
+
+    def noise_up_to(self, feedback: Model) -> Floats:
+        """Rms of the plant input with a feedback, of the noise up to each frequency, worst place; ends as `noise`."""
+        of_position = isinstance(self.feedback.controller, PositionPD)
+        power = noise_power(self.plant.frequency_hz, self.specification.encoder_step, of_position=of_position)
+        behind = feedback.response(self.plant.frequency_hz)
+        total = np.cumsum(np.abs(behind / (1 + self.open_loop(feedback))) ** 2 * power, axis=1)
+        return np.asarray(np.sqrt(total[int(np.argmax(total[:, -1]))]))
 
     def plain(self) -> dict[str, Any]:
         """For JSON; infinite margins are null."""
@@ -234,7 +242,7 @@ def _input_noise(problem: TuningProblem, loop: Loop, x: Floats) -> tuple[float, 
 def _limits(best: SearchResult) -> tuple[str, ...]:
     """The points of the curve that touch a limit, one for each limit."""
     problem, x = best.problem, best.x
-    value, _ = problem.clearances(x)
+    value = problem.clearances(x)
     behind = problem.structure.response(x)[0]
     loop = problem.plant.value * behind
     found: dict[str, tuple[float, str]] = {}

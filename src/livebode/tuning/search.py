@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from livebode.core import Model
 from livebode.tuning.plant_band import PlantBand
 from livebode.tuning.problem import TuningProblem
 from livebode.tuning.specification import LoopSpecification
-from livebode.tuning.structure import FeedbackStructure
+from livebode.tuning.structure import FeedbackStructure, TunedFeedback
 
 Floats = NDArray[np.float64]
 
@@ -35,8 +36,12 @@ class SearchResult:
     merit: float
 
 
-def search(controller: Model | None, plant: PlantBand, specification: LoopSpecification) -> SearchResult | None:
+def search(
+    controller: Model | None, plant: PlantBand, specification: LoopSpecification, fixed: TunedFeedback | None = None
+) -> SearchResult | None:
     """The best controller of the described structure, with few filters; None if none keeps the limits.
+
+    The filters of `fixed` are in series, too.
 
     Sequential quadratic programming (SLSQP) over the logarithms of the parameters, with the nearest points of the
     Nyquist plot as constraints, from the fastest feasible of a row of textbook settings. The result is a local
@@ -44,7 +49,7 @@ def search(controller: Model | None, plant: PlantBand, specification: LoopSpecif
     """
     best: SearchResult | None = None
     for notches, low_pass in _filters(plant, specification):
-        structure = FeedbackStructure(controller, plant.frequency_hz, notches, low_pass=low_pass)
+        structure = FeedbackStructure(controller, plant.frequency_hz, notches, low_pass=low_pass, fixed=fixed)
         problem = TuningProblem(structure, plant, specification)
         found = _optimised(problem, best)
         if found is not None and (best is None or found.merit > best.merit + _SIMPLER):
@@ -81,13 +86,15 @@ def _filters(plant: PlantBand, specification: LoopSpecification) -> Iterator[tup
 
 
 def _optimised(problem: TuningProblem, simpler: SearchResult | None) -> SearchResult | None:
-    required = problem.specification.bandwidth_hz is not None
     start = _start(problem)
     if start is None and simpler is not None:
         start = _extended(problem, simpler)
-    if start is None:
-        return None
-    x = start
+    return None if start is None else improved(problem, start)
+
+
+def improved(problem: TuningProblem, x: Floats) -> SearchResult:
+    """The local optimum from a controller that keeps every limit."""
+    required = problem.specification.bandwidth_hz is not None
     for _ in range(_ROUNDS):
         moved = _moved(problem, x, required)
         new = _feasible_part(problem, x, moved)
@@ -105,9 +112,7 @@ def merit(problem: TuningProblem, x: Floats) -> float:
     if problem.specification.bandwidth_hz is None:
         return float(_direction(problem.structure) @ x)
     short = float(np.min(problem.tracking(x)[0]))
-    return (
-        float(np.min(problem.clearances(x)[0])) + 0.01 * float(_direction(problem.structure) @ x) + min(short, 0) * 10
-    )
+    return float(np.min(problem.clearances(x))) + 0.01 * float(_direction(problem.structure) @ x) + min(short, 0) * 10
 
 
 def _direction(structure: FeedbackStructure) -> Floats:
@@ -161,15 +166,22 @@ def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
     from scipy.optimize import minimize
 
     structure = problem.structure
-    at = _nearest(problem, x)
+    nearest = _nearest(problem, x)
+    columns = np.any(nearest, axis=0)
+    near, at = problem.only(columns), nearest[:, columns]
     direction = _direction(structure)
     size = len(x)
     low, high = np.maximum(structure.low, x - _MOVE), np.minimum(structure.high, x + _MOVE)
     scale = 0.01 if required else 1.0
     goal = np.append(-scale * direction, -1.0) if required else -direction
 
+    @lru_cache(maxsize=1)  # SLSQP asks for values and slopes at the same point, one after the other
+    def clearances(x: bytes) -> tuple[Floats, Floats]:
+        value, slope = near.sloped_clearances(np.frombuffer(x))
+        return value[at], slope[at]
+
     def limits(z: Floats) -> Floats:
-        parts = [problem.clearances(z[:size], at)[0] - (z[-1] if required else 1e-4)]
+        parts = [clearances(z[:size].tobytes())[0] - (z[-1] if required else 1e-4)]
         if required:
             parts.append(problem.tracking(z[:size])[0])
         if (limit := problem.specification.noise_limit) is not None:
@@ -177,8 +189,7 @@ def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
         return np.concatenate(parts)
 
     def slopes(z: Floats) -> Floats:
-        found = problem.clearances(z[:size], at)[1]
-        assert found is not None
+        found = clearances(z[:size].tobytes())[1]
         rows = [np.column_stack([found, np.full(len(found), -1.0)]) if required else found]
         if required:
             part = problem.tracking(z[:size])[1]
@@ -188,7 +199,7 @@ def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
             rows.append(np.append(one, np.zeros(len(z) - size))[np.newaxis])
         return np.concatenate(rows)
 
-    begin = np.append(x, float(np.min(problem.clearances(x)[0]))) if required else x
+    begin = np.append(x, float(np.min(problem.clearances(x)))) if required else x
     bounds = list(zip(np.append(low, [-2.0] * required), np.append(high, [2.0] * required)))
     found = minimize(  # type: ignore[call-overload]
         lambda z: float(goal @ z), begin, jac=lambda _: goal, bounds=bounds, method="SLSQP",
@@ -200,7 +211,7 @@ def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
 
 def _nearest(problem: TuningProblem, x: Floats) -> NDArray[np.bool_]:
     """The points with the least clearance, which a step can reach."""
-    value, _ = problem.clearances(x)
+    value = problem.clearances(x)
     count = min(_ACTIVE, value.size)
     chosen = np.zeros(value.shape, dtype=bool)
     chosen.flat[np.argpartition(value.ravel(), count - 1)[:count]] = True

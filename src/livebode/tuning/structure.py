@@ -69,6 +69,8 @@ class FeedbackStructure:
         Centres about which the notches are searched.
     low_pass
         Whether there is a low-pass.
+    fixed
+        A feedback whose filters are in series, too, and are not tuned.
 
     Raises
     ------
@@ -83,6 +85,7 @@ class FeedbackStructure:
         notches_hz: Sequence[float] = (),
         *,
         low_pass: bool = False,
+        fixed: TunedFeedback | None = None,
     ) -> None:
         if not isinstance(controller, PID | Cascade | PositionPD):
             raise TuneError(
@@ -95,12 +98,15 @@ class FeedbackStructure:
         self.frequency_hz = frequency_hz
         self.notches_hz = tuple(notches_hz)
         self.low_pass = low_pass
+        self.fixed = fixed
         inner = controller.velocity if isinstance(controller, Cascade) else controller
         self.rate_hz = inner.rate_hz
         self._tangent = np.tan(np.pi * frequency_hz / self.rate_hz)
         self._inner = inner
         self.sign = -1.0 if (inner.gain if isinstance(inner, PID) else inner.velocity_gain) < 0 else 1.0
-        self._unit_delay = self.sign * _timing(inner, frequency_hz)
+        filters = fixed.biquads if fixed is not None else ()
+        untuned = [one.response(frequency_hz) for one in (_timing(inner), *filters)]
+        self._untuned = self.sign * np.prod(untuned, axis=0)
         self.names, self.start, self.low, self.high = self._variables()
         if isinstance(inner, PID):
             self._integral = integral(frequency_hz, inner.rate_hz, inner.integrator)
@@ -153,6 +159,12 @@ class FeedbackStructure:
         """Column of a parameter; None where the structure does not have it."""
         return self.names.index(name) if name in self.names else None
 
+    def only(self, columns: NDArray[np.bool_]) -> FeedbackStructure:
+        """The same at some of the frequencies."""
+        return FeedbackStructure(
+            self.controller, self.frequency_hz[columns], self.notches_hz, low_pass=self.low_pass, fixed=self.fixed
+        )
+
     def response(self, x: Floats) -> tuple[Complex, Complex]:
         """F, shape (frequencies,), and the derivative of log F to each parameter, (parameters, frequencies)."""
         value = dict(zip(self.names, np.exp(x).tolist()))
@@ -164,7 +176,7 @@ class FeedbackStructure:
             outer = value["position_gain"] / described * self._position
             slopes[self.names.index("position_gain")] = outer / (1 + outer)
             inner = inner * (1 + outer)
-        f = inner * self._unit_delay
+        f = inner * self._untuned
         for i in range(len(self.notches_hz)):
             f = f * self._notch(value, i, slopes)
         if self.low_pass:
@@ -220,8 +232,11 @@ class FeedbackStructure:
             depth_db = -20 * np.log10(value[f"notch{i}_depth"])
             if depth_db > 0.5:
                 notches.append((value[f"notch{i}_frequency"], float(depth_db), value[f"notch{i}_damping"]))
-        low_passes = (value["low_pass"],) if self.low_pass else ()
-        return TunedFeedback(self._controller(value), tuple(notches), low_passes, self.rate_hz)
+        low_passes = [value["low_pass"]] if self.low_pass else []
+        if self.fixed is not None:
+            notches += self.fixed.notches
+            low_passes += self.fixed.low_passes
+        return TunedFeedback(self._controller(value), tuple(notches), tuple(low_passes), self.rate_hz)
 
     def _controller(self, value: dict[str, float]) -> PID | Cascade | PositionPD:
         inner = self._inner
@@ -239,13 +254,12 @@ class FeedbackStructure:
         return pid
 
 
-def _timing(part: PID | PositionPD, frequency_hz: Floats) -> Complex:
-    """Hold and delay of a controller: its response with a law of one."""
-    plain = PID(
+def _timing(part: PID | PositionPD) -> PID:
+    """Hold and delay of a controller: it with a law of one."""
+    return PID(
         gain=1.0,
         rate_hz=part.rate_hz,
         rate_divider=part.rate_divider,
         hold=part.hold,
         delay_ticks=part.delay_ticks,
     )
-    return plain.response(frequency_hz)

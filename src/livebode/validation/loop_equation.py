@@ -53,11 +53,24 @@ class LoopSignals:
     output: Floats
     instrument: Complex
     _spectra: Complex
+    _starts: NDArray[np.intp]
     _with_images: dict[tuple[HeldSamples, int], tuple[Complex, Complex]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, block: Block, lines: Lines, *, input: str, excitation: str, output: str) -> LoopSignals:
+    def of(
+        cls,
+        block: Block,
+        lines: Lines,
+        *,
+        input: str,
+        excitation: str,
+        output: str,
+        starts: NDArray[np.intp] | None = None,
+    ) -> LoopSignals:
         """The spectra of consecutive samples that are all finite.
+
+        With `starts` the windows begin there instead of at each period; of several experiments in a row, windows that
+        contain the change from one to the next would have an error that averaging does not reduce.
 
         Raises
         ------
@@ -65,7 +78,9 @@ class LoopSignals:
             If there are fewer than 9 periods, or the excitation is zero at all lines.
         """
         period = lines.window
-        count = len(block) // period - 1
+        if starts is None:
+            starts = period * np.arange(len(block) // period - 1)
+        count = len(starts)
         if count < WINDOWS_MIN:
             raise SignalError(
                 "too-short",
@@ -76,7 +91,7 @@ class LoopSignals:
             )
         signals = np.stack([block[name] for name in (input, excitation, output)])
         signals = signals - signals.mean(axis=1, keepdims=True)
-        spectra = _spectra(signals, lines)
+        spectra = _spectra(signals, lines, starts)
         power = np.mean(np.abs(spectra[:, 1]) ** 2, axis=0)
         if not power.any():
             raise SignalError(
@@ -91,7 +106,7 @@ class LoopSignals:
         about = spectra * instrument[:, np.newaxis]
         dof = (count - 1) / (1 + 2 * _OVERLAP**2)
         step = _step(signals[0]) / np.sqrt(12 * period)
-        return cls(lines, *_moments(about), dof, step, signals[2], instrument, about)
+        return cls(lines, *_moments(about), dof, step, signals[2], instrument, about, starts)
 
     def judge(self, loop: Loop, phase: int = 0) -> LoopResidual:
         """The equation of this loop; UsageError if its feedback is missing.
@@ -119,19 +134,18 @@ class LoopSignals:
         """Mean and covariance of the three signals and of the images of a slower controller."""
         if (samples, phase) not in self._with_images:
             images = samples.images(self.output, self.lines.rate_hz, phase)
-            about = _spectra(images[np.newaxis], self.lines) * self.instrument[:, np.newaxis]
+            about = _spectra(images[np.newaxis], self.lines, self._starts) * self.instrument[:, np.newaxis]
             self._with_images[samples, phase] = _moments(np.concatenate([self._spectra, about], axis=1))
         return self._with_images[samples, phase]
 
 
-def _spectra(signals: Floats, lines: Lines) -> Complex:
-    """Of windows of two periods, a period apart, (windows, signals, lines)."""
+def _spectra(signals: Floats, lines: Lines, starts: NDArray[np.intp]) -> Complex:
+    """Of windows of two periods, (windows, signals, lines)."""
     period = lines.window
     hann = 1 - np.cos(np.pi * np.arange(2 * period) / period)
     angle = np.pi / period * np.outer(np.arange(2 * period), 2 * np.array(lines.bins))
     kernel = hann[:, np.newaxis] * np.exp(-1j * angle) / hann.sum()
-    count = signals.shape[1] // period - 1
-    return np.stack([signals[:, k * period : (k + 2) * period] @ kernel for k in range(count)])
+    return np.stack([signals[:, start : start + 2 * period] @ kernel for start in starts])
 
 
 def _moments(about: Complex) -> tuple[Complex, Complex]:

@@ -33,6 +33,7 @@ class RecordError(LivebodeError):
         "finished": "The run is finished and cannot be continued.",
         "foreign-files": "The directory has files that livebode did not write, so it is neither used nor replaced.",
         "locked": "Another process records in this directory.",
+        "matrix-unsupported": "The run is a matrix run, where one with a single response is needed.",
         "newer-version": "A file of the run was written by a newer version of livebode.",
         "no-directory": "The run has no directory yet: it is written in one piece, at its end.",
         "no-matrix": "The run has one response, and no matrix of them.",

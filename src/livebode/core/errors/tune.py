@@ -25,6 +25,7 @@ class TuneError(LivebodeError):
         "lines-missing": "The lines do not cover the crossover or a resonance.",
         "loop-contradicted": "The recording contradicts the described controllers.",
         "loop-unchecked": "It was not checked that the described controllers are those of the machine.",
+        "no-controller": "No controller is described between the two signals of an entry.",
         "no-mode": "The run has no valid fit of the mode that is to be shaped.",
         "no-stable-start": "No controller of the described structure is stable for every plant within the bounds.",
         "shaper-impossible": "No input shaper of a reasonable duration leaves so little vibration.",

@@ -327,9 +327,9 @@ export interface LoopFacts {
   parts: LoopParts;
   band: LoopBand | null;
   band_why_not: string;
-  /** Filters of `livebode tune`. */
+  /** Of `livebode tune`; without gains where the run has only its filters. */
   proposed: {
-    rate_hz: number;
+    gains: Record<string, number> | null;
     notches: { hz: number; depth_db: number; damping: number }[];
     low_passes_hz: number[];
   } | null;

@@ -6,7 +6,11 @@
 /** A curve of L with the radius that contains it, at the frequencies of the band. @typedef {{re: Float64Array, im: Float64Array, radius: Float64Array}} Disc */
 /** Infinite where nothing limits it. @typedef {{bandwidthHz: number, gainMarginDb: number, phaseMarginDeg: number, ms: number, disk: number}} Predicted */
 
-const EDGE = Array.from({ length: 24 }, (_, k) => [Math.cos((2 * Math.PI * k) / 24), Math.sin((2 * Math.PI * k) / 24)]);
+const EDGES = 24;
+const COS = Float64Array.from({ length: EDGES }, (_, k) => Math.cos((2 * Math.PI * k) / EDGES));
+const SIN = Float64Array.from({ length: EDGES }, (_, k) => Math.sin((2 * Math.PI * k) / EDGES));
+/** `Math.hypot` is several times slower. @param {number} x @param {number} y */
+const length = (x, y) => Math.sqrt(x * x + y * y);
 const DEG = 180 / Math.PI;
 const HALF_POWER_DB = 20 * Math.log10(Math.SQRT2);
 
@@ -45,20 +49,22 @@ export function predicted(hz, places, known, worst) {
 /** Ms: the largest 1/(|1 + L| − r). @param {Disc} disc */
 function sensitivity({ re, im, radius }) {
   let least = Infinity;
-  for (let i = 0; i < re.length; i++) least = Math.min(least, Math.hypot(1 + re[i], im[i]) - radius[i]);
+  for (let i = 0; i < re.length; i++) least = Math.min(least, length(1 + re[i], im[i]) - radius[i]);
   return 1 / Math.max(least, 1e-12);
 }
 
 /** α = min 2·|1 + L|/|1 − L| on the edges of the discs. @param {Disc} disc */
 function diskMargin({ re, im, radius }) {
   let least = Infinity;
-  for (let i = 0; i < re.length; i++)
-    for (const [c, s] of EDGE) {
-      const x = re[i] + radius[i] * c,
-        y = (im[i] + radius[i] * s) ** 2;
-      least = Math.min(least, ((1 + x) ** 2 + y) / ((1 - x) ** 2 + y));
-      if (radius[i] === 0) break;
+  for (let i = 0; i < re.length; i++) {
+    const edges = radius[i] === 0 ? 1 : EDGES;
+    for (let k = 0; k < edges; k++) {
+      const x = re[i] + radius[i] * COS[k],
+        y = (im[i] + radius[i] * SIN[k]) ** 2,
+        square = ((1 + x) ** 2 + y) / ((1 - x) ** 2 + y);
+      if (square < least) least = square;
     }
+  }
   return 2 * Math.sqrt(least);
 }
 
@@ -81,7 +87,7 @@ function gainMargin({ re, im, radius }) {
 /** From the points of the unit circle that a disc or the curve reaches. @param {Disc} disc */
 function phaseMargin({ re, im, radius }) {
   let least = Infinity;
-  const size = re.map((v, i) => Math.hypot(v, im[i]));
+  const size = re.map((v, i) => length(v, im[i]));
   for (let i = 0; i < re.length; i++) {
     const [a, r] = [size[i], radius[i]];
     if (a > 0 && Math.abs(a - 1) <= r) {
@@ -115,7 +121,7 @@ function leastClosed({ re, im, radius }, i) {
     r = radius[i];
   if (square <= r ** 2) return 0;
   const below = square - r ** 2;
-  return 1 / (Math.hypot(1 + re[i] / below, -im[i] / below) + r / below);
+  return 1 / (length(1 + re[i] / below, -im[i] / below) + r / below);
 }
 
 /**
@@ -126,7 +132,7 @@ function leastClosed({ re, im, radius }, i) {
  * @param {{re: Numbers, im: Numbers}} loop
  */
 export function stable(hz, { re, im }) {
-  const size = [0, 1].map((i) => Math.log(Math.hypot(re[i], im[i])));
+  const size = [0, 1].map((i) => Math.log(length(re[i], im[i])));
   const integrators = Math.round(-(size[1] - size[0]) / Math.log(hz[1] / hz[0]));
   let angle = Math.atan2(im[0], 1 + re[0]);
   const turns = Math.round((angle + (integrators * Math.PI) / 2) / (2 * Math.PI));
@@ -139,21 +145,18 @@ export function stable(hz, { re, im }) {
 
 /** Whether no plant within the bounds is unstable, if the measured one is stable. @param {Disc[]} places @param {number} known */
 export const keepsClear = (places, known) =>
-  places.every(({ re, im, radius }) => re.subarray(0, known).every((v, i) => Math.hypot(1 + v, im[i]) > radius[i]));
+  places.every(({ re, im, radius }) => re.subarray(0, known).every((v, i) => length(1 + v, im[i]) > radius[i]));
 
 /** The largest |L| above the lines, where no phase is known. @param {Disc[]} places @param {number} known */
 export const largestAbove = (places, known) =>
-  Math.max(
-    0,
-    ...places.flatMap(({ re, im }) => Array.from(re.subarray(known), (v, i) => Math.hypot(v, im[known + i]))),
-  );
+  Math.max(0, ...places.flatMap(({ re, im }) => Array.from(re.subarray(known), (v, i) => length(v, im[known + i]))));
 
 /** The frequency at which L is nearest to −1. @param {Numbers} hz @param {Disc[]} places @param {number} known */
 export function nearestHz(hz, places, known) {
   let [best, least] = [hz[0], Infinity];
   for (const { re, im } of places)
     for (let i = 0; i < known; i++) {
-      const away = Math.hypot(1 + re[i], im[i]);
+      const away = length(1 + re[i], im[i]);
       if (away < least) [best, least] = [hz[i], away];
     }
   return best;

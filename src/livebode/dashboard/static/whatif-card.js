@@ -186,7 +186,7 @@ export class WhatIfCard {
         { class: "row" },
         this.adding(),
         ...(this.trial.lowPassHz ? [] : [this.act(tr("add a low-pass"), () => this.addLowPass())]),
-        ...(proposed ? [this.act(tr("filters proposed by livebode tune"), () => this.propose(proposed))] : []),
+        ...(proposed ? [this.act(tr("proposed by livebode tune"), () => this.propose(proposed))] : []),
       ),
     );
   }
@@ -336,13 +336,18 @@ export class WhatIfCard {
   }
 
   /** @param {NonNullable<LoopFacts["proposed"]>} proposed */
-  propose({ notches, low_passes_hz: corners }) {
+  propose({ gains, notches, low_passes_hz: corners }) {
     const four = (/** @type {number} */ v) => Number(v.toPrecision(4));
+    for (const [name, v] of Object.entries(gains ?? {})) this.trial.values[name] = four(v);
     this.trial.notches = notches
       .slice(0, NOTCHES_MAX)
       .map(({ hz, depth_db, damping }) => ({ hz: four(hz), depthDb: four(depth_db), damping: four(damping) }));
     this.trial.lowPassHz = four(corners[0] ?? 0);
-    this.complain(tr("The filters are those of filters.h; set the gains that livebode tune printed."));
+    this.complain(
+      gains
+        ? tr("Gains and filters are those of the newest livebode tune of this run.")
+        : tr("The filters are those of filters.h; set the gains that livebode tune printed."),
+    );
   }
 
   /** @param {(facts: LoopFacts, trial: Trial) => string} made */
