@@ -108,8 +108,11 @@ class MatrixMonitor(StatefulBase):
 
     def process(self, responses: MatrixResponses) -> list[Event]:
         """Events of these matrices, which follow the previous ones."""
-        rows = (responses[np.array([row])] for row in range(len(responses)))
-        return [event for one in rows if self._is_due(one) for event in self._judge(one)]
+        found = []
+        for row in range(len(responses)):
+            if self._is_due(responses, row):
+                found += self._judge(responses[np.array([row])])
+        return found
 
     def summary(self) -> dict[str, Any]:
         """Judged time, numbers of raised and cleared alarms, and the active one."""
@@ -122,11 +125,11 @@ class MatrixMonitor(StatefulBase):
             "standing": [self._reported["name"]] if self._reported else [],
         }
 
-    def _is_due(self, one: MatrixResponses) -> bool:
-        """Whether it shares no window with the one judged before, and can be compared."""
-        if one.first[0] <= self._judged or not one.dof[0] > len(one.outputs):
+    def _is_due(self, responses: MatrixResponses, row: int) -> bool:
+        """Whether this matrix shares no window with the one judged before, and can be compared."""
+        if responses.first[row] <= self._judged or not responses.dof[row] > len(responses.outputs):
             return False
-        return bool((one.valid[0] & self._baseline.valid[0]).all(axis=1).any())
+        return bool((responses.valid[row] & self._baseline.valid[0]).all(axis=1).any())
 
     def _judge(self, one: MatrixResponses) -> list[Event]:
         pair = MatrixPair.of(self._baseline, one)
@@ -164,7 +167,8 @@ class MatrixMonitor(StatefulBase):
 
     @property
     def _identity(self) -> str:
-        return f"{matrix_digest(self._baseline)} {self.false_alarm_interval_s!r} {self._noise_samples} {self._description!r}"
+        settings = self.false_alarm_interval_s, self._noise_samples, self._description
+        return f"{matrix_digest(self._baseline)} {settings!r}"
 
 
 def matrix_digest(responses: MatrixResponses) -> str:
