@@ -23,6 +23,7 @@ from livebode.fleet.axis_stream import AxisStream
 from livebode.fleet.message import write_message
 from livebode.mimo import (
     MatrixExcitation,
+    MatrixMonitor,
     MatrixResponses,
     MatrixSettings,
     MatrixTracker,
@@ -35,6 +36,7 @@ from livebode.runtime.change_detection import ChangeDetection
 from livebode.runtime.continuing import StreamPosition
 from livebode.runtime.fits import Fits
 from livebode.runtime.matrix_columns import MatrixColumns
+from livebode.runtime.matrix_detection import MatrixDetection
 from livebode.runtime.readiness import Readiness
 from livebode.runtime.run_counts import RunCounts
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
@@ -193,6 +195,30 @@ def matrix_columns() -> Case:
         [lambda stage, part=part: step(stage, part) for part in (matrices[:1], matrices[1:2], matrices[2:])],
         [lambda: MatrixColumns(inputs, lines + 1)],
     )
+
+
+def matrix_monitor() -> Case:
+    """Changed in the second step, as before in the third."""
+    matrices = example_matrix_responses()
+
+    def part(number: int, factor: float) -> MatrixResponses:
+        at = 10**6 * number
+        return replace(matrices, value=factor * matrices.value, first=matrices.first + at, sample=matrices.sample + at)
+
+    def monitor(days: float = 30.0) -> MatrixMonitor:
+        return MatrixMonitor(matrices, false_alarm_interval_s=86400 * days)
+
+    parts = part(1, 1.0), part(2, 1.2), part(3, 1.0)
+    return Case(monitor, [lambda stage, one=one: stage.process(one) for one in parts], [lambda: monitor(1.0)])
+
+
+def matrix_detection() -> Case:
+    matrices = example_matrix_responses()
+    changed = replace(
+        matrices, value=1.2 * matrices.value, first=matrices.first + 10**6, sample=matrices.sample + 10**6
+    )
+    steps = [lambda stage, one=one: stage.process(one) for one in (matrices, changed)]
+    return Case(lambda: MatrixDetection(MatrixMonitor(matrices), "runs/healthy"), steps)
 
 
 def successive_trackers() -> Case:
@@ -400,8 +426,8 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, direct_tracker, successive_trackers, matrix_tracker, matrix_columns, local_polynomial, welch_average,
-        spectra_tracker,
+        tracker, direct_tracker, successive_trackers, matrix_tracker, matrix_columns, matrix_monitor, matrix_detection,
+        local_polynomial, welch_average, spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
         run_counts, readiness, sequencer, axis_stream, stream_position,
     )

@@ -38,7 +38,7 @@ class MatrixAlarm:
     def of(cls, one: MatrixResponses, pair: MatrixPair, causes: tuple[Cause, ...]) -> MatrixAlarm:
         """Of a matrix, its difference from the baseline, and the causes of that."""
         entry = min(pair.entries(), key=lambda changed: changed.probability)
-        return cls(int(one.first[0]), int(one.sample[0]), float(one.time_s[0]), pair.probability, entry, causes)
+        return cls(max(int(one.first[0]), 0), int(one.sample[0]), float(one.time_s[0]), pair.probability, entry, causes)
 
     @property
     def since(self) -> dict[str, Any]:
