@@ -13,18 +13,23 @@ import pytest
 import livebode
 from livebode.configuration import Axis
 from livebode.configuration.recipe import recipe_id
-from livebode.core import BaselineError, ConfigError, Event, LivebodeError, StateError, UsageError
-from livebode.mimo import MatrixMonitor
+from livebode.core import BaselineError, ConfigError, Event, Lines, LivebodeError, StateError, UsageError
+from livebode.dashboard.overlays import overlays_of
+from livebode.dashboard.quantities import Quantities
+from livebode.mimo import MatrixExcitation, MatrixMonitor, mean_matrix
 from livebode.publishing.feed import AxisFeed
 from livebode.runtime import Destination, run
 from livebode.runtime.matrix_pipeline import MatrixPipeline
 from livebode.simulation import Gantry, GantryLoop
-from studies.matrix_change import EXCITATION, GANTRY, LINES, NOISE_RAD_PER_S, RATE_HZ
 from tests.support.command import livebode as command
 from tests.support.command import write_parquet
 from tests.support.errors import refused
 from tests.support.gantry_runs import NAMES, gantry_run
 
+RATE_HZ, NOISE_RAD_PER_S = 1000.0, 0.05
+LINES = Lines.parse("5:100:2.5", rate_hz=RATE_HZ, window=400)
+EXCITATION = MatrixExcitation.orthogonal(LINES, 2, amplitude=0.2, dwell=3, settle=2)
+GANTRY = Gantry(motor_viscous_n_m_s=0.05, right_stiffness_n_per_m=4e5, right_damping_n_s_per_m=150.0)
 WEAK = replace(GANTRY, stiffness_n_per_m=0.95 * 4e5)
 CYCLE, MEMORY = EXCITATION.samples.shape[1], 3
 SINCE = 7 * CYCLE
@@ -170,6 +175,18 @@ def stopping(until: int) -> Any:
             raise StopError
 
     return stop
+
+
+def test_the_dashboard_draws_the_baseline_of_an_entry(folder: Path, weak: livebode.Run) -> None:
+    entry = livebode.Run(weak.path, entry="velocity2/u1")
+    assert "gantry" not in entry.summary["configuration"]["monitoring"]
+    _, healthy, remark = overlays_of(entry.summary, Quantities.of(entry.summary))
+    assert healthy is not None, remark
+    drawn = healthy.response(entry.responses[-1:], 0.0)
+    assert drawn is not None
+    expected = mean_matrix(livebode.Run(folder / "healthy").matrix).entry("velocity2", "u1")
+    assert np.array_equal(drawn.value, expected.value)
+    assert np.array_equal(drawn.sigma, expected.sigma)
 
 
 def test_another_baseline_or_description_cannot_continue_it(folder: Path) -> None:
