@@ -20,8 +20,8 @@ from studies.result import Verdict
 
 RUNS, LEARNED, MONITORED = 200, 20, 15
 TRACKED = replace(SETTINGS, memory=3)
-PART, LOSS_N_PER_M = "left belt's stiffness", 0.02 * 4e5
-WEAK = replace(GANTRY, stiffness_n_per_m=4e5 - LOSS_N_PER_M)
+PART, LOSS_PERCENT = "left belt's stiffness", 2.0
+WEAK = replace(GANTRY, stiffness_n_per_m=(1 - LOSS_PERCENT / 100) * 4e5)
 ALPHA = 0.05
 
 
@@ -76,10 +76,10 @@ def main(arguments: list[str]) -> int:
     print(Verdict("repetitions until the alarm, most", max(delay), 2 * TRACKED.memory))
     named = [event.details["part"] == PART for _, event in first]
     print(Verdict("first alarm names the left belt", float(np.mean(named)), 0.95, at_least=True))
-    last = [events[-1].details["causes"][0] for _, events in found if events]
-    print(Verdict("newest report names the left belt", float(np.mean([one["part"] == PART for one in last])), 0.95,
+    last = [events[-1].details["changes"][0] for _, events in found if events]
+    print(Verdict("newest report names the left belt", float(np.mean([one["name"] == PART for one in last])), 0.95,
                   at_least=True))  # fmt: skip
-    inside = [abs(one["amount"] + LOSS_N_PER_M) < one["bound"] for one in last]
+    inside = [abs(one["amount"] + LOSS_PERCENT) < one["bound"] for one in last]
     print(Verdict("newest amount inside its 95 % bound", float(np.mean(inside)), 0.93, at_least=True))
     print(f"for example: {found[0][1][0].message}")
     return 0

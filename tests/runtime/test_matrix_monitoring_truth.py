@@ -98,10 +98,10 @@ def test_the_belt_that_loses_stiffness_is_named_with_its_entry(weak: livebode.Ru
     for event in (first, corrected):
         assert event.details["part"] == "left belt's stiffness"
         assert event.details["entry"] == "velocity1/u1"
-    cause = corrected.details["causes"][0]
-    assert abs(cause["amount"] + 0.05 * 4e5) < 2.05 * cause["bound"]
-    share = f"{5 * abs(cause['amount']) / 2e4:.3g}"
-    assert f"the left belt's stiffness is {share} ±" in corrected.message
+    change = corrected.details["changes"][0]
+    assert (change["name"], change["unit"]) == ("left belt's stiffness", "%")
+    assert abs(change["amount"] + 5) < 2.05 * change["bound"]
+    assert f"the left belt's stiffness is {-change['amount']:.3g} ±" in corrected.message
     assert "less than in the baseline; the response velocity1/u1 differs by" in corrected.message
     found = weak.summary["monitoring"]
     assert found["alarms"] == [first.message, corrected.message]

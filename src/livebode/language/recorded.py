@@ -344,7 +344,7 @@ NAMES = (
     "the belt's stiffness", "the moved mass", "the belt's damping", "the motor's inertia",
     "belt's stiffness", "moved mass", "belt's damping", "motor's inertia", "mode", "mode damping",
     "left belt's stiffness", "left belt's damping", "right belt's stiffness", "right belt's damping", "beam's mass",
-    "beam's inertia", "cart's mass", "yaw stiffness", "yaw damping", "motor inertia", "motor friction",
+    "beam's inertia", "cart's mass", "cart's place", "yaw stiffness", "yaw damping", "motor inertia", "motor friction",
     "residual compliance", "mode gain", "lag", "rad/s² per unit of input", "deg", "none", "before", "after",
     "samples were lost", "friction, backlash or sensor steps; increase the excitation, or move the axis",
     "estimators", "windows", "differencing", "the sender", "model", "tables", "machine",

@@ -8,7 +8,7 @@ from typing import Any
 from livebode.core import Event, MatrixResponses
 from livebode.core.clock import moment
 from livebode.mimo.change import EntryChange, MatrixPair
-from livebode.mimo.gantry_change import Cause
+from livebode.mimo.gantry_change import CART_PLACE, Cause
 
 
 @dataclass(frozen=True)
@@ -88,10 +88,7 @@ class MatrixAlarm:
             "amount_percent": 100 * entry.share,
             "bound_percent": 100 * entry.bound,
             "part": self.causes[0].part if self.causes else None,
-            "causes": [
-                {"part": one.part, "amount": one.amount, "bound": one.bound, "before": one.before, "unit": one.unit}
-                for one in self.causes
-            ],
+            "changes": [_change(one) for one in self.causes],
             "probability": self.probability,
         }
         return Event(kind, self.sample, self.time_s, f"{begin} {'; '.join(parts)}.", details | since)
@@ -102,6 +99,19 @@ def cleared(one: MatrixResponses) -> Event:
     time_s = float(one.time_s[0])
     message = f"At {moment(time_s)} the responses agree with the baseline again."
     return Event("change-cleared", int(one.sample[0]), time_s, message, {"what": "matrix"})
+
+
+def _change(cause: Cause) -> dict[str, Any]:
+    """As the changes of a table: in percent, or in its unit where that is not known, and of a place."""
+    share = cause.before > 0 and cause.part != CART_PLACE
+    scale, unit = (100 / cause.before, "%") if share else (1.0, cause.unit)
+    return {
+        "name": cause.part,
+        "of": "value",
+        "unit": unit,
+        "amount": scale * cause.amount,
+        "bound": scale * cause.bound,
+    }
 
 
 def _name(entry: EntryChange) -> str:
