@@ -36,6 +36,7 @@ from livebode.runtime.change_detection import ChangeDetection
 from livebode.runtime.continuing import StreamPosition
 from livebode.runtime.fits import Fits
 from livebode.runtime.matrix_columns import MatrixColumns
+from livebode.runtime.matrix_detection import MatrixDetection
 from livebode.runtime.readiness import Readiness
 from livebode.runtime.run_counts import RunCounts
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
@@ -180,27 +181,6 @@ def matrix_tracker() -> Case:
     )
 
 
-def matrix_monitor() -> Case:
-    """Matrices with windows of their own, of which the last two differ from the baseline: one alarm."""
-    example = example_matrix_responses()
-    span = int(example.sample[-1] - example.first[-1]) + 1
-
-    def later(number: int, factor: float) -> MatrixResponses:
-        one, shift = example[-1:], number * span
-        return replace(one, value=factor * one.value, first=one.first + shift, sample=one.sample + shift)
-
-    parts = [later(number, factor) for number, factor in enumerate((1.0, 2.0, 2.0), 1)]
-
-    def step(stage: MatrixMonitor, part: MatrixResponses) -> object:
-        return [alarm.sentence for alarm in stage.process(part)], stage.alarmed
-
-    return Case(
-        lambda: MatrixMonitor(example),
-        [lambda stage, part=part: step(stage, part) for part in parts],
-        [lambda: MatrixMonitor(example, false_alarm_interval_s=60.0), lambda: MatrixMonitor(later(0, 2.0))],
-    )
-
-
 def matrix_columns() -> Case:
     """Of the example's matrices, in two steps; in the second all are valid."""
     matrices = example_matrix_responses()
@@ -215,6 +195,30 @@ def matrix_columns() -> Case:
         [lambda stage, part=part: step(stage, part) for part in (matrices[:1], matrices[1:2], matrices[2:])],
         [lambda: MatrixColumns(inputs, lines + 1)],
     )
+
+
+def matrix_monitor() -> Case:
+    """Changed in the second step, as before in the third."""
+    matrices = example_matrix_responses()
+
+    def part(number: int, factor: float) -> MatrixResponses:
+        at = 10**6 * number
+        return replace(matrices, value=factor * matrices.value, first=matrices.first + at, sample=matrices.sample + at)
+
+    def monitor(days: float = 30.0) -> MatrixMonitor:
+        return MatrixMonitor(matrices, false_alarm_interval_s=86400 * days)
+
+    parts = part(1, 1.0), part(2, 1.2), part(3, 1.0)
+    return Case(monitor, [lambda stage, one=one: stage.process(one) for one in parts], [lambda: monitor(1.0)])
+
+
+def matrix_detection() -> Case:
+    matrices = example_matrix_responses()
+    changed = replace(
+        matrices, value=1.2 * matrices.value, first=matrices.first + 10**6, sample=matrices.sample + 10**6
+    )
+    steps = [lambda stage, one=one: stage.process(one) for one in (matrices, changed)]
+    return Case(lambda: MatrixDetection(MatrixMonitor(matrices), "runs/healthy"), steps)
 
 
 def successive_trackers() -> Case:
@@ -422,9 +426,8 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, direct_tracker, successive_trackers, matrix_tracker, matrix_columns, matrix_monitor,
-        local_polynomial, welch_average,
-        spectra_tracker,
+        tracker, direct_tracker, successive_trackers, matrix_tracker, matrix_columns, matrix_monitor, matrix_detection,
+        local_polynomial, welch_average, spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
         run_counts, readiness, sequencer, axis_stream, stream_position,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from livebode.cli.picture_support import tell_how_to_draw
-from livebode.cli.pictures import tracked_amount
+from livebode.cli.pictures import show_monitoring, tracked_amount
 from livebode.core import MatrixResponses
 from livebode.locations import original
 from livebode.runtime import Outcome
@@ -21,6 +21,7 @@ def show_matrix(outcome: Outcome, newest: MatrixResponses) -> None:
         print(sentence)
     if not newest.valid.any():
         print("if the inputs move, compare [experiments] with the recording: dwell_periods, settle_periods, start")
+    show_monitoring(outcome.summary["monitoring"])
     tell_how_to_draw()
 
 

@@ -99,7 +99,7 @@ def show(outcome: Outcome) -> None:
     if "loop" in outcome.summary:
         _show_loop(outcome.summary["loop"])
     if "monitoring" in outcome.summary:
-        _show_monitoring(outcome.summary["monitoring"])
+        show_monitoring(outcome.summary["monitoring"])
     tell_how_to_draw()
 
 
@@ -170,7 +170,7 @@ def margins_in_short(worst: dict[str, float]) -> str:
     )
 
 
-def _show_monitoring(found: dict[str, Any]) -> None:
+def show_monitoring(found: dict[str, Any]) -> None:
     for sentence in found.get("alarms", [])[:_ALARMS_SHOWN]:
         print(sentence)
     if (more := len(found.get("alarms", [])) - _ALARMS_SHOWN) > 0:

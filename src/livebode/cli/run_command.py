@@ -82,7 +82,10 @@ def run_command(
     band: Band = None,
     baseline: Annotated[
         Path | None,
-        typer.Option(metavar="BASELINE", help="Detect changes from this baseline, a file of `livebode learn`."),
+        typer.Option(
+            metavar="BASELINE",
+            help="Detect changes from this baseline, a file of `livebode learn`; of matrices a healthy run.",
+        ),
     ] = None,
     false_alarm_interval: Annotated[
         float | None,

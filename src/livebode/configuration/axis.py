@@ -162,11 +162,7 @@ class Axis(ConfigurationSection):
             axis = axis.model_copy(update={"publish": [section.beside(folder) for section in self.publish]})
         if self.report is not None:
             axis = axis.model_copy(update={"report": self.report.beside(folder)})
-        baseline = axis.monitoring.baseline
-        if baseline is None:
-            return axis
-        monitoring = axis.monitoring.model_copy(update={"baseline": folder / baseline})
-        return axis.model_copy(update={"monitoring": monitoring})
+        return axis.model_copy(update={"monitoring": axis.monitoring.beside(folder)})
 
 
 class _ServeOnly(ConfigurationSection):

@@ -18,6 +18,7 @@ _USED = {
     "signals": {"outputs", "inputs", "excitations"},
     "lines": {"frequencies", "window"},
     "tracking": {"estimator", "hop", "average"},
+    "monitoring": {"baseline", "false_alarm_interval_days", "gantry"},
     "loop": {"input_logged", "excitation_logged", "output_logged", "controllers"},
 }
 _USED_WHOLE = {"source", "experiments", "record", "serve", "report", "machine", "publish"}
@@ -30,6 +31,8 @@ def check_no_matrix(axis: Axis) -> None:
     unused = ["experiments"] if axis.experiments is not None else []
     if axis.loop.controllers:
         unused.append("loop.controllers")
+    if axis.monitoring.gantry is not None:
+        unused.append("monitoring.gantry")
     if unused:
         raise ConfigError(
             "key-conflict",

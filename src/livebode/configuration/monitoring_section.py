@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
@@ -17,12 +18,16 @@ class MonitoringSection(ConfigurationSection):
     Parameters
     ----------
     baseline
-        File from `livebode learn`, relative to this file: the run is compared with it. Default: none.
+        File from `livebode learn`, relative to this file: the run is compared with it. Of a matrix of responses: the
+        directory of a matrix run of the healthy machine. Default: none.
     covariates
         Channels on which the parameters of a baseline may depend, such as a temperature; the same in all runs that are
         learned. A run with a baseline uses the covariates of the baseline.
     false_alarm_interval_days
         Mean time between false alarms, at least, in days of judged motion.
+    gantry
+        Of a matrix of responses: TOML file that describes the machine as a gantry, as of `livebode compare --gantry`,
+        relative to this file. An alarm then names the part that changed. Default: none.
     ready_mask
         Bits of signals.ready that are compared with ready_value, if it is a status word: of CiA 402 (object 0x6041)
         ready_mask = 0x6F and ready_value = 0x27 are "operation enabled". Default: all bits.
@@ -33,5 +38,11 @@ class MonitoringSection(ConfigurationSection):
     baseline: File | None = None
     covariates: Annotated[list[str], Field(max_length=4)] = []
     false_alarm_interval_days: Positive = 30.0
+    gantry: File | None = None
     ready_mask: Bits | None = None
     ready_value: Bits | None = None
+
+    def beside(self, folder: Path) -> MonitoringSection:
+        """The same with relative paths from `folder`."""
+        files = {"baseline": self.baseline, "gantry": self.gantry}
+        return self.model_copy(update={name: folder / file for name, file in files.items() if file is not None})

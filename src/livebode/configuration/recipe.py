@@ -18,13 +18,13 @@ def recipe_id(axis: Axis) -> str:
 
     16 hexadecimal digits of the SHA-256 of the configuration in JSON. Source, machine, [record], [report], [serve] and
     [[publish]] do not count, except how a recording is read (its time column, part, rate, kinds and DBC file). A
-    baseline and a DBC file count by their content. A default counts as omitted, so that a new setting of a later
-    version changes no name.
+    baseline, a described gantry and a DBC file count by their content. A default counts as omitted, so that a new
+    setting of a later version changes no name.
 
     Raises
     ------
     RecordingError
-        If the baseline or the DBC file cannot be read.
+        If one of these files cannot be read.
 
     Examples
     --------
@@ -40,7 +40,8 @@ def recipe_id(axis: Axis) -> str:
         reading["dbc"] = content_sha256(axis.source.dbc)
     if reading:
         plain["source"] = reading
-    if axis.monitoring.baseline is not None:
-        plain["monitoring"]["baseline"] = content_sha256(axis.monitoring.baseline)
+    for name in ("baseline", "gantry"):
+        if (file := getattr(axis.monitoring, name)) is not None:
+            plain["monitoring"][name] = content_sha256(file)
     text = json.dumps(plain, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]

@@ -115,7 +115,7 @@ class AlarmStatus:
         }
 
 
-_FACTS = ("what", "amount_percent", "bound_percent", "place_m", "reference")
+_FACTS = ("what", "amount_percent", "bound_percent", "place_m", "reference", "entry")
 _ITEM = ("name", "of", "amount", "unit")
 _LETTERS_MAX = 100
 _NUMBER_MAX = 1e15

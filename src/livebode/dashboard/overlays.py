@@ -87,17 +87,14 @@ class Healthy:
         self._table = table
 
     @classmethod
-    def of(cls, summary: Mapping[str, Any]) -> Healthy | None:
-        """Read the baseline of the run, in the version that it was compared with; None if there is none.
+    def of(cls, path: Path, summary: Mapping[str, Any]) -> Healthy | None:
+        """Read the baseline of the run, in the version that it was compared with; None if it has no lines.
 
         LivebodeError if the file cannot be read.
         """
-        path = recorded_configuration(dict(summary)).get("monitoring", {}).get("baseline")
-        if path is None:
-            return None
         from livebode.monitoring import Baseline, file_of  # with the simulation
 
-        file = file_of(Path(path), (summary.get("monitoring") or {}).get("baseline_id"))
+        file = file_of(path, (summary.get("monitoring") or {}).get("baseline_id"))
         tables = [table for table in Baseline.load(file).tables if table.what == "lines"]
         return cls(tables[0]) if tables else None
 
@@ -128,23 +125,56 @@ class Healthy:
         )
 
 
+class HealthyEntry:
+    """The baseline of one entry of a matrix run: the mean of that entry, the same at all positions."""
+
+    def __init__(self, mean: Responses) -> None:
+        self._mean = mean
+
+    @classmethod
+    def of(cls, path: Path, output: str, input: str) -> HealthyEntry:
+        """Read the run that is the baseline; LivebodeError if it cannot be read."""
+        from livebode.runtime.matrix_baseline import MatrixBaseline
+
+        return cls(MatrixBaseline.load(path).mean.entry(output, input))
+
+    def response(self, beside: Responses, before: float) -> Responses | None:  # noqa: ARG002 - as of `Healthy`
+        """The response of the healthy machine, with sigma, at the lines of the response `beside` (one row)."""
+        mean = self._mean
+        parts = {name: getattr(mean, name) for name in ("value", "sigma", "dof", "coherence", "valid")}
+        return replace(beside, **parts)
+
+
+def _healthy_of(summary: Mapping[str, Any]) -> Healthy | HealthyEntry | None:
+    """The baseline of the run; None if there is none."""
+    words = recorded_configuration(dict(summary))
+    path = words.get("monitoring", {}).get("baseline")
+    if path is None:
+        return None
+    if "entry" in summary:
+        return HealthyEntry.of(Path(path), words["signals"]["output"], words["signals"]["input"])
+    return Healthy.of(Path(path), summary)
+
+
 def _way(step: float, still: float) -> int:
     from livebode.monitoring.table import BACK, FORTH, STILL
 
     return FORTH if step > still else BACK if step < -still else STILL
 
 
-def overlays_of(summary: Mapping[str, Any], quantities: Quantities) -> tuple[FittedCurve | None, Healthy | None, str]:
+def overlays_of(
+    summary: Mapping[str, Any], quantities: Quantities
+) -> tuple[FittedCurve | None, Healthy | HealthyEntry | None, str]:
     """Both overlays, and the reasons why a requested one is missing."""
     remarks = []
     fitted: FittedCurve | None = None
-    healthy: Healthy | None = None
+    healthy: Healthy | HealthyEntry | None = None
     try:
         fitted = FittedCurve.of(summary, quantities)
     except ValueError as error:
         remarks.append(f"the fitted model cannot be drawn: {error}")
     try:
-        healthy = Healthy.of(summary)
+        healthy = _healthy_of(summary)
     except LivebodeError as error:
         remarks.append(f"the baseline cannot be drawn: {error}")
     return fitted, healthy, "; ".join(remarks)

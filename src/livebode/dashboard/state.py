@@ -25,7 +25,7 @@ from livebode.dashboard.frames import curve, frame
 from livebode.dashboard.hub import Hub, Item
 from livebode.dashboard.matrix_group import MatrixGroup
 from livebode.dashboard.notices import EventCauses
-from livebode.dashboard.overlays import FittedCurve, Healthy, grid_hz, overlays_of
+from livebode.dashboard.overlays import FittedCurve, Healthy, HealthyEntry, grid_hz, overlays_of
 from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses
 from livebode.dashboard.trends import Trends
@@ -60,7 +60,7 @@ class State:
         self._empty()
         self._summary: Mapping[str, Any] = {}
         self._fitted: FittedCurve | None = None
-        self._healthy: Healthy | None = None
+        self._healthy: Healthy | HealthyEntry | None = None
         self._remark = ""
         self._grew = float("-inf")
         self._made: dict[tuple[str, Quantity, float], bytes] = {}

@@ -115,11 +115,24 @@ def _problem_of(axis: Axis) -> LivebodeError | None:
     """Why it could not begin: its lines, loop or baseline; None where nothing is found, or it takes samples to tell."""
     try:
         if axis.monitoring.baseline is not None:
-            from livebode.monitoring import Baseline  # with the simulation
-
-            Baseline.load(axis.monitoring.baseline)
+            _check_baseline(axis, axis.monitoring.baseline)
         if axis.source.url is not None and axis.source.rate_hz is not None:
             live_follower(axis, axis.source.rate_hz)
     except LivebodeError as error:
         return error
     return None
+
+
+def _check_baseline(axis: Axis, path: Path) -> None:
+    """Whether it can be read, with the description of a gantry; imported here, because both need the simulation."""
+    if not axis.signals.is_matrix:
+        from livebode.monitoring import Baseline
+
+        Baseline.load(path)
+        return
+    from livebode.analysis.matrices import read_gantry
+    from livebode.runtime.matrix_baseline import MatrixBaseline
+
+    MatrixBaseline.load(path)
+    if axis.monitoring.gantry is not None:
+        read_gantry(axis.monitoring.gantry)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from livebode.mimo.gantry_fit import GantryFit, fit_gantry
     from livebode.mimo.mean import mean_matrix
     from livebode.mimo.modes import MatrixModes, fit_matrix
-    from livebode.mimo.monitor import MatrixAlarm, MatrixMonitor
+    from livebode.mimo.monitor import MatrixMonitor
     from livebode.mimo.prediction import MatrixPrediction, predict, within_limits
     from livebode.mimo.settings import MatrixLoop, MatrixSettings
     from livebode.mimo.tracker import MatrixTracker
@@ -30,7 +30,7 @@ __getattr__ = on_first_use(
         "gantry_fit": ("GantryFit", "fit_gantry"),
         "mean": ("mean_matrix",),
         "modes": ("MatrixModes", "fit_matrix"),
-        "monitor": ("MatrixAlarm", "MatrixMonitor"),
+        "monitor": ("MatrixMonitor",),
         "prediction": ("MatrixPrediction", "predict", "within_limits"),
         "settings": ("MatrixLoop", "MatrixSettings"),
         "tracker": ("MatrixTracker",),
@@ -43,7 +43,6 @@ __all__ = [
     "EntryChange",
     "GantryChange",
     "GantryFit",
-    "MatrixAlarm",
     "MatrixChange",
     "MatrixExcitation",
     "MatrixLoop",

@@ -202,7 +202,7 @@ class MatrixPair:
 
     def entries(self) -> list[EntryChange]:
         """Each entry by itself."""
-        radius = widened(self.sigma, np.full((1, 1, 1), self.dof), _LINE)
+        radius = self._radius
         found = []
         for o, output in enumerate(self.outputs):
             for i, name in enumerate(self.inputs):
@@ -216,6 +216,22 @@ class MatrixPair:
                 line = float(self.frequency_hz[at])
                 found.append(EntryChange(output, name, chance, line, off[at] / size, radius[at, o, i] / size))
         return found
+
+    def share(self, entry: str, frequency_hz: float) -> tuple[float, float]:
+        """|change|/|before| of an entry "output/input" at a line, with its bound; NaN where that is not valid."""
+        names = [f"{o}/{i}" for o in self.outputs for i in self.inputs]
+        o, i = divmod(names.index(entry), len(self.inputs))
+        at = np.flatnonzero(self.frequency_hz == frequency_hz)
+        if not at.size:
+            return np.nan, np.nan
+        k = int(at[0])
+        size = self.size[k, o, i]
+        return float(abs(self.difference[k, o, i]) / size), float(self._radius[k, o, i] / size)
+
+    @property
+    def _radius(self) -> Floats:
+        """Bound of each difference."""
+        return np.asarray(widened(self.sigma, np.full((1, 1, 1), self.dof), _LINE))
 
 
 def _wilks(difference: Complex, noise: Complex, spread: Complex, dof: float) -> Floats:

@@ -306,6 +306,21 @@ class MatrixSettings:
         return self.lines.window * (self.dwell if self.count > 1 else 1)
 
     @property
+    def noise_dof(self) -> int:
+        """Complex degrees of freedom of the noise once all repetitions are there; the newest is apart without average.
+
+        >>> lines = Lines.parse("20:140:20", 4000, 400)
+        >>> MatrixSettings(lines=lines, output="y", input=["u1", "u2"], estimator="direct", memory=5).noise_dof
+        6
+        """
+        return (self.memory - (1 if self.average else 2)) * self.count
+
+    @property
+    def noise_samples(self) -> int:
+        """Samples before those of a response from which its noise is estimated; none with `average`."""
+        return 0 if self.average else self.memory * self.cycle
+
+    @property
     def cycle(self) -> int:
         """Samples after which the excitation repeats."""
         return self.span * self.count

@@ -5,11 +5,12 @@ from __future__ import annotations
 from math import isfinite, nan
 from typing import Any
 
-from livebode.core import Block, Event, Parameters, Responses, Stage, StatefulBase, UsageError, counted
+from livebode.core import Block, Event, Parameters, Responses, Stage, StatefulBase, UsageError
 from livebode.estimation import Settings
 from livebode.monitoring.baseline import Baseline
 from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S
 from livebode.monitoring.machine_monitor import MachineMonitor
+from livebode.monitoring.result_sentence import result_sentence
 from livebode.monitoring.rows import NonOverlappingWindows, places
 from livebode.monitoring.table_monitor import TableMonitor
 
@@ -157,7 +158,7 @@ class Monitor(StatefulBase):
             "standing": standing,
         }
         together = self._machine.together() if self._machine else ""
-        return summary | {"message": _message(summary, together)}
+        return summary | {"message": result_sentence(summary, together)}
 
     def _stages(self) -> dict[str, StatefulBase]:
         stages: dict[str, StatefulBase] = {} if self._machine is None else {"machine": self._machine}
@@ -176,14 +177,3 @@ class Monitor(StatefulBase):
     def _identity(self) -> str:
         judges = "machine" if self._machine else ", ".join(self._tables)
         return f"{self._settings.identity} {self.false_alarm_interval_s!r} {judges}"
-
-
-def _message(summary: dict[str, Any], together: str) -> str:
-    judged = f"{summary['judged_s']:.1f} s of the run judged"
-    if not summary["judged_s"]:
-        return "Nothing of the run could be judged: the baseline does not cover what the machine did."
-    if not summary["changes"]:
-        return f"No change against the baseline ({judged})."
-    alarms = f"{counted(summary['changes'], 'change')} against the baseline"
-    standing = f"{len(summary['standing']) or 'none'} of them active at the end ({judged})"
-    return f"{alarms}, {standing}{together}."

@@ -88,6 +88,9 @@ def entry_summary(summary: Mapping[str, Any], output: str, input: str) -> dict[s
     signals = dict(configuration.get("signals", {}))
     signals.pop("excitation", None)  # all of them belong to every entry
     configuration["signals"] = signals | {"output": output, "input": input}
+    monitoring = configuration.get("monitoring")
+    if monitoring is not None:  # one response describes no gantry
+        configuration["monitoring"] = {name: value for name, value in monitoring.items() if name != "gantry"}
     configuration["loop"] = _loop(configuration.get("loop") or {}, output, input)
     rest = {name: value for name, value in summary.items() if name not in ("matrix", "columns")}
     return rest | {"configuration": configuration, "found": found, "entry": f"{output}/{input}"}

@@ -4,28 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import nan
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from livebode.configuration.axis import Axis
-from livebode.configuration.monitoring_section import MonitoringSection
-from livebode.core import Block, Event, Parameters, RecordError, Responses
-from livebode.core.state import Stage, decode, encode
+from livebode.core import Block, Event, Parameters, Responses
+from livebode.core.state import Stage
 from livebode.estimation import Settings
+from livebode.runtime.baseline_comparison import BaselineComparison, no_effect
 
 if TYPE_CHECKING:
     from livebode.monitoring import Monitor
 
-_NO_BASELINE = "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs."
 _NOT_FITTED = " The baseline's fitted parameters are not judged: the run has no [fit]."
 _NO_SAMPLES = " The baseline's model of the machine is not used: it needs samples at regular times."
-_ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
-_ALARMS_MAX = 100  # sentences in run.json; events.jsonl has all
-
-_STAGE = Stage("change-detection", 1)
 
 
-class ChangeDetection:
+class ChangeDetection(BaselineComparison["Monitor"]):
     """Passes a run's samples and responses to a Monitor, if there is one, and lists its alarms for run.json."""
+
+    _stage = Stage("change-detection", 1)
+    _no_baseline = "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs."
 
     def __init__(
         self,
@@ -35,16 +33,9 @@ class ChangeDetection:
         covariates: tuple[str, ...] = (),
         baseline_id: str | None = None,
     ) -> None:
-        self._monitor, self._baseline, self._remark = monitor, baseline, remark
-        self._id = baseline_id
+        super().__init__(monitor, baseline, remark, baseline_id)
         self.covariates = covariates
         """Channels that it needs in addition to those of the follower."""
-        self._alarms: list[str] = []
-
-    @property
-    def baseline(self) -> str | None:
-        """Name of what it compares with; None if it detects nothing."""
-        return None if self._monitor is None else self._baseline
 
     @property
     def watched(self) -> tuple[str, ...]:
@@ -65,11 +56,6 @@ class ChangeDetection:
         """Newest relative deviation of a parameter from the baseline; NaN where it is not known."""
         return nan if self._monitor is None else self._monitor.deviation(name)
 
-    @property
-    def compared_with(self) -> dict[str, Any]:
-        """Name and id of the baseline, as in run.json."""
-        return {"baseline": self.baseline, "baseline_id": self._id}
-
     def take_samples(self, block: Block) -> list[Event]:
         """Monitor the next samples; without this call they are a gap for the Monitor."""
         return [] if self._monitor is None else self._listed(self._monitor.process_samples(block))
@@ -82,38 +68,6 @@ class ChangeDetection:
         """The last events, at the end of the run."""
         return [] if self._monitor is None else self._listed(self._monitor.finish())
 
-    def summary(self, suppressed_s: float = 0.0) -> dict[str, Any]:
-        """Entries of run.json of a run that was not assessed for so many seconds, as the machine was not ready."""
-        if self._monitor is None:
-            return self.compared_with | {"message": _NO_BASELINE + self._remark}
-        found = self._monitor.summary()
-        remark = f" Not assessed for {suppressed_s:.1f} s: the machine was not ready." if suppressed_s else ""
-        message = {"message": found["message"] + remark + self._remark}
-        return self.compared_with | found | message | {"alarms": self._alarms}
-
-    def snapshot(self) -> bytes:
-        """Its messages, and the state that the next event depends on; see `restore`."""
-        monitor = {} if self._monitor is None else {"monitor": self._monitor}
-        return encode(_STAGE, {"alarms": self._alarms} | monitor)
-
-    def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot with the same baseline; RecordError if it belongs to another one."""
-        state = decode(_STAGE, snapshot)
-        if (self._monitor is None) != ("monitor" not in state):
-            raise RecordError(
-                "baseline-differs",
-                "the run was started with another baseline or none",
-                "continue with that one, or choose another directory",
-            )
-        if self._monitor is not None:
-            self._monitor.restore(state["monitor"])
-        self._alarms = state["alarms"]
-
-    def _listed(self, events: list[Event]) -> list[Event]:
-        if events:
-            self._alarms = [*self._alarms, *(e.message for e in events if e.kind in _ALARMS)][:_ALARMS_MAX]
-        return events
-
 
 def change_detection(axis: Axis, settings: Settings, *, samples: bool = True) -> ChangeDetection:
     """For these settings; BaselineError if the baseline cannot be read or does not fit.
@@ -123,10 +77,7 @@ def change_detection(axis: Axis, settings: Settings, *, samples: bool = True) ->
     section = axis.monitoring
     covariates = tuple(section.covariates) if samples else ()
     if section.baseline is None:
-        days = section.false_alarm_interval_days
-        asked = days != MonitoringSection().false_alarm_interval_days
-        remark = f" false_alarm_interval_days = {days:g} has no effect without one." * asked
-        return ChangeDetection(None, None, remark, covariates)
+        return ChangeDetection(None, None, no_effect(section), covariates)
     from livebode.monitoring import Baseline, Monitor  # with the simulation
 
     baseline = Baseline.load(section.baseline)

@@ -46,9 +46,13 @@ class MatrixRunLoop(SampleLoop[Outcome]):
     def _describe(self) -> dict[str, Any]:
         settings = self._tracker.settings
         found = self._about.get("found", {}) | _found(settings, self.source.channels)
-        return dict(self._about) | {"matrix": True, "found": found, "versions": summary.versions()}
+        begun = dict(self._about) | {"matrix": True, "found": found, "versions": summary.versions()}
+        if self.pipeline.detection.baseline is not None:
+            begun["monitoring"] = self.pipeline.detection.compared_with
+        return begun
 
     def _announce_start(self, begun: dict[str, Any]) -> None:
+        begun = begun | {"monitoring": self.pipeline.detection.compared_with}
         self._stream.announce(RunStarted(self.to.directory, begun, self._control, Overview()))
 
     def _announce_previous(self) -> None:
@@ -65,7 +69,15 @@ class MatrixRunLoop(SampleLoop[Outcome]):
         if len(responses):
             self._remember(responses)
             self._stream.publish(responses)
+        self._monitor(responses)
         return [block]
+
+    def _monitor(self, responses: MatrixResponses) -> None:
+        if self._shedding is not None:
+            self._shedding.monitors()
+            if not self._shedding.to_monitor(responses):
+                return
+        self._stream.publish_all(self.pipeline.detection.process(responses))
 
     def _remember(self, responses: MatrixResponses) -> None:
         if len(responses):
@@ -104,6 +116,7 @@ class MatrixRunLoop(SampleLoop[Outcome]):
     def _results(self) -> dict[str, Any]:
         done = self._describe() | summary.of_source(self.source)
         done |= summary.done(self._tracker.counts, self._tracker.settings.lines.rate_hz, self._counts)
+        done["monitoring"] = self.pipeline.detection.summary()
         return done | self.pipeline.columns.summary(self._tracker.settings.lines.frequency_hz)
 
     def _draw(self, into: Path) -> None:

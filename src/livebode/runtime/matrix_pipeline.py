@@ -12,6 +12,7 @@ from livebode.estimation.settings import nearest_hop
 from livebode.mimo import MatrixTracker
 from livebode.preparation.plan import LIVE_RESPONSES_PER_S
 from livebode.runtime.matrix_columns import MatrixColumns
+from livebode.runtime.matrix_detection import MatrixDetection, matrix_detection
 from livebode.runtime.pipeline import Pipeline, check_channels
 from livebode.runtime.sample_pipeline import SamplePipeline
 from livebode.sources.live import LiveSource
@@ -29,17 +30,22 @@ class MatrixPipeline:
         Turns samples into matrices.
     columns
         Counts where the columns are valid, and why not.
+    detection
+        Detects changes of the machine.
     """
 
     axis: Axis
     tracker: MatrixTracker
     columns: MatrixColumns
+    detection: MatrixDetection
 
     @classmethod
     def of(cls, axis: Axis, rate_hz: float, hop: int | None = None) -> MatrixPipeline:
-        """The configured tracker for samples of this rate; LivebodeError if its settings do not fit each other."""
+        """The configured tracker for samples of this rate; LivebodeError if it does not fit the axis."""
         tracker = MatrixTracker(matrix_settings(axis, rate_hz, hop))
-        return cls(axis, tracker, MatrixColumns(tracker.settings.columns, len(tracker.settings.lines)))
+        settings = tracker.settings
+        columns = MatrixColumns(settings.columns, len(settings.lines))
+        return cls(axis, tracker, columns, matrix_detection(axis, settings))
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> MatrixPipeline:
@@ -90,7 +96,7 @@ class MatrixPipeline:
     @property
     def parts(self) -> Mapping[str, Stateful]:
         """Stages with a state, by name."""
-        return {"tracker": self.tracker, "columns": self.columns}
+        return {"tracker": self.tracker, "columns": self.columns, "detection": self.detection}
 
     def take_over(self, before: SamplePipeline) -> bool:
         """Continue with the state of the previous one, if the settings that it depends on are unchanged.
@@ -101,6 +107,8 @@ class MatrixPipeline:
             self.tracker.restore(before.parts["tracker"].snapshot())
         except LivebodeError:
             return False
+        if isinstance(before, MatrixPipeline) and self.axis.monitoring == before.axis.monitoring:
+            self.detection.take_over(before.detection)
         return True
 
 

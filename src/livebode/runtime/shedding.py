@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from livebode.core import Event, Responses
+from livebode.core import Event, MatrixResponses, Responses
 from livebode.runtime.fit_budget import FitBudget
 from livebode.sources.live import LiveSource
 
@@ -61,7 +61,7 @@ class LoadShedding:
         self._monitors = behind_s < (MONITORING_STOPS_S if self._monitors else MONITORING_RESUMES_S)
         return self._monitors
 
-    def to_monitor(self, responses: Responses) -> bool:
+    def to_monitor(self, responses: Responses | MatrixResponses) -> bool:
         """The same; omitted work is counted."""
         if not self._monitors:
             self._leave_out("monitoring", len(responses), responses)
@@ -88,7 +88,7 @@ class LoadShedding:
         """Events that are not reported yet."""
         return self._thinned(sample, time_s, 0.0)
 
-    def _leave_out(self, what: str, rows: int, responses: Responses) -> None:
+    def _leave_out(self, what: str, rows: int, responses: Responses | MatrixResponses) -> None:
         if rows:
             self._left_out[what] += rows
             self._since = int(responses.sample[0]) if self._since is None else self._since

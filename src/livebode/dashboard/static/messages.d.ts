@@ -152,6 +152,7 @@ export interface AlarmFacts {
   of?: string;
   amount?: number;
   unit?: string;
+  entry?: string;
 }
 
 /** The most important thing on an axis; see verdict.py. */

@@ -64,13 +64,16 @@ const EFFECTS = {
  * @param {AlarmFacts} facts
  */
 function effect(facts) {
-  const { what = "", amount_percent: percent, place_m: place, name, of, amount, unit = "" } = facts;
+  const { what = "", amount_percent: percent, place_m: place, name, of, amount, unit = "", entry } = facts;
   const known = EFFECTS[what];
   if (known && percent !== undefined) {
     const words = known[percent < 0 ? 0 : 1](fixed(Math.abs(percent), 1));
     return place === undefined ? words : tr("{what} at {place} m", { what: words, place: plain(place, 3) });
   }
   if (what === "machine") return tr("far from the baseline: another machine?");
+  if (entry !== undefined && name === undefined && percent !== undefined) {
+    return tr("response {entry} differs by {size} %", { entry, size: fixed(percent, 1) });
+  }
   if (name === undefined || amount === undefined) return tr("different from the baseline");
   const size = `${signed(amount)} ${unit}`;
   return of === "value" || of === undefined
