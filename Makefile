@@ -174,7 +174,8 @@ damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile
 	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/records/test_bit_flips_fault.py
 	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/records/test_hostile_run_fault.py
 
-crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each of ten kinds of live source
+crash: $(BUILT)  ## kill processes that record at 1,000 random moments, as often with each of ten kinds of live source, and fail every call
+	LIVEBODE_CRASH_CALLS=1 $(BIN)/python -m pytest tests/records/test_every_call_fault.py
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/records/test_kills_fault.py
 	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 10 -rP tests/records/test_live_kills_fault.py  # they mostly wait
 
