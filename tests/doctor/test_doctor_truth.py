@@ -191,6 +191,20 @@ def test_a_channel_of_a_recording_that_is_constant_empty_or_missing_is_named(tmp
         assert words in check["message"]
 
 
+def test_every_channel_of_a_matrix_is_read(tmp_path: Path) -> None:
+    given = signals(100)
+    path = tmp_path / "axis.toml"
+    path.write_text(
+        'source.log = "a.parquet"\n[signals]\nexcitation = ["w", "v"]\ninput = ["u", "s"]\noutput = ["y", "z"]\n'
+        '[lines]\nfrequencies = "50"\nwindow = 20\n[experiments]\ndwell_periods = 1\n'
+    )
+    both = given | {"v": given["w"], "s": given["u"], "z": given["y"]}
+    for change, verdict in (({}, "ok"), ({"z": np.zeros(100)}, "warning")):
+        write_parquet(tmp_path / "a.parquet", both | change)
+        check = doctor(path)[1]["source"]
+        assert (check["verdict"], "channel 'z' is constant" in check["message"]) == (verdict, bool(change)), check
+
+
 def test_each_of_several_axes_is_asked_for_its_source(tmp_path: Path) -> None:
     write_parquet(tmp_path / "a.parquet", signals(100))
     path = tmp_path / "axes.toml"

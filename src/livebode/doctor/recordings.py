@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from livebode.configuration.axis import Axis
-from livebode.configuration.recording import open_even_or_uneven
+from livebode.configuration.recording import open_even_or_uneven, open_recording
 from livebode.core import LivebodeError
 from livebode.doctor.check import Check
 from livebode.locations import Location
@@ -25,9 +25,11 @@ def check_recording(name: str, axis: Axis, path: Location) -> Check:
         return Check(name, "ok", f"{path} can be read", facts=facts)
     own = axis.model_copy(update={"source": axis.source.model_copy(update={"log": path})})
     signals = axis.signals
-    names = [signals.excitation, signals.input, signals.output, signals.schedule, *axis.monitoring.covariates]
+    roles = [name for role in ("excitation", "input", "output") for name in signals.listed(role)]
+    names = [*roles, signals.schedule, *axis.monitoring.covariates]
+    opened = open_recording if signals.is_matrix else open_even_or_uneven  # matrices need one clock
     try:
-        channels = contents_of(open_even_or_uneven(own), list(dict.fromkeys(filter(None, names)))).channels
+        channels = contents_of(opened(own), list(dict.fromkeys(filter(None, names)))).channels
     except LivebodeError as error:
         return Check.of_error(name, error)
     silent = [_silence(channel) for channel in channels if not channel.minimum < channel.maximum]
