@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines
+from livebode.core.document import PrintedTable, Section
 from livebode.excitation import multisine
+from livebode.reporting.proposal_section import proposed_controller
+from livebode.reporting.report_data import read
 from livebode.simulation import BeltAxis, Drive, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
 from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from tests.support.command import livebode, write_parquet
@@ -65,6 +68,26 @@ def test_gains_for_odrive_count_turns_and_have_no_filters(run: Path) -> None:
     values = [float(line.split(" = ")[1]) for line in written.splitlines()]
     gain = 2 * np.pi * velocity["gain"]
     np.testing.assert_allclose(values[1:], [gain, gain / velocity["integral_time_s"]], rtol=1e-5)
+
+
+def test_the_report_has_the_newest_proposal_or_says_why_not(run: Path) -> None:
+    done = livebode("tune", run, "--loop-checked", "--max-sensitivity", 1.6, "--json")
+    promised = json.loads(done.out)["promised"]
+    section = proposed_controller(read(run))
+    assert isinstance(section, Section)
+    table = section.parts[0]
+    assert isinstance(table, PrintedTable)
+    assert [row[3] for row in table.rows[:1]] == [f"{promised['bandwidth_hz']:.4g}"]
+    assert float(table.rows[3][3]) == pytest.approx(promised["max_sensitivity"], rel=1e-3)
+    kept = json.loads((run / "tune.json").read_text(encoding="utf-8"))
+    kept["controller"]["velocity"]["gain"] *= 1.01
+    for text, words in ((json.dumps(kept), "another proposal than the run gives now"), ("{", "is damaged")):
+        (run / "tune.json").write_text(text, encoding="utf-8")
+        why = proposed_controller(read(run))
+        assert isinstance(why, str)
+        assert words in why
+    (run / "tune.json").unlink()
+    assert "No controller was proposed" in str(proposed_controller(read(run)))
 
 
 def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path) -> None:

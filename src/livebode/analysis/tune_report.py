@@ -7,7 +7,6 @@ from pathlib import Path
 from livebode.analysis.checked_loop import checked_loop
 from livebode.analysis.places import by_place
 from livebode.analysis.strokes import read_strokes
-from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.matrix import check_controllers, matrix_loop
 from livebode.configuration.recorded import recorded_configuration
@@ -28,12 +27,12 @@ _CONTRADICTED = ("one change", "not explained")
 def tune_run(
     directory: Path,
     specification: LoopSpecification,
-    axis: Axis | None = None,
+    section: LoopSection | None = None,
     *,
     loop_checked: bool = False,
     entry: str | None = None,
 ) -> ControllerProposal:
-    """The proposal for a run; the loop is from `axis`, else from its configuration.
+    """The proposal for a run; the loop is described by `section`, else by its configuration.
 
     The responses are the mean of the run, or with a schedule the means at twelve places. Of an entry of a matrix run
     they are the plant that its controller sees while the others are active as described (`equivalent_plant`).
@@ -44,7 +43,7 @@ def tune_run(
         Run directory.
     specification
         Limits.
-    axis
+    section
         Another description of the loop.
     loop_checked
         The description was verified otherwise, where no `livebode check-loop` of the run confirms it.
@@ -59,17 +58,16 @@ def tune_run(
         If the loop's feedback is missing.
     """
     if entry is not None:
-        return _tune_entry(directory, specification, axis, loop_checked, entry)
-    responses, loop, checked = _inputs(directory, axis, loop_checked)
+        return _tune_entry(directory, specification, section, loop_checked, entry)
+    responses, loop, checked = _inputs(directory, section, loop_checked)
     return tune(responses, loop, specification, loop_checked=checked)
 
 
 def _tune_entry(
-    directory: Path, specification: LoopSpecification, axis: Axis | None, loop_checked: bool, entry: str
+    directory: Path, specification: LoopSpecification, section: LoopSection | None, loop_checked: bool, entry: str
 ) -> ControllerProposal:
     run = RunRecord.open(directory, matrix=True)
     output, input = entry_named(str(directory), run.summary, entry)
-    section = axis.loop if axis is not None else None
     if section is None:
         section = LoopSection.model_validate(recorded_configuration(run.summary).get("loop", {}))
     responses = mean_matrix(run.matrix())
@@ -97,17 +95,16 @@ def _tune_entry(
 
 
 def schedule_run(
-    directory: Path, specification: LoopSpecification, axis: Axis | None = None, *, loop_checked: bool = False
+    directory: Path, specification: LoopSpecification, section: LoopSection | None = None, *, loop_checked: bool = False
 ) -> GainSchedule:
     """The same with gains that follow the schedule of the run; errors as of `gain_schedule`."""
-    responses, loop, checked = _inputs(directory, axis, loop_checked)
+    responses, loop, checked = _inputs(directory, section, loop_checked)
     return gain_schedule(responses, loop, specification, loop_checked=checked)
 
 
-def _inputs(directory: Path, axis: Axis | None, loop_checked: bool) -> tuple[Responses, Loop, bool]:
+def _inputs(directory: Path, section: LoopSection | None, loop_checked: bool) -> tuple[Responses, Loop, bool]:
     """Mean responses by place, the loop, and whether its description was checked."""
     run = RunRecord.open(directory)
-    section = axis.loop if axis is not None else None
     if section is None:
         section = LoopSection.model_validate(recorded_configuration(run.summary).get("loop", {}))
     responses = Responses.join(list(run.steady_batches()))

@@ -67,13 +67,14 @@ def tune_command(
 ) -> None:
     """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
 
-    Writes tune.png, the gains as gains.toml, and the filters as filters.h and filters.st, to the run directory; nothing
-    to a machine. The exit code is 2 if no controller meets the specification. With --entry of a matrix run it is the
-    controller between that output and input, and the plant that it sees while the other [[loop.controllers]] are active
-    as described.
+    Writes tune.png, the gains as gains.toml, the filters as filters.h and filters.st, and for `livebode report` the
+    whole as tune.json, to the run directory; nothing to a machine. The exit code is 2 if no controller meets the
+    specification. With --entry of a matrix run it is the controller between that output and input, and the plant that
+    it sees while the other [[loop.controllers]] are active as described.
     """
     if entry is not None and (schedule or strokes is not None):
         raise _not_of_an_entry()
+    from livebode.analysis.stored_proposal import store_proposal
     from livebode.analysis.tune_report import feedforward_of, schedule_run, tune_run
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.configuration import Axis
@@ -95,7 +96,7 @@ def tune_command(
         low_pass=low_pass,
         coherence=coherence,
     )
-    other = None if axis is None else Axis.read(axis)
+    other = None if axis is None else Axis.read(axis).loop
     found = tune_run(directory, specification, other, loop_checked=loop_checked, entry=entry)
     moves = None if strokes is None else location(strokes)
     forward = feedforward_of(directory, found.feedback.controller, moves, entry)
@@ -107,6 +108,7 @@ def tune_command(
 
             title = directory.name if entry is None else f"{directory.name}: {entry}"
             save_tuning_picture(found, into, gains=gains, feedforward=forward, title=title)
+        store_proposal(found, into, other, entry)
         (into / "filters.h").write_text(c_header(found.feedback.biquads), encoding="utf-8")
         (into / "gains.toml").write_text(gains_toml(found.feedback.controller), encoding="utf-8")
         if odrive:
@@ -126,7 +128,7 @@ def tune_command(
         if gains is not None:
             show_schedule(gains)
         also = {"odrive.txt": odrive, "gains.csv": schedule, "tune.png": can_draw()}
-        written = ["gains.toml", "filters.h", "filters.st", *(name for name, use in also.items() if use)]
+        written = ["tune.json", "gains.toml", "filters.h", "filters.st", *(name for name, use in also.items() if use)]
         print(f"\n{into}: {', '.join(written)}")
         tell_how_to_draw()
     if not found.met:

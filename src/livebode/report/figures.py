@@ -35,10 +35,8 @@ def _figure(picture: Picture) -> Figure:
         from livebode.report.parameters import parameters_figure
 
         return parameters_figure(**picture.data)
-    if picture.what == "loop":
-        from livebode.report.loop import loop_figure
-
-        return loop_figure(**picture.data, title=tr("Open loop"), width_in=WIDTH_IN)
+    if picture.what in ("loop", "proposal"):
+        return _loop_figure(picture)
     if picture.what == "validation":
         from livebode.report.validation import validation_figure
 
@@ -62,3 +60,13 @@ def _figure(picture: Picture) -> Figure:
     from livebode.report.comparison import places_figure
 
     return places_figure(**picture.data)
+
+
+def _loop_figure(picture: Picture) -> Figure:
+    if picture.what == "loop":
+        from livebode.report.loop import loop_figure
+
+        return loop_figure(**picture.data, title=tr("Open loop"), width_in=WIDTH_IN)
+    from livebode.report.tuning import folded_tuning_figure
+
+    return folded_tuning_figure(**picture.data, width_in=WIDTH_IN)

@@ -23,6 +23,7 @@ from livebode.tuning.predicted_steps import predicted_steps
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.gridspec import SubplotSpec
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -31,6 +32,7 @@ _REACH = 2.2
 _LOWEST_DEG = -460.0
 _TIMES = 400
 _BELOW_IN = 3.6
+_FOLDED_IN = 12.0
 
 
 def save_tuning_picture(
@@ -75,12 +77,7 @@ def tuning_figure(
             2, 4, width_ratios=[1.15, 1, 1, 1], top=top, bottom=bottom, hspace=0.28, wspace=0.2, **sides
         )
         heading(figure, look, title or tr("Loop"), _facts(found), 0.05)
-        magnitude = figure.add_subplot(grid[0, 0])
-        phase = figure.add_subplot(grid[1, 0], sharex=magnitude)
-        _bode(magnitude, phase, look, found)
-        _nyquist(figure.add_subplot(grid[:, 1]), look, found)
-        _nichols(figure.add_subplot(grid[:, 2]), look, found)
-        _steps(figure.add_subplot(grid[0, 3]), figure.add_subplot(grid[1, 3]), look, found)
+        _drawn(figure, look, found, (grid[0, 0], grid[1, 0], grid[:, 1], grid[:, 2], grid[0, 3], grid[1, 3]))
         if panels:
             top, bottom = (below_in - 0.4) / height_in, 0.58 / height_in
             row = figure.add_gridspec(1, 4, top=top, bottom=bottom, wspace=0.2, **sides)
@@ -88,6 +85,28 @@ def tuning_figure(
                 draw(figure.add_subplot(row[0, column]), look)
         _legend(figure, look)
     return figure
+
+
+def folded_tuning_figure(found: ControllerProposal, *, width_in: float) -> Figure:
+    """The upper panels of `tuning_figure` in two columns, for the width of a page."""
+    look = style(False)
+    with drawing(look):
+        figure = new_figure(width_in, _FOLDED_IN)
+        grid = figure.add_gridspec(4, 2, left=0.09, right=0.98, top=0.905, bottom=0.05, hspace=0.42, wspace=0.2)
+        heading(figure, look, tr("Loop"), _facts(found), 0.09)
+        _drawn(figure, look, found, (grid[0, 0], grid[1, 0], grid[:2, 1], grid[2:, 1], grid[2, 0], grid[3, 0]))
+        _legend(figure, look, 0.09)
+    return figure
+
+
+def _drawn(figure: Figure, look: Style, found: ControllerProposal, cells: tuple[SubplotSpec, ...]) -> None:
+    """Into cells for magnitude, phase, Nyquist plot, Nichols plot, step of the reference and of a disturbance."""
+    magnitude = figure.add_subplot(cells[0])
+    phase = figure.add_subplot(cells[1], sharex=magnitude)
+    _bode(magnitude, phase, look, found)
+    _nyquist(figure.add_subplot(cells[2]), look, found)
+    _nichols(figure.add_subplot(cells[3]), look, found)
+    _steps(figure.add_subplot(cells[4]), figure.add_subplot(cells[5]), look, found)
 
 
 def _curves(found: ControllerProposal) -> list[tuple[Model, bool]]:
@@ -235,7 +254,7 @@ def _facts(found: ControllerProposal) -> str:
     return tr("promised for the worst plant within the bounds: {margins}", margins=" · ".join(words))
 
 
-def _legend(figure: Figure, look: Style) -> None:
+def _legend(figure: Figure, look: Style, left: float = 0.05) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -245,5 +264,5 @@ def _legend(figure: Figure, look: Style) -> None:
         Patch(facecolor=look.run, alpha=0.25),
     ]
     texts = [tr("before"), tr("proposed"), tr("95 % band")]
-    at = (0.05, 1 - 0.7 / figure.get_size_inches()[1])
+    at = (left, 1 - 0.7 / figure.get_size_inches()[1])
     figure.legend(handles, texts, loc="upper left", bbox_to_anchor=at, ncols=3, borderpad=0.0)

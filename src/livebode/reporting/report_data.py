@@ -15,6 +15,7 @@ from livebode.analysis.checked_loop import checked_loop
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import LoopReport, loop_report
 from livebode.analysis.parameter_track import MARGINS, Track, tracks
+from livebode.analysis.stored_proposal import newest_proposal
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration, recorded_report
@@ -25,6 +26,7 @@ from livebode.fitting import Fit
 from livebode.language import listed, recognised, tr
 from livebode.records import RunRecord
 from livebode.reporting.event_summary import EventSummary
+from livebode.tuning import ControllerProposal
 
 if TYPE_CHECKING:
     from livebode.validation import Validation
@@ -109,6 +111,8 @@ class ReportData(RunData):
         The model fitted to the mean and the data of the fit; or None and the reason.
     loop, loop_words
         Margins of the described loop; or None and the reason.
+    proposal, proposal_words
+        The newest proposal of `livebode tune`; or None and the reason.
     tracks
         Parameters and margins over the run, by model.
     judged
@@ -120,6 +124,8 @@ class ReportData(RunData):
     fit_words: str
     loop: LoopReport | None
     loop_words: str
+    proposal: ControllerProposal | None
+    proposal_words: str
     tracks: dict[str, Track]
     judged: Judged | None = None
 
@@ -155,6 +161,7 @@ def read(
     configuration, of = recorded_configuration(run.summary), averaged(run)
     fit, fit_words = _fit(configuration, of)
     loop, loop_words = _loop(run, configuration, of, fit)
+    proposal, proposal_words = _proposal(run)
     over = tracks(run, of.overview.sample, of.overview.time_s)
     event_summary = EventSummary.of(run.each_event_and_damage())
     own = recorded_report(run.summary) if header is None else header
@@ -169,6 +176,8 @@ def read(
         fit_words=fit_words,
         loop=loop,
         loop_words=loop_words,
+        proposal=proposal,
+        proposal_words=proposal_words,
         tracks=over,
         judged=judged,
     )
@@ -206,6 +215,14 @@ def _loop(
     except LivebodeError as error:
         return None, tr("No margins: {why}.", why=recognised(str(error)))
     return replace(found, responses=Responses.of(of.response), checked=checked), ""
+
+
+def _proposal(run: RunRecord) -> tuple[ControllerProposal | None, str]:
+    try:
+        found = newest_proposal(run.path, None if run.selected is None else "/".join(run.selected))
+    except LivebodeError as error:
+        return None, tr("No controller is proposed: {why}.", why=recognised(str(error)))
+    return found, "" if found else tr("No controller was proposed. Use `livebode tune RUN` to propose one.")
 
 
 def recordings(source: dict[str, Any]) -> list[str]:

@@ -12,13 +12,14 @@ from livebode.reporting import first_page, sections
 from livebode.reporting.distortion import distortion
 from livebode.reporting.limits import limits
 from livebode.reporting.measured import details, how
+from livebode.reporting.proposal_section import proposed_controller
 from livebode.reporting.report_data import Judged, ReportData, RunData, entry_title, read, recordings, written
 from livebode.reporting.verdict import verdict
 from livebode.reporting.wording import duration
 
 _SECTIONS = (
     how, sections.response, distortion, sections.tracking, sections.parameters, sections.motion, sections.margins,
-    sections.events, sections.quality, sections.validation,
+    proposed_controller, sections.events, sections.quality, sections.validation,
 )  # fmt: skip
 _APPENDIX = (details, sections.source_state, sections.settings, sections.versions)
 
