@@ -162,7 +162,9 @@ class Axis(ConfigurationSection):
             axis = axis.model_copy(update={"publish": [section.beside(folder) for section in self.publish]})
         if self.report is not None:
             axis = axis.model_copy(update={"report": self.report.beside(folder)})
-        return axis.model_copy(update={"monitoring": axis.monitoring.beside(folder)})
+        monitoring = axis.monitoring.beside(folder)
+        # A section that nobody wrote stays one that nobody wrote.
+        return axis if monitoring is axis.monitoring else axis.model_copy(update={"monitoring": monitoring})
 
 
 class _ServeOnly(ConfigurationSection):

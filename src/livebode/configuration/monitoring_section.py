@@ -45,4 +45,5 @@ class MonitoringSection(ConfigurationSection):
     def beside(self, folder: Path) -> MonitoringSection:
         """The same with relative paths from `folder`."""
         files = {"baseline": self.baseline, "gantry": self.gantry}
-        return self.model_copy(update={name: folder / file for name, file in files.items() if file is not None})
+        update = {name: folder / file for name, file in files.items() if file is not None}
+        return self.model_copy(update=update) if update else self
