@@ -27,7 +27,7 @@ def test_the_fundamental_and_not_the_window_of_the_design(window):
     assert (found.transient, found.outlying, found.distortion) == ((), (), ())
 
 
-@settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(
     period=st.one_of(st.integers(50, 20000), st.sampled_from([53, 127, 499, 1999, 4999, 9973, 19997])),
     count=st.integers(7, 300),
@@ -62,13 +62,13 @@ def test_multisines_with_offset_and_drift_never_give_a_wrong_period(
 
 
 @pytest.mark.parametrize(
-    ("snr_db", "periods", "least"), [(40, 2, 38), (20, 3, 38), (10, 5, 38), (0, 10, 36), (0, 50, 40)]
+    ("snr_db", "periods", "least"), [(40, 2, 19), (20, 3, 19), (10, 5, 19), (0, 10, 18), (0, 50, 20)]
 )
 def test_the_period_of_seven_lines_is_found_in_noise(snr_db, periods, least):
-    """Out of 40 seeded recordings at least so many give 200 samples. At 0 dB ten periods hold 2,000 samples."""
+    """Out of 20 seeded recordings at least so many give 200 samples. At 0 dB ten periods hold 2,000 samples."""
     rng = np.random.default_rng(snr_db + periods)
     right = 0
-    for _ in range(40):
+    for _ in range(20):
         try:
             right += recognise(noisy(rng, np.tile(SEVEN, periods), snr_db), 4000).period == 200
         except SignalError:
@@ -187,9 +187,9 @@ NOT_PERIODIC = {
 
 @pytest.mark.parametrize("kind", NOT_PERIODIC)
 def test_no_period_is_claimed_where_there_is_none(kind):
-    """In none of 25 seeded recordings of each kind; the stated false-alarm rate of 1e-3 expects 0.28 of all 275."""
+    """In none of 15 seeded recordings of each kind; the stated false-alarm rate of 1e-3 expects 0.17 of all 165."""
     rng = np.random.default_rng(11)
-    for _ in range(25):
+    for _ in range(15):
         with pytest.raises(SignalError):
             recognise(NOT_PERIODIC[kind](rng, int(rng.integers(200, 12000))), 1000)
 
@@ -199,7 +199,7 @@ def test_a_recording_shorter_than_two_periods_is_refused_with_its_period():
     rng = np.random.default_rng(5)
     named = 0
     for _ in range(20):
-        period = int(rng.integers(500, 8000))
+        period = int(rng.integers(500, 3000))
         lines = Lines(tuple(range(1, period // 4)), period, 1000.0)
         one = multisine(lines, phases=rng.uniform(0, 6.28, len(lines)))
         x = noisy(rng, np.resize(one, int(period * rng.uniform(1.2, 1.9))), 30)
@@ -209,7 +209,7 @@ def test_a_recording_shorter_than_two_periods_is_refused_with_its_period():
     assert named >= 18
 
 
-def test_the_period_of_ten_minutes_at_4_khz():
+def test_the_period_of_two_minutes_at_4_khz():
     rng = np.random.default_rng(0)
-    x = np.tile(SEVEN, 12000) + rng.standard_normal(2_400_000)
+    x = np.tile(SEVEN, 2400) + rng.standard_normal(480_000)
     assert recognise(x, 4000, x).period == 200

@@ -72,8 +72,8 @@ def test_97_percent_of_lags_lie_inside_for_an_independent_residual(colour: float
 
 @pytest.mark.parametrize("colour", [0.0, 0.7])
 def test_a_true_model_passes_in_the_loop(colour: float) -> None:
-    """50 runs, with hardly any excitation, so that u is mostly what the noise made of it."""
-    found = [judged(fitted(1e-6), columns) for columns in loop(50, 0.02, colour)]
+    """30 runs, with hardly any excitation, so that u is mostly what the noise made of it."""
+    found = [judged(fitted(1e-6), columns) for columns in loop(30, 0.02, colour)]
     for i, c in enumerate(found[0].correlations):
         share = np.mean([v.correlations[i].share for v in found])
         if c.name in found[0].judged_by or not colour:
@@ -82,14 +82,14 @@ def test_a_true_model_passes_in_the_loop(colour: float) -> None:
     if colour:
         assert all(v.judged_by == ("w",) for v in found)
         # Without the excitation a verdict against the model says that it may be the noise.
-        blind = judged(fitted(1e-6), loop(50, 0.02, colour)[0], excitation=None)
+        blind = judged(fitted(1e-6), loop(30, 0.02, colour)[0], excitation=None)
         assert blind.doubtful
         assert "specify the excitation" in blind.sentence or blind.verdict == "passes"
 
 
 def test_in_a_loop_lags_at_which_the_residual_comes_first_are_not_for_judging() -> None:
     """What the study's table says: ŷ before the noise is fine, ŷ after it is made of the noise."""
-    found = [judged(fitted(1e-6), columns) for columns in loop(50, 0.02, 0.0)[:30]]
+    found = [judged(fitted(1e-6), columns) for columns in loop(30, 0.02, 0.0)[:20]]
     before = np.mean([np.abs(v.correlations[1].value[:LAGS]) <= v.correlations[1].limit[:LAGS] for v in found])
     assert before < 0.9
 
