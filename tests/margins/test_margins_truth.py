@@ -46,7 +46,7 @@ def test_margins_are_those_of_python_control(case: Case) -> None:
     if not found.ok[0]:
         return
     # Its polynomial method finds crossings that are none, from the poles near z = 1; on a fine response it is right.
-    omega = 2 * np.pi * np.geomspace(0.05, 1999.9, 9_000)
+    omega = 2 * np.pi * np.geomspace(0.05, 1999.9, 12_000)
     measured = control.frd(case.response(omega / 2 / np.pi), omega, smooth=True)
     gains, turns, distances, _, at_gain, _ = control.stability_margins(measured, returnall=True)
     end = case.response(np.array([2000.0])).real

@@ -95,8 +95,8 @@ def test_in_a_loop_lags_at_which_the_residual_comes_first_are_not_for_judging() 
 
 
 def test_the_limits_make_room_for_a_fit_that_is_itself_uncertain() -> None:
-    """20 fits to noisy lines, each on fresh data: without its covariance many lags would lie outside."""
-    found = [judged(fitted(0.08, seed), columns) for seed, columns in enumerate(loop(20))]
+    """30 fits to noisy lines, each on fresh data: without its covariance many lags would lie outside."""
+    found = [judged(fitted(0.08, seed), columns) for seed, columns in enumerate(loop(30))]
     share = np.mean([v.correlations[2].share for v in found])
     assert share == pytest.approx(0.97, abs=0.02)
     assert np.mean([v.correlations[2].white_share for v in found]) < share - 0.1
