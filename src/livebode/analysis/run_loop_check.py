@@ -13,7 +13,7 @@ from livebode.analysis.loop_check import LoopCheck, check_loop
 from livebode.analysis.validation import clean_stretch
 from livebode.configuration.axis import Axis
 from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.recorded import recorded_configuration, recorded_loop
 from livebode.core import Block, Channel, RecordError, SignalError, UsageError
 from livebode.records import RunRecord
 from livebode.records.loop_check_file import write_loop_check
@@ -56,11 +56,11 @@ def check_loop_of_run(
         If the loop is not described, or its rates differ from that of the samples.
     """
     run = RunRecord.open(directory)
-    words = recorded_configuration(run.summary)
     if section is None:
-        section = LoopSection.model_validate(words.get("loop", {}))
+        section = recorded_loop(run.summary)
     given = {role: name for role, name in (channels or {}).items() if name}
-    return _checked(run, section, {**words.get("signals", {}), **given}), section
+    signals = recorded_configuration(run.summary).get("signals", {})
+    return _checked(run, section, {**signals, **given}), section
 
 
 def check_controllers_of_run(
@@ -86,13 +86,13 @@ def check_controllers_of_run(
         As of `check_loop_of_run`.
     """
     run = RunRecord.open(directory, matrix=True)
-    words = recorded_configuration(run.summary)
     if section is None:
-        section = LoopSection.model_validate(words.get("loop", {}))
+        section = recorded_loop(run.summary)
+    signals = recorded_configuration(run.summary).get("signals", {})
     roles: dict[str, list[str]] = {
         role: [names] if isinstance(names, str) else names or []
         for role in ("input", "excitation")
-        for names in [words.get("signals", {}).get(role)]
+        for names in [signals.get(role)]
     }
     if not roles["input"] or not roles["excitation"]:
         raise RecordError(

@@ -7,23 +7,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 
-from livebode.analysis.tune_report import tune_run
 from livebode.configuration.loop_section import LoopSection
 from livebode.core import LivebodeError, RecordError
 from livebode.records import to_json
 from livebode.records.inside import read_bytes
 from livebode.tuning import ControllerProposal, LoopSpecification
 
-FILE = "tune.json"
+_FILE = "tune.json"
 _BYTES_MAX = 1 << 20
 _SAME = 1e-3  # of each value: another processor rounds differently
 
 
 class _Stored(BaseModel):
-    model_config = ConfigDict(extra="ignore", strict=True)
-
     specification: LoopSpecification
     controller: dict[str, Any]
     loop: LoopSection | None = None
@@ -34,7 +31,7 @@ def store_proposal(found: ControllerProposal, directory: Path, loop: LoopSection
     """Write tune.json: the proposal, and the description of the loop and the entry that were given for it."""
     described = None if loop is None else loop.model_dump(mode="json", exclude_defaults=True, by_alias=True)
     text = to_json(found.plain() | {"loop": described, "entry": entry}, indent=2)
-    (directory / FILE).write_text(text + "\n", encoding="utf-8")
+    (directory / _FILE).write_text(text + "\n", encoding="utf-8")
 
 
 def newest_proposal(directory: Path, entry: str | None = None) -> ControllerProposal | None:
@@ -54,14 +51,16 @@ def newest_proposal(directory: Path, entry: str | None = None) -> ControllerProp
     TuneError
         If nothing can be proposed any more.
     """
-    if not (directory / FILE).exists():
+    if not (directory / _FILE).exists():
         return None
     try:
-        stored = _Stored.model_validate_json(read_bytes(directory, FILE, _BYTES_MAX), strict=False)
+        stored = _Stored.model_validate_json(read_bytes(directory, _FILE, _BYTES_MAX))
     except (OSError, ValidationError, LivebodeError):
         raise _again(directory, "is damaged") from None
     if stored.entry != entry:
         return None
+    from livebode.analysis.tune_report import tune_run  # with SciPy
+
     found = tune_run(directory, stored.specification, stored.loop, loop_checked=True, entry=entry)
     before, now = (np.array([*_numbers(one)]) for one in (stored.controller, found.plain()["controller"]))
     if before.shape != now.shape or not np.allclose(before, now, rtol=_SAME, atol=0.0):
@@ -72,9 +71,9 @@ def newest_proposal(directory: Path, entry: str | None = None) -> ControllerProp
 def _again(directory: Path, what: str) -> RecordError:
     return RecordError(
         "proposal-invalid",
-        f"{str(directory / FILE)!r} {what}",
+        f"{str(directory / _FILE)!r} {what}",
         "use livebode tune again",
-        path=str(directory / FILE),
+        path=str(directory / _FILE),
     )
 
 

@@ -9,7 +9,7 @@ from livebode.analysis.places import by_place
 from livebode.analysis.strokes import read_strokes
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.matrix import check_controllers, matrix_loop
-from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.recorded import recorded_loop
 from livebode.core import PID, Cascade, LivebodeError, Loop, PositionPD, Responses, SignalError, TuneError
 from livebode.locations import Location
 from livebode.mimo import equivalent_plant, mean_matrix
@@ -69,7 +69,7 @@ def _tune_entry(
     run = RunRecord.open(directory, matrix=True)
     output, input = entry_named(str(directory), run.summary, entry)
     if section is None:
-        section = LoopSection.model_validate(recorded_configuration(run.summary).get("loop", {}))
+        section = recorded_loop(run.summary)
     responses = mean_matrix(run.matrix())
     rate_hz, (outputs, inputs) = responses.lines.rate_hz, (responses.outputs, responses.inputs)
     own = section.of_controller(output, input).build(rate_hz)
@@ -106,23 +106,20 @@ def _inputs(directory: Path, section: LoopSection | None, loop_checked: bool) ->
     """Mean responses by place, the loop, and whether its description was checked."""
     run = RunRecord.open(directory)
     if section is None:
-        section = LoopSection.model_validate(recorded_configuration(run.summary).get("loop", {}))
+        section = recorded_loop(run.summary)
     responses = Responses.join(list(run.steady_batches()))
     checked = _confirmed(directory, section) or loop_checked
     return by_place(responses), section.build(responses.lines.rate_hz), checked
 
 
 def feedforward_of(
-    directory: Path, controller: PID | Cascade | PositionPD, strokes: Location | None = None, entry: str | None = None
+    directory: Path, controller: PID | Cascade | PositionPD, strokes: Location | None = None
 ) -> Feedforward | None:
     """Feedforward for a run: inertia from its responses, friction from `strokes` or else the run's own recording.
 
     None where the lines do not show the inertia, or it is not known whether the output is a position or a velocity.
-    Without friction where the run's own recording has no strokes in both directions. None of an entry of a matrix run:
-    several motors share the inertia.
+    Without friction where the run's own recording has no strokes in both directions.
     """
-    if entry is not None:
-        return None
     run = RunRecord.open(directory)
     kind = _kind(run.kinds.output, controller)
     if kind is None:

@@ -99,7 +99,8 @@ def tune_command(
     other = None if axis is None else Axis.read(axis).loop
     found = tune_run(directory, specification, other, loop_checked=loop_checked, entry=entry)
     moves = None if strokes is None else location(strokes)
-    forward = feedforward_of(directory, found.feedback.controller, moves, entry)
+    # Several motors share the inertia that an entry of a matrix would show.
+    forward = feedforward_of(directory, found.feedback.controller, moves) if entry is None else None
     gains = schedule_run(directory, specification, other, loop_checked=loop_checked) if schedule else None
     into = results_directory(directory)
     with writing(into, RecordError):

@@ -44,6 +44,15 @@ def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
+def recorded_loop(summary: dict[str, Any]) -> LoopSection:
+    """The [loop] with which a run was recorded; RecordError as of `recorded_configuration`.
+
+    >>> recorded_loop({"configuration": {"loop": {"velocity": {"gain": 0.2, "rate_hz": 4000.0}}}}).velocity.gain
+    0.2
+    """
+    return LoopSection.model_validate(recorded_configuration(summary).get("loop", {}))
+
+
 def recorded_report(summary: dict[str, Any]) -> ReportSection:
     """The [report] with which a run was recorded; where it names no machine, with the path of [machine].
 

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from livebode.analysis.checked_loop import checked_loop
 from livebode.analysis.places import by_place
-from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.recorded import recorded_loop
 from livebode.core import Cascade, Gain, LivebodeError, Model, Responses
 from livebode.dashboard.overlays import grid_hz
 from livebode.dashboard.past import Past
@@ -37,11 +36,10 @@ def loop_trial(
     past: Past, quantities: Quantities, summary: dict[str, Any], plant: Callable[[], PlantBand]
 ) -> dict[str, Any]:
     """For the page, as plain data; `why_not` if nothing can be tried, `band_why_not` if the bounds are unknown."""
-    feedback = quantities.loop.feedback if quantities.loop is not None else None
+    feedback = quantities.feedback
     if feedback is None and quantities.own != "open loop":
         return {"why_not": quantities.why_not("open loop")}
-    section = LoopSection.model_validate(recorded_configuration(summary).get("loop", {}))
-    checked = checked_loop(past.directory, section)
+    checked = checked_loop(past.directory, recorded_loop(summary))
     model = feedback or Gain(1.0)  # without a description the measured L is the plant, and F is a factor
     drawn_hz, rate_hz = grid_hz(quantities.lines), quantities.lines.rate_hz
     parts = FeedbackParts.of(model, drawn_hz)
@@ -70,7 +68,7 @@ def plant_band(past: Past, quantities: Quantities) -> PlantBand:
     """
     limits = LoopSpecification()
     mean = by_place(_responses(past))
-    if quantities.loop is not None and quantities.loop.feedback is not None:
+    if quantities.feedback is not None:
         mean = quantities.of_responses(mean, "plant")
     return PlantBand.of(mean, quantities.lines.rate_hz, coherence=limits.coherence, confidence=limits.confidence)
 

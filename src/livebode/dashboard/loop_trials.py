@@ -25,7 +25,7 @@ class LoopTrials:
 
     def steps(self, axis: int, past: Past, quantities: Quantities, text: str) -> dict[str, Any]:
         """Steps and torque noise before and after, of the plant that the page has."""
-        feedback = quantities.loop.feedback if quantities.loop is not None else None
+        feedback = quantities.feedback
         if feedback is None and quantities.own != "open loop":
             raise ServerError("quantity-unavailable", quantities.why_not("open loop"), "describe the loop under [loop]")
         model = feedback or Gain(1.0)

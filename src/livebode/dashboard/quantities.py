@@ -11,9 +11,8 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Lines, Loop, PlantKinds, Quantity, Responses, ServerError, split_plant_unit
+from livebode.configuration.recorded import recorded_loop
+from livebode.core import Lines, Loop, Model, PlantKinds, Quantity, Responses, ServerError, split_plant_unit
 from livebode.estimation.quantities import convert
 from livebode.records.run import kinds_in, lines_in
 
@@ -56,12 +55,15 @@ class Quantities:
         found = summary["found"]
         lines = lines_in(found)
         try:
-            loop = LoopSection.model_validate(recorded_configuration(dict(summary)).get("loop", {})).build(
-                lines.rate_hz
-            )
+            loop = recorded_loop(dict(summary)).build(lines.rate_hz)
         except ValueError:  # of livebode or of pydantic
             loop = None
         return cls(found["quantity"], found["unit"], lines, loop, kinds_in(found))
+
+    @property
+    def feedback(self) -> Model | None:
+        """The described controllers; None without a description."""
+        return None if self.loop is None else self.loop.feedback
 
     def why_not(self, quantity: Quantity) -> str:
         """The reason why the page cannot show a quantity; empty if it can."""

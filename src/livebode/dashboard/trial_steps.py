@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,7 +62,7 @@ def _bandwidth_hz(plant: PlantBand, feedback: Model) -> float:
 
 def _side(plant: PlantBand, feedback: Model, described: Model, time_s: Floats, of_plant: bool) -> dict[str, Any]:
     banded = _certain(plant, feedback)
-    reference, disturbance = predicted_steps(_first_place(plant), feedback, time_s)
+    reference, disturbance = predicted_steps(plant.at([0]), feedback, time_s)
     return {
         "reference": _plain(reference, banded),
         "disturbance": _plain(disturbance, banded) if of_plant else None,
@@ -71,15 +70,10 @@ def _side(plant: PlantBand, feedback: Model, described: Model, time_s: Floats, o
     }
 
 
-def _first_place(plant: PlantBand) -> PlantBand:
-    rows = {name: getattr(plant, name)[:1] for name in ("value", "radius", "spread", "sigma")}
-    return replace(plant, **rows)
-
-
 def _distances(plant: PlantBand, feedback: Model) -> tuple[Floats, Floats]:
     """|1 + L|, and how much less or more it may be within the bounds; above the lines only |L| is limited."""
-    loop = plant.value * feedback.response(plant.frequency_hz)
-    radius = plant.radius * np.abs(feedback.response(plant.frequency_hz))
+    behind = feedback.response(plant.frequency_hz)
+    loop, radius = plant.value * behind, plant.radius * np.abs(behind)
     return np.where(plant.above, 1.0, np.abs(1 + loop)), np.where(plant.above, np.abs(loop), radius)
 
 

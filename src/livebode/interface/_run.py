@@ -13,9 +13,8 @@ from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import loop_report
 from livebode.configuration.axis import Axis
 from livebode.configuration.fit_section import FitSection
-from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.machine_section import MachineSection
-from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.recorded import recorded_configuration, recorded_loop
 from livebode.core import (
     Event,
     Lines,
@@ -270,8 +269,7 @@ class Run:
         """
         responses = Responses.join(list(self._record.steady_batches()))
         if loop is None:
-            section = LoopSection.model_validate(recorded_configuration(self._record.summary).get("loop", {}))
-            loop = section.build(self.lines.rate_hz)
+            loop = recorded_loop(self._record.summary).build(self.lines.rate_hz)
         return loop_report(fit or self.fit(), self._averaged.words, responses, loop).margins
 
     def _section(self, given: Mapping[str, Any]) -> FitSection:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, nan
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -54,11 +54,10 @@ def read_matrix(directory: Path, header: ReportSection | None = None) -> MatrixR
             "none of the matrices has a valid column at any line",
             "compare [experiments] with the recording: dwell_periods, settle_periods, start",
         )
-    spans_s = (begin_s, end_s) if begin_s <= end_s else (nan, nan)
     return MatrixReportData(
         run=run,
         configuration=recorded_configuration(run.summary),
-        extent=Extent(count, incomplete, spans_s, int(newest.sample[0])),
+        extent=Extent(count, incomplete, (begin_s, end_s), int(newest.sample[0])),
         event_summary=EventSummary.of(run.each_event_and_damage()),
         header=recorded_report(run.summary) if header is None else header,
         newest=newest,

@@ -12,10 +12,9 @@ from livebode.core.document import Finding, Listing, Paragraph, Part, Picture, P
 from livebode.language import number, recognised, tr, trn
 from livebode.reporting.matrix_data import MatrixReportData
 from livebode.reporting.measured import about_bounds, grid_rows, matrix_in_words, signal_rows
-from livebode.reporting.wording import BOUND_95, lines_of, pairs, polar, share, with_bound
+from livebode.reporting.wording import BOUND_95, line_table, lines_of, pairs, polar, share, with_bound
 
 _ACROSS, _DOWN = 3, 3  # Bode plots in one picture; more are illegible on a page
-_LINES_SHOWN = 120
 
 
 def singular_values(of: MatrixReportData) -> Picture:
@@ -121,15 +120,9 @@ def inputs(of: MatrixReportData) -> Section:
         )
         for f, condition, size, around in zip(newest.frequency_hz, newest.condition[0], sizes, radius)
     ]  # fmt: skip
-    step = -(-len(rows) // _LINES_SHOWN)
-    note = tr(
-        "{shown} of {count} lines are shown; the picture and the record contain all.",
-        shown=len(rows[::step]), count=len(rows),
-    )  # fmt: skip
     headings: tuple[str, ...] = ("Hz", tr("condition number of the inputs"), tr("largest singular value"), "±")
     headings += (tr("smallest singular value"), "±") if several else ()
-    table = PrintedTable(headings, tuple(rows[::step]), tuple(range(len(headings))), note if step > 1 else "")
-    return Section(tr("Inputs and singular values"), (*parts, table))
+    return Section(tr("Inputs and singular values"), (*parts, line_table(headings, rows)))
 
 
 def about_columns(newest: MatrixResponses) -> list[Finding]:

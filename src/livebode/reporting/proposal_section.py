@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import TYPE_CHECKING
 
 from livebode.core.document import Listing, Picture, PrintedTable, Section
 from livebode.language import number, recognised, tr
 from livebode.reporting.report_data import ReportData
-
-if TYPE_CHECKING:
-    from livebode.tuning import ControllerProposal
+from livebode.tuning import ControllerProposal
+from livebode.tuning.gains_text import gains_toml
 
 
 def proposed_controller(of: ReportData) -> Section | str:
@@ -18,8 +16,6 @@ def proposed_controller(of: ReportData) -> Section | str:
     found = of.proposal
     if found is None:
         return of.proposal_words
-    from livebode.tuning.gains_text import gains_toml  # with SciPy
-
     caption = tr("Dashed: as described. Solid: proposed. Bands: every plant and place within the 95 % bounds.")
     return Section(
         tr("Proposed controller"),

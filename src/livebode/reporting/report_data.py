@@ -15,6 +15,7 @@ from livebode.analysis.checked_loop import checked_loop
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import LoopReport, loop_report
 from livebode.analysis.parameter_track import MARGINS, Track, tracks
+from livebode.analysis.stored_proposal import newest_proposal
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.recorded import recorded_configuration, recorded_report
@@ -25,9 +26,9 @@ from livebode.fitting import Fit
 from livebode.language import listed, recognised, tr
 from livebode.records import RunRecord
 from livebode.reporting.event_summary import EventSummary
+from livebode.tuning import ControllerProposal
 
 if TYPE_CHECKING:
-    from livebode.tuning import ControllerProposal
     from livebode.validation import Validation
 
 
@@ -217,16 +218,11 @@ def _loop(
 
 
 def _proposal(run: RunRecord) -> tuple[ControllerProposal | None, str]:
-    nothing = tr("No controller was proposed. Use `livebode tune RUN` to propose one.")
-    if not (run.path / "tune.json").exists():
-        return None, nothing
-    from livebode.analysis.stored_proposal import newest_proposal  # with SciPy
-
     try:
-        found = newest_proposal(run.path, None if run.selected is None else "/".join(run.selected))
+        found = newest_proposal(run.path, run.entry_name)
     except LivebodeError as error:
         return None, tr("No controller is proposed: {why}.", why=recognised(str(error)))
-    return found, "" if found else nothing
+    return found, "" if found else tr("No controller was proposed. Use `livebode tune RUN` to propose one.")
 
 
 def recordings(source: dict[str, Any]) -> list[str]:

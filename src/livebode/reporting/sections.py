@@ -18,6 +18,7 @@ from livebode.reporting.alarms import alarms
 from livebode.reporting.report_data import ReportData, RunData, by_schedule
 from livebode.reporting.wording import (
     BOUND_95,
+    line_table,
     lines_of,
     pairs,
     polar_rows,
@@ -26,7 +27,6 @@ from livebode.reporting.wording import (
     with_bound,
 )
 
-_LINES_SHOWN = 120
 _PANELS, _CURVES = 8, 700  # parameters that are drawn, and responses per curve
 _TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and responses per trace
 
@@ -52,16 +52,8 @@ def response(of: ReportData) -> Section:
         (number(f, "g"), *polar, number(c, ".4f") if isfinite(c) else "—", share(n, of.of.count))
         for f, polar, c, n in zip(frequency, polar_rows(one, BOUND_95), one.coherence, of.of.valid)
     ]
-    step = -(-len(rows) // _LINES_SHOWN)
-    note = tr(
-        "{shown} of {count} lines are shown; the picture and the record contain all.",
-        shown=len(rows[::step]), count=len(rows),
-    )  # fmt: skip
-    table = PrintedTable(
-        ("Hz", f"dB{_re(of)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid")),
-        tuple(rows[::step]), tuple(range(7)), note if step > 1 else "",
-    )  # fmt: skip
-    return Section(tr("Frequency response"), (table,))
+    headings = ("Hz", f"dB{_re(of)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid"))
+    return Section(tr("Frequency response"), (line_table(headings, rows),))
 
 
 def tracking(of: ReportData) -> Section:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import floor, isfinite, log10
 from typing import Any
 
@@ -14,6 +15,7 @@ from livebode.language import number, tr, trn
 
 BOUND_95 = float(np.sqrt(np.log(20.0)))
 """`Response.bound(BOUND_95)` covers the true value with 95 %."""
+_LINES_SHOWN = 120
 
 
 def lines_of(number: int) -> str:
@@ -100,6 +102,16 @@ def polar_rows(one: Response, c: float) -> list[tuple[str, str, str, str]]:
 def pairs(rows: list[tuple[str, str]]) -> PrintedTable:
     """A table of names and values, without empty values."""
     return PrintedTable(("", ""), tuple((name, value) for name, value in rows if value))
+
+
+def line_table(headings: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> PrintedTable:
+    """A table of numbers with a row for each line; of many lines it shows every n-th, and says so."""
+    step = -(-len(rows) // _LINES_SHOWN)
+    note = tr(
+        "{shown} of {count} lines are shown; the picture and the record contain all.",
+        shown=len(rows[::step]), count=len(rows),
+    )  # fmt: skip
+    return PrintedTable(headings, tuple(rows[::step]), tuple(range(len(headings))), note if step > 1 else "")
 
 
 def to_toml(values: dict[str, Any]) -> str:

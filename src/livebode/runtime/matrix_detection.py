@@ -77,8 +77,7 @@ def _check_noise(settings: MatrixSettings) -> None:
     outputs = len(settings.output)
     if settings.noise_dof > outputs:
         return
-    apart = 1 if settings.average else 2
-    needed = outputs // settings.count + 1 + apart
+    needed = settings.memory + (outputs - settings.noise_dof) // settings.count + 1
     raise ConfigError(
         "value-mismatch",
         f"monitoring needs the noise of {outputs} outputs, but experiments.memory = {settings.memory} gives "

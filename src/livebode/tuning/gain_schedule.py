@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -71,13 +71,9 @@ class GainSchedule:
             "share": self.share,
             "position": self.position.tolist(),
             **{name: np.exp(column).tolist() for name, column in zip(self.names, self.logarithms.T)},
-            "promised": [_plain(one) for one in self.promised],
-            "common_promised": [_plain(one) for one in self.common_promised],
+            "promised": [one.plain() for one in self.promised],
+            "common_promised": [one.plain() for one in self.common_promised],
         }
-
-
-def _plain(one: PredictedMargins) -> dict[str, float | None]:
-    return {name: value if np.isfinite(value) else None for name, value in asdict(one).items()}
 
 
 def gain_schedule(

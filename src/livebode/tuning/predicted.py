@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +31,10 @@ class PredictedMargins:
     max_sensitivity: float
     disk_margin: float
     bandwidth_hz: float
+
+    def plain(self) -> dict[str, float | None]:
+        """For JSON; infinite ones are null."""
+        return {name: value if isfinite(value) else None for name, value in vars(self).items()}
 
 
 def disk_margin(loop: ArrayLike) -> float:

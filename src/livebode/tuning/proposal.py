@@ -286,7 +286,7 @@ def _no_start(plant: PlantBand, lines: Lines) -> TuneError:
 
 
 def _margins(of: PredictedMargins | None) -> dict[str, float | None] | None:
-    return None if of is None else _plain(asdict(of))
+    return None if of is None else of.plain()
 
 
 def _plain(values: dict[str, Any]) -> dict[str, Any]:
