@@ -11,9 +11,10 @@ from livebode.core import FitError, MatrixResponses
 def mean_matrix(responses: MatrixResponses) -> MatrixResponses:
     """The mean of the rows that share no window, from the newest backwards, as one row; it needs at least one row.
 
-    A row that contains all repetitions is retained as it is. `noise` is the mean of that of the rows used. Its degrees
-    of freedom are those of one row, or those between the rows if these are more. A column is valid where it is in all
-    rows used.
+    A row that contains all repetitions is retained as it is. Rows of fewer repetitions, as early in a run, have less
+    weight: that of value and time is the reciprocal of the row's `spread`, that of `noise` the row's degrees of
+    freedom. The noise of rows may be from the same windows, so its degrees of freedom are their mean with these
+    weights, or those between the rows if these are more. A column is valid where it is in all rows used.
 
     Raises
     ------
@@ -48,22 +49,23 @@ def apart(responses: MatrixResponses, rows: NDArray[np.intp]) -> NDArray[np.intp
 
 
 def _mean(of: MatrixResponses) -> MatrixResponses:
-    number = len(of)
-    reason = of.reason.max(axis=0, keepdims=True)
-    between = (number - 1.0) * len(of.inputs)
+    between = (len(of) - 1.0) * len(of.inputs)
     with np.errstate(invalid="ignore"):
+        weight = 1.0 / np.einsum("rkii->rk", of.spread).real
+        weight = (weight / weight.sum(axis=0))[:, :, np.newaxis, np.newaxis]
         return MatrixResponses(
             of.lines,
             of.outputs,
             of.inputs,
-            np.mean(of.value, axis=0, keepdims=True),
-            np.mean(of.noise, axis=0, keepdims=True),
-            np.mean(of.spread, axis=0, keepdims=True) / number,
-            np.array([max(float(of.dof.min()), between)]),
+            np.sum(weight * of.value, axis=0, keepdims=True),
+            np.average(of.noise, axis=0, weights=of.dof)[np.newaxis],
+            np.sum(weight**2 * of.spread, axis=0, keepdims=True),
+            np.array([max(float(np.average(of.dof, weights=of.dof)), between)]),
             np.mean(of.coherence, axis=0, keepdims=True),
             np.max(of.condition, axis=0, keepdims=True),
-            reason,
+            of.reason.max(axis=0, keepdims=True),
             of.first[:1],
             of.sample[-1:],
-            np.array([float(np.mean(of.time_s))]),
+            np.array([float(np.average(of.time_s, weights=np.nanmean(weight, axis=(1, 2, 3))))]),
+            of.units,
         )
