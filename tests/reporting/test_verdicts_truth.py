@@ -57,6 +57,16 @@ def test_a_run_without_a_baseline_is_not_assessed(tmp_path: Path) -> None:
     assert document.tones[changes.tone] == "not assessed"
 
 
+@pytest.mark.parametrize(("rows", "gaps", "tone"), [((0,), 0, "ok"), ((0, 7), 0, "check"), ((0, 7), 1, "ok")], ids=str)
+def test_invalid_windows_of_a_start_and_a_gap_are_expected(tmp_path: Path, rows: Any, gaps: int, tone: str) -> None:
+    """Windows overlap by half, so that each start makes one of ten responses invalid."""
+    responses = measured(10, 1)
+    responses.valid[list(rows)] = False
+    document = run_report(write_run(tmp_path / "run", responses, counts={"gaps": gaps}), made=MADE)
+    (found,) = [f for f in document.verdict if "have an invalid line" in f.text]
+    assert found.tone == tone
+
+
 def test_a_comparison_is_headed_by_the_alarm_of_a_run_though_no_line_differs(tmp_path: Path) -> None:
     before, after = monitored(tmp_path / "a", 1, 0, 0), monitored(tmp_path / "b", 2, 1, 1)
     document = Comparison.of(before, after).document(MADE)

@@ -9,6 +9,7 @@ from livebode.analysis.parameter_track import MARGINS, failed
 from livebode.core.document import Finding, Tone
 from livebode.language import listed, number, recognised, tr, trn
 from livebode.margins import worst
+from livebode.records.run import RunRecord
 from livebode.reporting.alarms import alarms
 from livebode.reporting.report_data import ReportData, RunData
 from livebode.reporting.wording import lines_of, share
@@ -110,11 +111,18 @@ def _valid(of: ReportData) -> list[Finding]:
         "or a gap is always invalid).",
         every, lines=lines_of(len(of.run.lines)), bad=bad, share=share(bad, every),
     )  # fmt: skip
-    found = [Finding("check" if bad > _INVALID_MANY * every else "ok", text)]
+    unexpected = bad - _after_starts(of.run)
+    found = [Finding("check" if unexpected > _INVALID_MANY * every else "ok", text)]
     if never := [f"{number(f, 'g')} Hz" for f, n in zip(of.run.lines.frequency_hz, of.of.valid) if not n]:
         lines = listed(never[:8]) + " …" * (len(never) > 8)
         found.append(Finding("check", tr("Never valid: {lines}.", lines=lines)))
     return found
+
+
+def _after_starts(run: RunRecord) -> int:
+    """Responses whose window contains the start or a gap."""
+    hop = run.found.get("hop", run.lines.window)
+    return int((1 + run.summary.get("counts", {}).get("gaps", 0)) * (-(-run.lines.window // hop) - 1))
 
 
 def _fits(of: ReportData) -> list[Finding]:
