@@ -172,17 +172,17 @@ def _checked(run: RunRecord, section: LoopSection, channels: dict[str, Any]) -> 
             expected_hz=run.lines.rate_hz,
         )
     named = {role: str(name) for role, name in roles.items()}
-    signals = LoopSignals.of(block, run.lines, **named, starts=_settled(run, block) if run.is_matrix else None)
-    return check_loop(signals, section)
+    of = run.found["experiments"] if run.is_matrix else None
+    starts = of and settled_starts(block, run.lines.window, of["dwell_periods"], of["settle_periods"], of["start"])
+    return check_loop(LoopSignals.of(block, run.lines, **named, starts=starts), section)
 
 
-def _settled(run: RunRecord, block: Block) -> NDArray[np.intp]:
+def settled_starts(block: Block, period: int, dwell: int, settle: int, start: int = 0) -> NDArray[np.intp]:
     """Begins of the windows of two periods in the settled part of each experiment of a matrix run.
 
-    Where that part is one period, its window also contains the period before it.
+    Where that part is one period, its window also contains the period before it. `dwell` and `settle` are in periods,
+    `start` is the sample of the first experiment; SignalError if an experiment has one period.
     """
-    of, period = run.found["experiments"], run.lines.window
-    dwell, settle = of["dwell_periods"], of["settle_periods"]
     if dwell < 2:
         raise SignalError(
             "too-short",
@@ -192,8 +192,8 @@ def _settled(run: RunRecord, block: Block) -> NDArray[np.intp]:
             limit=2 * period,
         )
     places = np.arange(min(settle, dwell - 2), dwell - 1) * period
-    first = -((block.start - of["start"]) // -(dwell * period)) - 1  # the experiment in which the block begins
-    begins = of["start"] - block.start + dwell * period * np.arange(first, first + len(block) // (dwell * period) + 2)
+    first = -((block.start - start) // -(dwell * period)) - 1  # the experiment in which the block begins
+    begins = start - block.start + dwell * period * np.arange(first, first + len(block) // (dwell * period) + 2)
     starts = (begins[:, np.newaxis] + places).ravel()
     return np.asarray(starts[(starts >= 0) & (starts + 2 * period <= len(block))], dtype=np.intp)
 
