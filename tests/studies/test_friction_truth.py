@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, SignalError, UsageError
 from livebode.motion import FrictionCurve, friction_curve
-from studies.friction import STRIBECK, measured, truth
+from studies.friction import CASES, STRIBECK, measured, truth
 from tests.support.command import livebode
 from tests.support.real_recordings import recording
 
@@ -66,7 +66,7 @@ def test_friction_over_the_position_is_found() -> None:
 
 
 def test_stribeck_friction_of_the_simulated_axis_is_found() -> None:
-    curve, true = measured(STRIBECK, seed=1), truth(STRIBECK)
+    curve, true = measured(CASES["with Stribeck"], seed=1), truth(STRIBECK)
     for name in curve.names:
         assert abs(curve[name] - true[name]) <= 1.3 * curve.bound(0.99)[curve.index(name)]
     assert curve["stribeck"] == pytest.approx(true["stribeck"], rel=0.2)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.analysis.strokes import MotionSamples
-from livebode.core import SignalError, UsageError
+from livebode.core import Block, SignalError, UsageError
 from livebode.motion.angle_orders import (
     Shaft,
     ShaftOrders,
@@ -21,6 +21,7 @@ from livebode.motion.angle_orders import (
     usable_windows,
 )
 from livebode.motion.friction_curve import FrictionCurve, friction_curve
+from livebode.motion.line_subtraction import without_lines
 from livebode.motion.order_changes import OrderChange, order_changes
 from livebode.motion.position_errors import PositionErrors, position_errors
 from livebode.motion.smooth_motion import SmoothKernel
@@ -50,7 +51,9 @@ class OrderReport:
     speed_hz
         Slowest and fastest turns of the motor in a window, per second.
     lines_hz
-        Lines of the time that were left out because they were specified.
+        Lines of the time that were specified.
+    subtracted_hz
+        Those of them that were told from the orders and subtracted; windows that meet the others are left out.
     found_lines
         Lines of the time that nobody specified, and that were found and left out.
     motion
@@ -65,6 +68,7 @@ class OrderReport:
     strokes: int
     speed_hz: tuple[float, float]
     lines_hz: Floats
+    subtracted_hz: Floats
     found_lines: list[TimeLine]
     motion: MotionSamples
     unit: str
@@ -88,6 +92,7 @@ class OrderReport:
             "strokes": self.strokes,
             "turns_per_s": list(self.speed_hz),
             "lines_hz": self.lines_hz.tolist(),
+            "subtracted_lines_hz": self.subtracted_hz.tolist(),
             "found_lines": [{"frequency_hz": one.frequency_hz, "amplitude": one.amplitude} for one in self.found_lines],
             "inertia": self.friction["inertia"],
             "inertia_bound": float(self.friction.bound()[self.friction.index("inertia")]),
@@ -143,39 +148,79 @@ def orders_of(
             "out-of-range", f"{turn=} is not a positive number", "give the units of the angle in one turn",
             argument="turn", value=turn,
         )  # fmt: skip
-    curve = friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind, band_hz=band_hz)
-    kernel = SmoothKernel(_band(motion.block.rate_hz), motion.block.rate_hz)
-    rest, acceleration, speed = _torque(motion, curve, kernel)
-    scale = 2 * np.pi / per_turn
-    inner = slice(kernel.reach, len(motion.block) - kernel.reach)
-    turned = _angle(motion, angle)[inner] * scale
-    signals = np.stack([rest, acceleration])
-    slowest = _slowest(speed)
-    strokes = strokes_of(turned, speed, signals, motion.block.rate_hz, slowest)
-    limit = min(highest_hz, _most_hz(kernel))
     known = np.zeros(0) if lines_hz is None else np.asarray(lines_hz, dtype=np.float64)
-    sigma_j = float(curve.sigma[curve.index("inertia")])
+    search = _Search(motion, shafts, _angle(motion, angle) * 2 * np.pi / per_turn, known, highest_hz)
+    found = search.result(friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind,
+                                         band_hz=band_hz))  # fmt: skip
+    if any(one.seen.any() for one in found.shafts):
+        quiet = search.without_ripple(found.shafts)
+        found = search.result(friction_curve(quiet, input=motion.input, output=motion.output, kind=motion.kind,
+                                             band_hz=band_hz))  # fmt: skip
+    return found
 
-    def shaft_found(shaft: Shaft, lines: Floats) -> tuple[ShaftOrders, PositionErrors, list[float]]:
-        windows = angle_windows(strokes, shaft)
-        middle = (windows.slowest + windows.fastest)[:, np.newaxis] / 2 * np.array(shaft.orders)
-        value = windows.value / _left(kernel, middle)
-        extra = sigma_j * np.abs(np.nanmean(value[1], axis=0))
-        speeds = [float(windows.slowest.min()) / shaft.turns, float(windows.fastest.max()) / shaft.turns]
-        use, _ = usable_windows(windows, shaft, lines, limit)
-        errors = position_errors(windows, shaft, value[0], use, curve["inertia"])
-        return shaft_orders(windows, shaft, value[0], extra, lines, limit), errors, speeds
 
-    found = [shaft_found(shaft, known) for shaft in shafts]
-    lines = _unknown_lines(strokes, [one for one, _, _ in found], known, limit, kernel)
-    if lines:
-        away = np.concatenate([known, [line.frequency_hz for line in lines]])
-        found = [shaft_found(shaft, away) for shaft in shafts]
-    speeds = [speed for _, _, both in found for speed in both]
-    unit = motion.block.channels[motion.block.index(motion.input)].unit
-    turns_per_s = (min(speeds), max(speeds))
-    orders, errors = [one for one, _, _ in found], [one for _, one, _ in found]
-    return OrderReport(orders, errors, curve, len(strokes), turns_per_s, known, lines, motion, unit)
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What a search for orders needs beside the friction; the angle is that of the motor in rad, (samples,)."""
+
+    motion: MotionSamples
+    shafts: Sequence[Shaft]
+    angle: Floats
+    known_hz: Floats
+    highest_hz: float
+
+    def result(self, curve: FrictionCurve) -> OrderReport:
+        """The orders with this friction and inertia."""
+        motion, rate_hz = self.motion, self.motion.block.rate_hz
+        kernel = SmoothKernel(_band(rate_hz), rate_hz)
+        rest, acceleration, speed = _torque(motion, curve, kernel)
+        inner = slice(kernel.reach, len(motion.block) - kernel.reach)
+        signals = np.stack([rest, acceleration])
+        limit = min(self.highest_hz, _most_hz(kernel))
+        low = self.known_hz <= limit
+        strokes = strokes_of(self.angle[inner], speed, signals, rate_hz, _slowest(speed))
+        strokes, meeting = without_lines(strokes, self.shafts, self.known_hz[low])
+        remaining = np.concatenate([meeting, self.known_hz[~low]])
+
+        def shaft_found(shaft: Shaft, lines: Floats) -> tuple[ShaftOrders, PositionErrors, list[float]]:
+            windows = angle_windows(strokes, shaft)
+            middle = (windows.slowest + windows.fastest)[:, np.newaxis] / 2 * np.array(shaft.orders)
+            value = windows.value / _left(kernel, middle)
+            extra = float(curve.sigma[curve.index("inertia")]) * np.abs(np.nanmean(value[1], axis=0))
+            speeds = [float(windows.slowest.min()) / shaft.turns, float(windows.fastest.max()) / shaft.turns]
+            use, _ = usable_windows(windows, shaft, lines, limit)
+            errors = position_errors(windows, shaft, value[0], use, curve["inertia"])
+            return shaft_orders(windows, shaft, value[0], extra, lines, limit), errors, speeds
+
+        found = [shaft_found(shaft, remaining) for shaft in self.shafts]
+        lines = _unknown_lines(strokes, [one for one, _, _ in found], self.known_hz, limit, kernel)
+        if lines:
+            away = np.concatenate([remaining, [line.frequency_hz for line in lines]])
+            found = [shaft_found(shaft, away) for shaft in self.shafts]
+        speeds = [speed for _, _, both in found for speed in both]
+        return OrderReport(
+            shafts=[one for one, _, _ in found],
+            errors=[one for _, one, _ in found],
+            friction=curve,
+            strokes=len(strokes),
+            speed_hz=(min(speeds), max(speeds)),
+            lines_hz=self.known_hz,
+            subtracted_hz=np.setdiff1d(self.known_hz, remaining),
+            found_lines=lines,
+            motion=motion,
+            unit=motion.block.channels[motion.block.index(motion.input)].unit,
+        )
+
+    def without_ripple(self, found: list[ShaftOrders]) -> Block:
+        """The samples as the axis would need them without the orders that are seen.
+
+        In slow motion a ripple is within the band of the friction, and moves the axis: its acceleration is then
+        correlated with what the regression takes for noise, so that the inertia is too small.
+        """
+        block = self.motion.block
+        data = block.data.copy()
+        data[block.index(self.motion.input)] += sum(one.torque(self.angle * one.shaft.turns) for one in found)
+        return replace(block, data=data)
 
 
 def _unknown_lines(

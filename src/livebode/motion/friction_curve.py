@@ -278,20 +278,32 @@ def _with_stribeck(
 
 def _stribeck(columns: Floats, motion: SmoothMotion, used: NDArray[np.bool_], top: float) -> Regression:
     """The regression with Stribeck friction: a scan of its speed, then Gauss-Newton steps."""
-    v, sign, u = motion.velocity, motion.sign, motion.input
 
-    def at(speed: float) -> Regression:
-        return regress(np.column_stack([columns, sign * _decay(v, speed)]), u, used, motion.kernel.correlation)
+    def with_decay(speed: float) -> Floats:
+        return np.column_stack([columns, _smooth_decay(motion, speed)])
 
-    speed = min((top * share for share in _STRIBECK), key=lambda s: at(s).squares)
+    def fitted(speed: float) -> Floats:
+        return np.linalg.lstsq(with_decay(speed)[used], motion.input[used])[0]
+
+    def squares(speed: float) -> float:
+        return float(np.sum((motion.input - with_decay(speed) @ fitted(speed))[used] ** 2))
+
+    speed = min((top * share for share in _STRIBECK), key=squares)
     for _ in range(_ROUNDS):
-        slope = float(at(speed).value[-1]) * sign * _decay_slope(v, speed)
-        full = regress(np.column_stack([columns, sign * _decay(v, speed), slope]), u, used, motion.kernel.correlation)
-        step = float(np.clip(full.value[-1], -speed / 2, speed))
+        slope = float(fitted(speed)[-1]) * motion.smoothed(np.sign(motion.sharp) * _decay_slope(motion.sharp, speed))
+        full = np.column_stack([with_decay(speed), slope])
+        step = np.linalg.lstsq(full[used], motion.input[used])[0][-1]
+        step = float(np.clip(step, -speed / 2, speed))
         speed += step
         if abs(step) < _SETTLED * speed:
             break
-    return full.displaced(-1, speed)
+    return regress(full, motion.input, used, motion.kernel.correlation).displaced(-1, speed)
+
+
+def _smooth_decay(motion: SmoothMotion, speed: float) -> Floats:
+    """Stribeck friction of 1 through the kernel; only its difference from a step is continuous."""
+    v = motion.sharp
+    return motion.sign - motion.smoothed(np.sign(v) * (1 - _decay(v, speed)))
 
 
 def _curve(

@@ -19,6 +19,8 @@ _REACH = 6.0  # σ on each side, beyond which a kernel is zero: at 4 its second 
 _LAGS = 6  # beyond, smoothed white noise is correlated by less than 1e-3
 _SHARPER = 5.0  # times the band: the speed whose sign decides about dry friction
 _SLOWEST = 0.01  # of the highest speed
+_FINE = 8  # samples of the sharp speed in σ
+_ROUNDED = 2  # samples by which the reach of the kernel differs between two rates
 _SAMPLES_MIN = 2.0  # σ in samples: below it the sampled derivative of the kernel is wrong
 
 
@@ -53,9 +55,14 @@ class SmoothKernel:
         return int(np.ceil(_REACH * self.sigma))
 
     @property
+    def fine_step(self) -> int:
+        """Samples between those of a speed that is sharper than the kernel."""
+        return max(round(self.sigma / _FINE), 1)
+
+    @property
     def step(self) -> int:
-        """Samples between those that a regression uses."""
-        return round(self.sigma)
+        """Samples between those that a regression uses, about σ."""
+        return self.fine_step * round(self.sigma / self.fine_step)
 
     @property
     def correlation(self) -> Floats:
@@ -91,6 +98,8 @@ class SmoothMotion:
         Where the axis is, from the recording or the integral of its velocity.
     sign
         Smoothed sign of the speed.
+    sharp
+        Speed with less smoothing, at `fine_step` of the kernel, from before the first sample to after the last one.
     standing
         Share of the kernel in which the axis is at standstill: slower than `slowest` for more than its width.
     kernel
@@ -102,6 +111,7 @@ class SmoothMotion:
     velocity: Floats
     acceleration: Floats
     sign: Floats
+    sharp: Floats
     standing: Floats
     kernel: SmoothKernel
 
@@ -147,9 +157,21 @@ class SmoothMotion:
             velocity=kernel.smooth(y, order)[step],
             acceleration=kernel.smooth(y, order + 1)[step],
             sign=kernel.smooth(np.sign(speed))[step],
+            sharp=speed[kernel.reach % kernel.fine_step :: kernel.fine_step],
             standing=kernel.smooth(_held(np.abs(speed) <= least, 2 * kernel.sigma))[step],
             kernel=kernel,
         )
+
+    def smoothed(self, value: Floats) -> Floats:
+        """A continuous function of `sharp`, through the same kernel: the mean of a curve is not the curve at the mean.
+
+        Shape (sharp samples,) to (samples,).
+        """
+        fine_step = self.kernel.fine_step
+        kernel = SmoothKernel(self.kernel.band_hz, self.kernel.rate_hz / fine_step)
+        first = self.kernel.reach // fine_step - kernel.reach + _ROUNDED
+        inner = kernel.smooth(np.pad(value, _ROUNDED, mode="edge"))
+        return np.asarray(inner[first :: self.kernel.step // fine_step][: self.input.size])
 
 
 def _sharp_speed(y: Floats, kernel: SmoothKernel, order: int) -> Floats:
