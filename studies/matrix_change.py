@@ -67,7 +67,7 @@ Floats = NDArray[np.float64]
 
 
 def matrices(gantry: Gantry, runs: int, rng: np.random.Generator) -> list[MatrixResponses]:
-    """The last matrix of each recording, from all its repetitions."""
+    """The matrices of each recording; the last one is from all its repetitions."""
     loop, found = GantryLoop(gantry=gantry, rate_hz=RATE_HZ), []
     w = np.tile(EXCITATION.samples, MEMORY)
     for begin in range(0, runs, AT_ONCE):
@@ -78,7 +78,7 @@ def matrices(gantry: Gantry, runs: int, rng: np.random.Generator) -> list[Matrix
         blocks = (
             Block(np.ascontiguousarray(one), CHANNELS, RATE_HZ) for one in np.moveaxis(loop.signals(inputs), 2, 0)
         )
-        found += [MatrixTracker(SETTINGS).process(block)[-1:] for block in blocks]
+        found += [MatrixTracker(SETTINGS).process(block) for block in blocks]
     return found
 
 

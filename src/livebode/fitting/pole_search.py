@@ -146,7 +146,7 @@ def _reduced(outputs: Outputs, of: Separated, kind: Kind, *, fixed: bool = False
     while True:
         rivals = [
             solve(outputs, structure, start, rounds=_ROUNDS_SEARCH)
-            for structure, start in _neighbours(best, kind, fixed=fixed)
+            for structure, start in reduced_structures(best, kind, fixed=fixed)
             if outputs.enough_for(structure)
         ]
         rivals = [one for one in rivals if possible(outputs, one, kind)]
@@ -158,7 +158,8 @@ def _reduced(outputs: Outputs, of: Separated, kind: Kind, *, fixed: bool = False
         best = solve(outputs, better.structure, better.theta, rounds=_ROUNDS_LAST)
 
 
-def _neighbours(of: Separated, kind: Kind, *, fixed: bool) -> Iterator[tuple[Structure, Floats]]:
+def reduced_structures(of: Separated, kind: Kind, *, fixed: bool) -> Iterator[tuple[Structure, Floats]]:
+    """Structures with a term less, and a start for each; `fixed`: with as many poles."""
     structure, theta = of.structure, of.theta
     if structure.integrators and structure.poles + structure.integrators + structure.direct > 1:
         yield replace(structure, integrators=structure.integrators - 1), theta

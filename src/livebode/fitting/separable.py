@@ -99,10 +99,15 @@ def solve(
     likely = float(np.sum(misfit_by(rest, noise, variance, outputs.noise_dof, measured.use)))
     # Errors of an incomplete model are alike at neighbouring lines and in all outputs: they are fewer than lines.
     erring = 2 * float(np.sum(1 - (noise / np.where(variance > 0, variance, 1.0))[measured.use]))
-    # A pole is searched for over all lines, so the largest of as many random values is found.
-    each_pole = np.log(outputs.grid.frequency_hz.size) + _ERROR_PRICE * erring
+    each_pole = pole_price(outputs.grid.frequency_hz.size, erring)
     cost = likely + structure.size * np.log(outputs.count) + structure.poles * each_pole
     return Separated(structure, theta, linear, response, problem.weight, epsilon, cost, settled)
+
+
+def pole_price(lines: int, erring: float) -> float:
+    """Cost of a pole beside that of its parameters; `erring` is the number of real values whose error is the model's."""
+    # A pole is searched for over all lines, so the largest of as many random values is found.
+    return float(np.log(lines) + _ERROR_PRICE * erring)
 
 
 def whole_covariance(outputs: Outputs, of: Separated) -> Floats:

@@ -158,19 +158,23 @@ def compare_gantries(
     difference = second.value - first.value
     difference[MOMENT] -= kilograms * (places[1] - places[0])
     difference[INERTIA] -= kilograms * (places[1] ** 2 - places[0] ** 2)
-    covariance = first.covariance + second.covariance
+    covariance = first.independent + second.independent
     noise_dof = 2 * (first.noise_dof + second.noise_dof)
     probability = _tail(_square(difference, covariance), len(difference), noise_dof)
     judged = entries.changed if entries is not None else probability < alpha
-    known = _Known(first, covariance, kilograms, places[1], noise_dof)
+    known = _Known(first, covariance, first.covariance + second.covariance, kilograms, places[1], noise_dof)
     found = _causes(difference, known, alpha) if judged else []
     return GantryChange(entries, probability, alpha, tuple(found), (first, second))
 
 
 class _Known(NamedTuple):
-    """The fit before, the covariance of the difference, mass and place of the cart, and degrees of freedom."""
+    """The fit before, mass and place of the cart, degrees of freedom, and the covariance of the difference.
+
+    That of independent lines chooses and tests; the other one, which has more scatter, gives the bounds.
+    """
 
     before: GantryFit
+    independent: Floats
     covariance: Floats
     cart_kg: float
     cart_m: float
@@ -199,10 +203,12 @@ def _explained(name: str, difference: Floats, known: _Known) -> tuple[Cause, Flo
     # The direction of a place depends on how far the cart moved.
     for _ in range(3 if name == CART_PLACE else 1):
         direction = dict(_directions(known, amount))[name]
-        pair = _scaled(np.stack([direction, difference], axis=1), known.covariance)
-        both = pair.T @ np.linalg.solve(_unit(known.covariance), pair)
+        pair = _scaled(np.stack([direction, difference], axis=1), known.independent)
+        solved = np.linalg.solve(_unit(known.independent), pair)
+        both = pair.T @ solved
         amount = float(both[0, 1] / both[0, 0])
-    bound = normal_quantile(0.975) / float(np.sqrt(both[0, 0]))
+    by = _scaled(solved[:, 0], known.independent) / both[0, 0]  # of the difference on the amount
+    bound = normal_quantile(0.975) * float(np.sqrt(by @ known.covariance @ by))
     size, unit = _before(name, known)
     cause = Cause(name, amount, bound, size, unit, float(both[0, 1] ** 2 / both[0, 0]))
     return cause, difference - amount * direction

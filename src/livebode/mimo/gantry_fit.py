@@ -11,7 +11,6 @@ from livebode.core import MatrixResponses, UsageError
 from livebode.core.distributions import normal_quantile
 from livebode.core.installing import needing
 from livebode.mimo.least_squares import minimise
-from livebode.mimo.mean import mean_matrix
 from livebode.mimo.whitening import Weighted
 from livebode.simulation import Gantry
 
@@ -48,6 +47,8 @@ class GantryFit:
         The gantry as described: radius and half width are taken from it.
     value, covariance
         Of `PARAMETERS`, shapes (11,) and (11, 11).
+    independent
+        The covariance with lines that are independent: it has less scatter, for tests of all parameters at once.
     epsilon
         Model error as a share of each entry, 0 where noise explains the residuals.
     chi2, dof
@@ -61,6 +62,7 @@ class GantryFit:
     description: Gantry
     value: Floats
     covariance: Floats
+    independent: Floats
     epsilon: float
     chi2: float
     dof: float
@@ -124,16 +126,14 @@ def fit_gantry(
             "track two inputs and two outputs, the left motor first",
             argument="responses",
         )
-    matrix = mean_matrix(responses)
-    low, high = band_hz or (0.0, np.inf)
-    weighted = Weighted.of(matrix, (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high))
+    weighted = Weighted.of(responses, band_hz)
     start = parameters_of(description)
     size = np.where(start == 0, start[MASS] * description.half_width_m, start)
-    model = _Model(description, weighted.frequency_hz, matrix.lines.rate_hz, size)
+    model = _Model(description, weighted.frequency_hz, responses.lines.rate_hz, size)
     found = minimise(weighted, model.response, model.slopes, start / size)
     return GantryFit(
-        description, found.values * size, found.covariance * np.outer(size, size), found.epsilon, found.chi2,
-        found.dof, weighted.dof, found.settled,
+        description, found.values * size, found.covariance * np.outer(size, size),
+        found.independent * np.outer(size, size), found.epsilon, found.chi2, found.dof, weighted.dof, found.settled,
     )  # fmt: skip
 
 

@@ -29,21 +29,24 @@ class MatrixMinimum:
     Attributes
     ----------
     values, covariance
-        Of the parameters, with the scatter of estimated weights.
+        Of the parameters, with the scatter of estimated weights, and with errors that are alike at neighbouring lines.
+    independent
+        The covariance with lines that are independent.
     epsilon
         Model error as a share of each entry, 0 where noise explains the residuals.
     chi2, dof
         Sum of squares by noise alone, and its expectation for a true model.
-    rest
-        Weighted residuals, shape (lines, entries).
+    error
+        Measured minus model, shape (lines, entries).
     """
 
     values: Floats
     covariance: Floats
+    independent: Floats
     epsilon: float
     chi2: float
     dof: float
-    rest: Complex
+    error: Complex
     settled: bool
 
 
@@ -58,16 +61,45 @@ def minimise(weighted: Weighted, model: Model, slopes: Model, start: Floats) -> 
         if abs(epsilon - before) <= _SAME * epsilon:
             break
     inverse, share = weighted.part(epsilon)
-    response, whole = model(found), _slopes(slopes(found), inverse)
-    scale = np.linalg.norm(whole, axis=0) + 1e-300
-    try:
-        covariance = np.linalg.inv((whole / scale).T @ (whole / scale)) / np.outer(scale, scale)
-    except np.linalg.LinAlgError:
-        covariance = np.full((start.size, start.size), np.inf)
-    rest = _rest(weighted, response, inverse)
+    response, whole = model(found), inverse @ slopes(found)
+    alone = _inverse(stacked(whole).reshape(-1, start.size))
+    covariance = _over_lines(weighted, inverse, whole, alone) if np.isfinite(alone).all() else alone
     chi2 = _chi2(_rest(weighted, response, weighted.part(0.0)[0]))
     widened = 1 + (weighted.scatter - 1) * share
-    return MatrixMinimum(found, covariance * widened, epsilon, chi2, dof, rest, settled)
+    return MatrixMinimum(found, covariance * widened, alone * widened, epsilon, chi2, dof, weighted.value - response, settled)
+
+
+def _inverse(slope: Floats) -> Floats:
+    """(AᵀA)⁻¹ of A with the parameters as columns; infinite where it is singular."""
+    scale = np.linalg.norm(slope, axis=0) + 1e-300
+    try:
+        return np.asarray(np.linalg.inv((slope / scale).T @ (slope / scale)) / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        return np.full((scale.size, scale.size), np.inf)
+
+
+def _over_lines(weighted: Weighted, inverse: Complex, whole: Complex, alone: Floats) -> Floats:
+    """Covariance of the parameters with errors that are alike at neighbouring lines, of weighted slopes `whole`.
+
+    The errors that the rows of the recording show are taken through the fit. Products of lines that are further apart
+    count less and from a distance on nothing, which bounds their scatter and gives a covariance without negative
+    eigenvalues (Newey and West, Econometrica 55(3), 1987); the distance grows with the cube root of the lines. A model
+    error is independent from line to line. `alone` is the covariance without this, and the result if there are no rows.
+    """
+    errors = len(weighted.scattered)
+    if not errors:
+        return alone
+    influence = 2 * np.einsum("kep,pq->keq", whole.conj(), alone)  # of weighted errors on the parameters
+    noise = inverse @ np.linalg.inv(weighted.part(0.0)[0])  # whitened noise, as the weights with ε see it
+    by_noise = np.swapaxes(noise, 1, 2) @ influence
+    each = np.einsum("rke,kep->rkp", weighted.scattered, by_noise)
+    total = np.einsum("rkp,rkq->pq", each, each.conj()).real
+    reach = int(np.ceil(np.cbrt(each.shape[1])))
+    for lag in range(1, min(reach, each.shape[1] - 1) + 1):
+        product = np.einsum("rkp,rkq->pq", each[:, lag:], each[:, :-lag].conj()).real
+        total += (1 - lag / (reach + 1)) * (product + product.T)
+    of_noise = np.einsum("kep,keq->pq", by_noise, by_noise.conj()).real / 2
+    return np.asarray(total / (2 * errors) + (alone - of_noise))
 
 
 def _searched(weighted: Weighted, model: Model, slopes: Model, inverse: Complex, start: Floats) -> tuple[Floats, bool]:
@@ -79,7 +111,7 @@ def _searched(weighted: Weighted, model: Model, slopes: Model, inverse: Complex,
         return stacked(_rest(weighted, model(x), inverse)).ravel()
 
     def jacobian(x: Floats) -> Floats:
-        return -_slopes(slopes(x), inverse)
+        return -stacked(inverse @ slopes(x)).reshape(-1, x.size)
 
     with np.errstate(all="ignore"):
         found = least_squares(
@@ -91,10 +123,6 @@ def _searched(weighted: Weighted, model: Model, slopes: Model, inverse: Complex,
 
 def _rest(weighted: Weighted, response: Complex, inverse: Complex) -> Complex:
     return np.asarray(np.einsum("kij,kj->ki", inverse, weighted.value - response))
-
-
-def _slopes(slope: Complex, inverse: Complex) -> Floats:
-    return stacked(inverse @ slope).reshape(-1, slope.shape[2])
 
 
 def _chi2(rest: Complex) -> float:

@@ -15,6 +15,7 @@ from livebode.fitting.pole_search import Kind, search
 from livebode.fitting.separable import Outputs, Separated
 from livebode.mimo.least_squares import MatrixMinimum, minimise
 from livebode.mimo.mean import mean_matrix
+from livebode.mimo.mode_choice import chosen
 from livebode.mimo.whitening import Weighted
 
 Floats = NDArray[np.float64]
@@ -127,21 +128,24 @@ def fit_matrix(
     """
     check_model(model, order)
     matrix = mean_matrix(responses)
-    low, high = band_hz or (0.0, np.inf)
-    inside = (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
-    weighted = Weighted.of(matrix, inside)
+    weighted = Weighted.of(responses, band_hz)
     whole = matrix.valid[0].all(axis=1)
     entries = [_entry(matrix, o, i, whole) for o in range(len(matrix.outputs)) for i in range(len(matrix.inputs))]
     names = tuple(f"{o}/{i}" for o in matrix.outputs for i in matrix.inputs)
     outs = outputs_of(entries, names, band_hz, hold)
     kind = model if like is None else like.model
-    best = search(outs, model, order) if like is None else [_started(like, names)]
-    covariance = None
-    if best:
-        minimum = _refined(weighted, outs, best[0])
-        best, covariance = [_separated(best[0], outs, minimum), *best[1:]], minimum.covariance
+
+    def refine(one: Separated) -> tuple[Separated, MatrixMinimum]:
+        minimum = _refined(weighted, outs, one)
+        return _separated(one, outs, minimum), minimum
+
+    if like is not None:
+        best = [refine(_started(like, names))]
+    else:
+        best = chosen(weighted, outs, search(outs, model, order), model, refine, fixed=order is not None)
     specified = order is not None or like is not None
-    found = assembled(outs, best, names, entries, kind, specified=specified, covariance=covariance)
+    covariance = best[0][1].covariance if best else None
+    found = assembled(outs, [one for one, _ in best], names, entries, kind, specified=specified, covariance=covariance)
     given = {field.name: getattr(found, field.name) for field in fields(CommonPoles)}
     return MatrixModes(**given, size=(len(matrix.outputs), len(matrix.inputs)))
 

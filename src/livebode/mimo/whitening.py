@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import FitError, MatrixResponses
+from livebode.mimo.mean import mean_matrix
+from livebode.mimo.row_scatter import row_scatter
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -17,27 +19,33 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
-    """The lines of one matrix where all columns are valid, and the covariance of its entries.
+    """The lines of a mean matrix where all columns are valid, and the covariance of its entries.
 
     Attributes
     ----------
     value
         Entries, those of an output after each other, shape (lines, entries).
-    covariance
-        Estimate of noise ⊗ spread, shape (lines, entries, entries).
-    dof, outputs
-        Complex degrees of freedom of the noise, and its dimension.
+    noise, spread
+        Factors of their covariance, shapes (lines, outputs, outputs) and (lines, inputs, inputs).
+    dof
+        Complex degrees of freedom of the noise.
+    scattered
+        Whitened errors of all lines together (`row_scatter`), shape (errors, lines, entries).
     """
 
     frequency_hz: Floats
     value: Complex
-    covariance: Complex
+    noise: Complex
+    spread: Complex
     dof: float
-    outputs: int
+    scattered: Complex
 
     @classmethod
-    def of(cls, matrix: MatrixResponses, use: NDArray[np.bool_]) -> Weighted:
-        """From a matrix of one row, at the lines of `use` where all columns are valid."""
+    def of(cls, responses: MatrixResponses, band_hz: tuple[float, float] | None) -> Weighted:
+        """From the mean of the rows that share no window, at the lines of a band where all columns are valid."""
+        matrix = mean_matrix(responses)
+        low, high = band_hz or (0.0, np.inf)
+        use = (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
         outputs, dof = len(matrix.outputs), float(matrix.dof[0])
         if dof <= outputs + 1:
             raise FitError(
@@ -51,15 +59,26 @@ class Weighted:
         whole = use & matrix.valid[0].all(axis=1)
         if not whole.any():
             raise FitError("too-few-lines", "no line has all its columns valid", "see why() for the reasons", lines=0)
-        covariance = matrix.covariance[0, whole]
-        entries = covariance.shape[1] * covariance.shape[2]
-        return cls(
+        found = cls(
             matrix.frequency_hz[whole],
-            matrix.value[0, whole].reshape(-1, entries),
-            covariance.reshape(-1, entries, entries),
+            matrix.value[0, whole].reshape(np.count_nonzero(whole), -1),
+            matrix.noise[0, whole],
+            matrix.spread[0, whole],
             dof,
-            outputs,
+            np.empty((0, 0, 0), dtype=np.complex128),
         )
+        return replace(found, scattered=row_scatter(responses, whole, found.part(0.0)[0]))
+
+    @property
+    def outputs(self) -> int:
+        """Dimension of the noise."""
+        return self.noise.shape[1]
+
+    @property
+    def covariance(self) -> Complex:
+        """Estimate of noise ⊗ spread, shape (lines, entries, entries)."""
+        entries = self.value.shape[1]
+        return np.asarray(np.einsum("kop,kij->koipj", self.noise, self.spread).reshape(-1, entries, entries))
 
     @property
     def count(self) -> int:
@@ -93,12 +112,6 @@ class Weighted:
         inverse = np.linalg.inv(np.linalg.cholesky(unit + _ROUNDING * np.eye(size.shape[1]))) / size[:, np.newaxis, :]
         share = np.einsum("kij,kjl,kil->", inverse, noise, inverse.conj()).real / size.size
         return inverse, float(share)
-
-    def at(self, lines: NDArray[np.bool_]) -> Weighted:
-        """Some of its lines."""
-        return replace(
-            self, frequency_hz=self.frequency_hz[lines], value=self.value[lines], covariance=self.covariance[lines]
-        )
 
 
 def stacked(values: Complex) -> Floats:
