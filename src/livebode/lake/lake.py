@@ -25,7 +25,7 @@ from livebode.locations import Location, Url, delta_options, location, read_byte
 from livebode.locations.storage import make_parent, opened, reporting
 
 try:
-    from deltalake import CommitProperties, DeltaTable, Transaction
+    from deltalake import CommitProperties, DeltaTable, Schema, Transaction
     from deltalake.exceptions import CommitFailedError, DeltaError, TableNotFoundError
     from deltalake.transaction import AddAction, RemoveAction
 except ImportError:
@@ -231,9 +231,9 @@ class Lake:
         return self._tables[name]
 
     def created(self, name: str) -> DeltaTable:
-        """The table at its newest version, which may be a new one."""
+        """The table at its newest version, which may be a new one, with all columns."""
         if (table := self.opened(name)) is not None:
-            return table
+            return _with_all_columns(table, name)
         one = TABLES[name]
         with suppress(CommitFailedError):  # another process has created it in the same moment
             DeltaTable.create(
@@ -264,6 +264,16 @@ class Lake:
                 table=name,
                 reason=str(error),
             ) from error
+
+
+def _with_all_columns(table: DeltaTable, name: str) -> DeltaTable:
+    """Add the columns that a table of an earlier livebode lacks: compaction would drop those of new files."""
+    known = {field.name for field in table.schema().fields}
+    if missing := [field for field in TABLES[name].schema if field.name not in known]:
+        with suppress(CommitFailedError):  # another process has added them in the same moment
+            table.alter.add_columns(Schema.from_arrow(pa.schema(missing)).fields)
+        table.update_incremental()
+    return table
 
 
 def _rows_of(table: pa.Table, columns: Sequence[str]) -> list[Row]:
