@@ -13,6 +13,7 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 from pyarrow.fs import LocalFileSystem, SubTreeFileSystem
 
@@ -70,6 +71,20 @@ class Lake:
                 empty = TABLES[name].schema.empty_table()
                 return empty.select(columns) if columns else empty
             return self._rows(name, table, columns, where)
+
+    def rows(self, name: str) -> ds.Dataset | pa.Table | None:
+        """The rows of a table as they are now: on this computer not read yet; None if nothing was written.
+
+        Raises
+        ------
+        ArchiveError
+            If the table cannot be read.
+        """
+        with self.reported(name):
+            table = self.opened(name)
+            if table is None:
+                return None
+            return self._rows(name, table, None) if isinstance(self._place, Url) else self._dataset(name, table)
 
     def rows_of(self, name: str, key: Key) -> pa.Table:
         """The rows of one result in a table of responses, parameters or events, read from as few files as possible.
@@ -206,10 +221,7 @@ class Lake:
         """
         place, schema = self._place / name, TABLES[name].schema
         if isinstance(place, Path):
-            own = SubTreeFileSystem(str(place), LocalFileSystem())
-            # A table of an earlier livebode lacks the newest columns, which are then null.
-            found = table.to_pyarrow_dataset(filesystem=own, schema=schema)
-            return found.to_table(columns=columns, filter=where)
+            return self._dataset(name, table).to_table(columns=columns, filter=where)
 
         def part(uri: str) -> pa.Table:
             source = pa.BufferReader(read_bytes(place / uri.rsplit("/", 1)[-1]))
@@ -218,6 +230,12 @@ class Lake:
         with ThreadPoolExecutor(_DOWNLOADS) as pool:
             empty = schema.empty_table()
             return pa.concat_tables([empty.select(columns) if columns else empty, *pool.map(part, table.file_uris())])
+
+    def _dataset(self, name: str, table: DeltaTable) -> ds.Dataset:
+        """Rows of a table on this computer."""
+        own = SubTreeFileSystem(str(self._place / name), LocalFileSystem())
+        # A table of an earlier livebode lacks the newest columns, which are then null.
+        return table.to_pyarrow_dataset(filesystem=own, schema=TABLES[name].schema)
 
     def opened(self, name: str) -> DeltaTable | None:
         """The table at its newest version; None if it does not exist."""

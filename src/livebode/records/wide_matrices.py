@@ -1,4 +1,4 @@
-"""Matrices of responses in wide form: a row for each entry, and one for each element of the factors of the covariance."""
+"""Matrices of responses in wide form: a row for each entry, and for each element of the factors of the covariance."""
 
 from __future__ import annotations
 
