@@ -136,16 +136,15 @@ class MatrixTracker(StatefulBase):
         settled = np.flatnonzero((rows.sample - s.start) % s.span + 1 >= s.first_place)
         sample = rows.sample[settled]
         found, count = self._estimate(rows, settled)
-        used = s.memory if s.average else 1
-        middle = sample - (s.lines.window - 1) / 2 - s.span * (s.count - 1) / 2
-        if s.average:
-            middle = middle - s.cycle * (count - 1) / 2
+        used = np.maximum(count, 1) if s.average else np.ones_like(count)
+        extent = s.lines.window + np.where(count > 0, s.span * (s.count - 1) + s.cycle * (used - 1), 0)
+        middle = sample - (s.lines.window - 1) / 2 - s.span * (s.count - 1) / 2 - s.cycle * (used - 1) / 2
         return MatrixResponses(
             s.lines,
             tuple(s.output),
             s.columns,
             **vars(found),
-            first=sample - s.lines.window + 1 - s.cycle * (used - 1) - s.span * (s.count - 1),
+            first=sample - extent + 1,
             sample=sample,
             time_s=np.asarray(block.origin_s + middle / block.rate_hz, dtype=np.float64),
             units=(),
