@@ -90,7 +90,8 @@ def _summary(record: LakeRecord) -> dict[str, Any]:
     configuration = recorded_configuration(summary)
     del configuration["source"]["log"]
     configuration.pop("machine", None)
-    configuration.get("monitoring", {}).pop("baseline", None)
+    for file in ("baseline", "gantry"):
+        configuration.get("monitoring", {}).pop(file, None)
     more = {name: summary[name] for name in ("left_out_samples", "matrix") if name in summary}
     return {"configuration": configuration, "found": summary["found"]} | more
 
