@@ -12,9 +12,12 @@ import pyuff
 import scipy.io
 import xarray as xr
 
-from livebode.core import Block
+from livebode.core import Block, RecordError
+from livebode.dashboard.overlays import overlays_of
+from livebode.dashboard.quantities import Quantities
 from livebode.dashboard.run_entry import entry
 from livebode.records import RunRecord
+from livebode.runtime.same_run import check_same_run
 from tests.support.command import livebode
 from tests.support.gantry_runs import NAMES, RATE_HZ, gantry_block, gantry_log
 
@@ -281,3 +284,24 @@ def test_what_needs_a_single_response_refuses_a_matrix_in_one_sentence(folder: P
 def test_the_list_of_runs_names_the_channels_of_a_matrix(folder: Path) -> None:
     row = entry(folder / "before")
     assert (row.state, row.signals) == ("finished", "velocity1, velocity2 / u1, u2 / w1, w2")
+
+
+def test_a_relative_baseline_is_found_from_other_directories(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (folder / "after.toml").read_text() + '[monitoring]\nbaseline = "before"\n'
+    (folder / "judged.toml").write_text(text)
+    for name, *options in (("judged.toml",), ("after.toml", "--baseline", "before")):
+        monkeypatch.chdir(folder)
+        assert livebode("run", name, *options, "--out", "judged", "--force").code == 0
+        run = RunRecord.open(folder / "judged", matrix=True)
+        monkeypatch.chdir("/")
+        one = run.entry("velocity2", "u1").summary
+        _, healthy, remark = overlays_of(one, Quantities.of(one))
+        assert healthy is not None, remark
+        assert run.summary["monitoring"]["changes"] == 1
+    earlier = json.loads(json.dumps(run.summary))
+    earlier["configuration"]["monitoring"]["baseline"] = "before"  # as recorded before
+    monkeypatch.chdir(folder)
+    check_same_run(run.path, earlier, run.summary, (), ())
+    monkeypatch.chdir("/")
+    with pytest.raises(RecordError, match="with another configuration"):
+        check_same_run(run.path, earlier, run.summary, (), ())

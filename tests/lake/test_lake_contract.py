@@ -8,9 +8,10 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 import pytest
+from deltalake import DeltaTable
 
 from livebode import ArchiveError
-from livebode.lake import TABLES, Key, Lake
+from livebode.lake import TABLES, Key, Lake, compact
 from livebode.lake.data_file import write_data_file
 
 
@@ -91,3 +92,28 @@ def test_a_filter_on_any_column_finds_its_rows(lake: Lake, tmp_path: Path) -> No
     lake.add_files("events", [file])
     assert lake.read("events", where=pc.field("kind") == "gap").num_rows == 3
     assert lake.read("events", where=pc.field("content") == KEYS[1].content).num_rows == 0
+
+
+@pytest.mark.parametrize("name", ["runs", "responses"])
+def test_a_table_of_an_earlier_version_gets_the_new_columns_and_compaction_retains_them(
+    lake: Lake, tmp_path: Path, name: str
+) -> None:
+    schema = TABLES[name].schema
+    newest = schema.names[-1]
+    DeltaTable.create(f"{lake.url}/{name}", pa.schema(list(schema)[:-1]))
+    for number, key in enumerate(KEYS[:2]):
+        value = str(number) if pa.types.is_string(schema.field(newest).type) else [str(number)]
+        own = pa.Table.from_pylist([key._asdict() | {newest: value}], schema=schema)
+        if TABLES[name].key:
+            lake.add_rows(name, own)
+        else:
+            file = write_data_file(tmp_path, name, key, [own])
+            lake.store(tmp_path / file.name, name)
+            lake.add_files(name, [file])
+    lake.add_rows("runs", rows("runs", *KEYS[:2]))  # what does not count is not joined
+    written = sorted(lake.read(name, [newest])[newest].to_pylist())
+    assert len(written) == 2
+    (joined,) = (one for one in compact(lake) if one.table == name)
+    assert (joined.before, joined.after) == (2, 1)
+    assert sorted(lake.read(name, [newest])[newest].to_pylist()) == written
+    assert [field.name for field in DeltaTable(f"{lake.url}/{name}").schema().fields] == schema.names

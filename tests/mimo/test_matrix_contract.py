@@ -213,3 +213,18 @@ def test_wrong_matrices_limits_and_samples_are_refused() -> None:
         tracker().process(block_of(ORTHOGONAL[:, :0]))
     with pytest.raises(SignalError, match="500 samples per second"):
         tracker().process(Block(np.zeros((5, 10)), NAMES, rate_hz=500))
+
+
+@pytest.mark.parametrize("average", [False, True])
+def test_first_is_the_oldest_sample_that_a_matrix_depends_on(average: bool) -> None:
+    whole = block_of(ORTHOGONAL, noise=0.1)
+    found = tracker(average=average).process(whole)
+    valid = np.flatnonzero(found.valid.all(axis=(1, 2)))
+    for row in valid[[0, len(valid) // 2, -1]]:
+        first, sample = int(found.first[row]), int(found.sample[row])
+        for begin, same in ((first, True), (first + 1, False)):
+            later = tracker(average=average).process(whole.cut(begin, len(whole)))
+            (at,) = np.flatnonzero(later.sample == sample)
+            assert np.allclose(later.value[at], found.value[row], rtol=1e-9) == same
+            assert (later.first[at] == first) == same
+    assert (found.first[valid] >= 0).all()

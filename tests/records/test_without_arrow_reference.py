@@ -23,6 +23,7 @@ NEED_IT = {
     "interface/_example_hall.py",
     "records/query.py",
     "records/segments/verified_files.py",
+    "records/wide_matrices.py",
     "records/wide_responses.py",
     "sources/arrow_ipc.py",
     "sources/arrow_values.py",

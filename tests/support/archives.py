@@ -38,7 +38,7 @@ hop = 400
 [fit]
 model = "rigid"
 """
-DATA = ("responses", "parameters", "events")
+DATA = ("responses", "covariance", "parameters", "events")
 
 
 def write_recording(path: Path, seed: int, periods: int = 8, machine: int | None = None) -> None:

@@ -66,9 +66,7 @@ def learn(
         raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
     with ExitStack() as copies:
         runs = [RunRecord.open(copies.enter_context(local_copy(path)), matrix=True) for path in paths]
-        for run in runs:
-            if run.is_matrix:
-                raise matrix_unsupported(run.place, "a baseline")
+        check_no_matrix(runs)
         axes = [learnable_axis(recorded_configuration(run.summary), run.place) for run in runs]
         _check_once(runs, axes)
         return learn_from(runs, axes, report)
@@ -76,6 +74,10 @@ def learn(
 
 class HealthyRun(Protocol):
     """A run of a run directory or of a lake."""
+
+    @property
+    def is_matrix(self) -> bool:
+        """Whether it has matrices of responses."""
 
     @property
     def place(self) -> str:
@@ -99,6 +101,18 @@ class HealthyRun(Protocol):
 
     def steady_batches(self) -> Iterator[Responses]:
         """Responses of a machine that was ready."""
+
+
+def check_no_matrix(runs: Sequence[HealthyRun]) -> None:
+    """RecordError if a run has matrices: the run itself is the baseline of others, and nothing is learned."""
+    for run in runs:
+        if run.is_matrix:
+            raise matrix_unsupported(
+                run.place,
+                "a learned baseline",
+                "set monitoring.baseline (--baseline) of the runs to compare to the directory of a matrix run of the "
+                "healthy machine: it needs no learning",
+            )
 
 
 def learn_from(

@@ -227,8 +227,8 @@ def _longest_stretch(run: RunRecord, words: dict[str, Any], names: list[str]) ->
 
 def _of_logs(words: dict[str, Any], names: list[str], where: str) -> Block:
     used: dict[str, Any] = {key: words[key] for key in ("source", "signals", "monitoring") if key in words}
-    if isinstance(outputs := used.get("signals", {}).get("output"), list):
-        used["signals"] = {"output": outputs[0]}  # lists would need the lines and experiments of the matrix
+    if any(isinstance(channels, list) for channels in used.get("signals", {}).values()):
+        used |= _without_matrix(used)
     axis = Axis.of(used, where)
     given, ready = axis.source, axis.ready
     found = []
@@ -236,6 +236,15 @@ def _of_logs(words: dict[str, Any], names: list[str], where: str) -> Block:
         opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=names)
         found.append(clean_stretch(opened, names, ready if ready and opened.has(ready.channel) else None)[0])
     return max(found, key=len)
+
+
+def _without_matrix(words: dict[str, Any]) -> dict[str, Any]:
+    """What says when the machine is ready: lists would need the lines and experiments of the matrix."""
+    signals, monitoring = words["signals"], words.get("monitoring", {})
+    output = signals["output"]
+    ready = {"ready": signals["ready"]} if "ready" in signals else {}
+    bits = {name: monitoring[name] for name in ("ready_mask", "ready_value") if name in monitoring}
+    return {"signals": {"output": output[0] if isinstance(output, list) else output} | ready, "monitoring": bits}
 
 
 def _recorded(run: RunRecord, names: list[str]) -> Block | None:

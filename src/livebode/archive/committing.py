@@ -49,10 +49,10 @@ class Committer:
         if hashed:  # first: what has a result and no known place would be tracked again
             rows = file_rows([(one.place, one.content) for one in hashed], self.job.common_machine)
             self.lake.add_rows("files", rows)
-        by_table: dict[str, list[DataFile]] = {"responses": [], "parameters": [], "events": []}
+        by_table: dict[str, list[DataFile]] = {}
         for one in tracked:
             for file in one.files:
-                by_table[file.table].append(file)
+                by_table.setdefault(file.table, []).append(file)
         for table, files in by_table.items():
             self.lake.add_files(table, files)
         quantities = [row for one in tracked for row in one.quantities]

@@ -14,11 +14,12 @@ import pyarrow as pa
 
 from livebode.analysis.run_trend import FittedQuantities
 from livebode.arrow import from_numpy, text
-from livebode.core import Event, Responses
+from livebode.core import Event, MatrixResponses, Responses
 from livebode.core.writing import writing
 from livebode.lake import DataFile, Key
 from livebode.lake.data_file import DataFileWriter
 from livebode.records import parameter_rows, to_json
+from livebode.records.wide_matrices import covariance_to_wide, entries_to_wide
 from livebode.records.wide_responses import to_wide
 from livebode.runtime.documents import Document, FitResults
 from livebode.runtime.whole_record import RecordInOnePiece
@@ -27,7 +28,7 @@ _EVENTS = 10_000
 
 
 class LakeRecord(RecordInOnePiece):
-    """Writes responses, parameters and events to files of the lake's layout as they come.
+    """Writes responses or matrices of them, parameters and events to files of the lake's layout as they come.
 
     Parameters
     ----------
@@ -53,12 +54,9 @@ class LakeRecord(RecordInOnePiece):
         self.summary: dict[str, Any] = {}
         self._events: list[Event] = []
         self._open = ExitStack()
+        self._writers: dict[str, DataFileWriter] = {}
 
     def __enter__(self) -> Self:
-        with writing(self.path):
-            self._responses, self._parameters, self._event_rows = map(
-                self._writer, ("responses", "parameters", "events")
-            )
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
@@ -69,11 +67,14 @@ class LakeRecord(RecordInOnePiece):
         with writing(self.path):
             match document:
                 case Responses():
-                    self._responses.write(to_wide(document))
+                    self._write("responses", to_wide(document))
+                case MatrixResponses():
+                    self._write("responses", entries_to_wide(document))
+                    self._write("covariance", covariance_to_wide(document))
                 case FitResults(parts):
                     for part in parts:
                         rows = parameter_rows(part)
-                        self._parameters.write(pa.table(rows))
+                        self._write("parameters", pa.table(rows))
                         self.fitted.add(rows)
                 case Event():
                     self._events.append(document)
@@ -84,17 +85,19 @@ class LakeRecord(RecordInOnePiece):
         self.summary = summary
         with writing(self.path):
             self._write_events()
-            written = [writer.finish() for writer in (self._responses, self._parameters, self._event_rows)]
+            written = [writer.finish() for writer in self._writers.values()]
         self.files = tuple(file for file in written if file.rows)
 
-    def _writer(self, table: str) -> DataFileWriter:
-        (self.path / table).mkdir()
-        return self._open.enter_context(DataFileWriter(self.path / table, table, self._key))
+    def _write(self, table: str, rows: pa.Table) -> None:
+        if table not in self._writers:
+            (self.path / table).mkdir()
+            self._writers[table] = self._open.enter_context(DataFileWriter(self.path / table, table, self._key))
+        self._writers[table].write(rows)
 
     def _write_events(self) -> None:
         events, self._events = self._events, []
         if events:
-            self._event_rows.write(_rows_of(events))
+            self._write("events", _rows_of(events))
 
 
 def _rows_of(events: list[Event]) -> pa.Table:

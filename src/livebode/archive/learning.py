@@ -10,7 +10,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from livebode.analysis.learning import learn_from, learnable_axis, reads_recordings
+from livebode.analysis.learning import check_no_matrix, learn_from, learnable_axis, reads_recordings
 from livebode.configuration.axis import Axis
 from livebode.core import ArchiveError, LivebodeError
 from livebode.lake import Lake, LakeRun
@@ -53,7 +53,10 @@ def learn_of_lake(
         If a recording that is needed is at none of its places any more, or a run was tracked by an earlier livebode.
     BaselineError
         If the runs do not match, or contain too little data.
+    RecordError
+        If a run has matrices.
     """
+    check_no_matrix(runs)
     configurations = [run.summary["configuration"] for run in runs]
     axes = [_axis(run, own, run.row["url"]) for run, own in zip(runs, configurations)]
     size_bytes = recordings = 0

@@ -191,13 +191,6 @@ class ArchiveSettings(_Section):
         if name and isinstance(machine := data.get("machine", {}), dict):
             own["machine"] = {"axis": name} | machine
         axis = Axis.of(own, place).beside(self.recipe.parent)
-        if axis.signals.is_matrix:
-            raise ConfigError(
-                "key-conflict",
-                "an archive stores single responses, and [signals] of the recipe lists several channels",
-                "name one channel for each signal, or track matrices with `livebode run`",
-                key="signals",
-            ).at(place)
         if self.baselines is not None and axis.monitoring.baseline is not None:
             raise ConfigError(
                 "key-conflict",

@@ -21,6 +21,7 @@ from livebode.configuration.recorded import recorded_configuration
 from livebode.configuration.recording import open_recording
 from livebode.lake import Key, Lake
 from livebode.records import to_json
+from livebode.records.matrix_run import entries_of
 from livebode.records.run import lines_in
 from livebode.runtime import Destination, run, run_output_only
 from livebode.version import __version__
@@ -54,11 +55,16 @@ def _no_pictures(*_: object) -> None:
 
 
 def _about(record: LakeRecord, place: RecordingPlace) -> dict[str, Any]:
-    """Row of the table `runs`, without what all tables have; an output-only run has no response and no lines."""
+    """Row of the table `runs`, without what all tables have; an output-only run has no response and no lines.
+
+    Of a matrix run, `responses` counts its matrices.
+    """
     found, recorded = record.summary["found"], record.summary.get("recorded") or {}
     monitoring = record.summary.get("monitoring", {})
     rows = {file.table: file.rows for file in record.files}
     lines = lines_in(found) if "bins" in found else None
+    if entries := entries_of(record.summary):
+        rows["responses"] //= len(entries)  # of a matrix there is a row for each entry
     return {
         "url": str(place.url),
         "recorded_from": _moment(recorded.get("from")),
@@ -84,9 +90,10 @@ def _summary(record: LakeRecord) -> dict[str, Any]:
     configuration = recorded_configuration(summary)
     del configuration["source"]["log"]
     configuration.pop("machine", None)
-    configuration.get("monitoring", {}).pop("baseline", None)
-    transient = {name: summary[name] for name in ("left_out_samples",) if name in summary}
-    return {"configuration": configuration, "found": summary["found"]} | transient
+    for file in ("baseline", "gantry"):
+        configuration.get("monitoring", {}).pop(file, None)
+    more = {name: summary[name] for name in ("left_out_samples", "matrix") if name in summary}
+    return {"configuration": configuration, "found": summary["found"]} | more
 
 
 def _quantities(axis: Axis, record: LakeRecord, common: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -61,6 +61,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "learn": "Learn a baseline of one machine, or of each machine of a hall, from its healthy runs in the lake.",
         "compare": "Find the quantities that differ between two axes, or between two spans of one, with bounds.",
         "report": "Write the trends of all quantities and machines as one page, the worst machine first.",
+        "query": "Query the tables of a lake with SQL (DuckDB).",
     },
     "fleet": {
         "run": "Start the workers of a fleet on this computer, and replace those that die, until Ctrl-C.",

@@ -152,7 +152,7 @@ def run_command(
             "all_periods": all_periods or None,
         },
         "monitoring": {
-            "baseline": baseline,
+            "baseline": None if baseline is None else baseline.absolute(),
             "false_alarm_interval_days": false_alarm_interval,
             "covariates": covariate or None,
         },

@@ -152,7 +152,8 @@ class Axis(ConfigurationSection):
     @property
     def ready(self) -> ReadyCondition | None:
         """At which samples the machine is ready; None without such a channel. ConfigError as `ready_condition`."""
-        of, averages = self.monitoring, self.tracking.average
+        # An average of matrices has no window of a machine that was not ready.
+        of, averages = self.monitoring, self.tracking.average and not self.signals.is_matrix
         return ready_condition(self.signals.ready, of.ready_mask, of.ready_value, averages=averages)
 
     def beside(self, folder: Path) -> Axis:

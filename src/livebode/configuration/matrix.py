@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from livebode.mimo import MatrixLoop, MatrixSettings
 
 _USED = {
-    "signals": {"outputs", "inputs", "excitations"},
+    "signals": {"outputs", "inputs", "excitations", "ready"},
     "lines": {"frequencies", "window"},
     "tracking": {"estimator", "hop", "average"},
-    "monitoring": {"baseline", "false_alarm_interval_days", "gantry"},
+    "monitoring": {"baseline", "false_alarm_interval_days", "gantry", "ready_mask", "ready_value"},
     "loop": {"input_logged", "excitation_logged", "output_logged", "controllers"},
 }
 _USED_WHOLE = {"source", "experiments", "record", "serve", "report", "machine", "publish"}

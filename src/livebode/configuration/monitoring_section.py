@@ -43,7 +43,7 @@ class MonitoringSection(ConfigurationSection):
     ready_value: Bits | None = None
 
     def beside(self, folder: Path) -> MonitoringSection:
-        """The same with relative paths from `folder`."""
+        """The same with absolute paths, relative ones from `folder`: a run is also viewed from other directories."""
         files = {"baseline": self.baseline, "gantry": self.gantry}
-        update = {name: folder / file for name, file in files.items() if file is not None}
+        update = {name: (folder / file).absolute() for name, file in files.items() if file is not None}
         return self.model_copy(update=update) if update else self

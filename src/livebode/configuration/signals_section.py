@@ -41,7 +41,8 @@ class SignalsSection(ConfigurationSection):
     ready
         Channel that shows whether the machine is ready (drive on, homed, not stopped): not zero, or see
         monitoring.ready_mask. A missing value is not ready. A response whose window contains a sample that is not
-        ready is recorded and shown, but not assessed, and its alarms are suppressed. Default: always ready.
+        ready is recorded and shown, but not assessed, and its alarms are suppressed. Of a matrix such a window does not
+        count. Default: always ready.
     """
 
     outputs: Channels = Field(alias="output")

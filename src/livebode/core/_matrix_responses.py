@@ -60,7 +60,8 @@ class MatrixResponses(RowArrays):
     reason
         Number in `REASONS`, shape (rows, lines, inputs): 0 where the column is valid.
     first, sample
-        Numbers of the oldest sample (of the oldest window) and of the newest one, shape (rows,).
+        Numbers of the oldest sample of the windows that the matrix is computed from, and of the newest one, shape
+        (rows,). Where not all experiments are complete, those of the newest window.
     time_s
         Effective time: mean of the centres of the windows, shape (rows,).
     units

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from livebode.core import MatrixResponses, ServerError
 from livebode.records import RunRecord
 
 Newest = Callable[[], MatrixResponses | None]
+
+_NEAR_S = 60.0
 
 
 @dataclass
@@ -61,13 +64,24 @@ class MatrixGroup:
         newest = self.newest()
         if time_s is None and newest is not None:
             return newest
-        found = None
-        if readable:
-            for part in RunRecord.open(directory, matrix=True).matrix_batches():
-                found = _better(found, part, time_s)
+        found = _of_record(RunRecord.open(directory, matrix=True), time_s) if readable else None
         if found is None:
             raise ServerError("not-begun", "no matrix has a valid column yet", "wait for all experiments")
         return found
+
+
+def _of_record(run: RunRecord, time_s: float | None) -> MatrixResponses | None:
+    """The one in the segments near that time, else in the whole run."""
+    found = None
+    if segments := [one for one in run.segments if one.table == "responses"]:
+        near_s = (segments[-1].first_s, inf) if time_s is None else (time_s - _NEAR_S, time_s + _NEAR_S)
+        for part in run.matrix_batches(span_s=near_s):
+            found = _better(found, part, time_s)
+        if found is not None and (time_s is None or abs(found.time_s[0] - time_s) <= _NEAR_S):
+            return found
+    for part in run.matrix_batches():
+        found = _better(found, part, time_s)
+    return found
 
 
 def _better(found: MatrixResponses | None, part: MatrixResponses, time_s: float | None) -> MatrixResponses | None:

@@ -23,7 +23,7 @@ def views_of(directory: Path, first_axis: int = 0) -> list[tuple[State, Viewed]]
 
 
 def _of_matrix(directory: Path, name: str, first_axis: int) -> list[tuple[State, Viewed]]:
-    """All entries, from one reading of the matrices."""
+    """All entries: of a long run from its means, else from one reading of the matrices."""
     run = RunRecord.open(directory, matrix=True)
     found = run.summary["found"]
     group = MatrixGroup(name, tuple(found["outputs"]), tuple(found["inputs"]), first_axis)
@@ -34,9 +34,10 @@ def _of_matrix(directory: Path, name: str, first_axis: int) -> list[tuple[State,
         state.group, state.entry = group, entry
         viewed.begin(state)
         views.append((state, viewed))
-    for part in run.matrix_batches():
-        for (state, viewed), (output, input) in zip(views, group.entries):
-            viewed.take(state, part.entry(output, input))
+    if not all(viewed.fill_from_means(state) for state, viewed in views):
+        for part in run.matrix_batches():
+            for (state, viewed), (output, input) in zip(views, group.entries):
+                viewed.take(state, part.entry(output, input))
     for state, viewed in views:
         viewed.rest(state)
     return views

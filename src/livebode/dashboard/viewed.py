@@ -41,7 +41,7 @@ class Viewed:
     def fill(self, state: State) -> None:
         """Pass all data to the state."""
         self.begin(state)
-        if not self._fill_from_means(state):
+        if not self.fill_from_means(state):
             for part in self._run.batches():
                 self.take(state, part)
         self.rest(state)
@@ -50,7 +50,7 @@ class Viewed:
         """Start the run of the state; its responses follow by `take`, and then everything else by `rest`."""
         state.begin(self.directory, self._run.summary)
 
-    def _fill_from_means(self, state: State) -> bool:
+    def fill_from_means(self, state: State) -> bool:
         """Pass the means of a long run and its newest responses; False if the run is short, or has no means."""
         segments = [segment for segment in self._run.segments if segment.table == "responses"]
         if sum(segment.size_bytes for segment in segments) < _LONG_BYTES:
@@ -61,7 +61,8 @@ class Viewed:
             return False
         first = next(self._run.between(-inf, segments[0].first_s))
         newest = Responses.join(list(self._run.between(newest_s - _RECENT_S, inf)))
-        count = sum(segment.rows for segment in segments) // len(self._run.lines)
+        each = len(self._run.lines) * max(1, len(RunRecord.open(self.directory, matrix=True).entries))
+        count = sum(segment.rows for segment in segments) // each
         count += int(np.count_nonzero(newest.time_s > newest_s))
         self._sample, self._last_s = int(newest.sample[-1]), float(newest.time_s[-1])
         state.take_past(first, means, newest, count)

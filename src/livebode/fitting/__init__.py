@@ -1,6 +1,6 @@
 """From responses to models of the machine: physical parameters and rational models, with covariance."""
 
-from livebode.fitting.binned_mean import BinnedMeans, binned_means, combined
+from livebode.fitting.binned_mean import BinnedMeans, SharedWindows, binned_means, combined
 from livebode.fitting.chains import Rigid, TwoMass
 from livebode.fitting.common_poles import POLE_MODELS, CommonPoles, fit_common_poles
 from livebode.fitting.fitter import Fitter
@@ -30,6 +30,7 @@ __all__ = [
     "RecordingsMean",
     "Rigid",
     "RunningMean",
+    "SharedWindows",
     "ThreeMass",
     "TwoMass",
     "TwoMassGain",

@@ -16,6 +16,48 @@ Starts = NDArray[np.int64]
 _DISTORTION_DOF = 4.0  # as in the mean of a run
 
 
+@dataclass(frozen=True)
+class SharedWindows:
+    """How much of their noise two responses have in common, each from one window of each of some experiments.
+
+    White noise correlates in two windows of N samples that begin d apart by max(0, 1 − d/N). Two matrices of n
+    experiments have n − e of them in common if one is e experiments after the other, each with 1/n of the noise.
+
+    Parameters
+    ----------
+    window
+        Samples of a window.
+    span
+        Samples from an experiment to the next.
+    experiments
+        Number of experiments that a response is computed from.
+
+    Examples
+    --------
+    >>> SharedWindows(400).share(np.array([0, 100, 400])).tolist()
+    [1.0, 0.75, 0.0]
+    >>> SharedWindows(400, span=800, experiments=2).share(np.array([0, 800, 900])).tolist()
+    [1.0, 0.5, 0.375]
+    """
+
+    window: int
+    span: int = 0
+    experiments: int = 1
+
+    @property
+    def reach(self) -> int:
+        """Samples after which two responses have nothing in common."""
+        return self.window + self.span * (self.experiments - 1)
+
+    def share(self, apart: NDArray[np.int64]) -> Floats:
+        """Correlation of two responses whose newest samples are so far apart, shape of `apart`."""
+        found = np.zeros(apart.shape)
+        for later in range(self.experiments):
+            common = 1 - np.abs(apart - later * self.span) / self.window
+            found += (self.experiments - later) / self.experiments * np.maximum(common, 0.0)
+        return found
+
+
 @dataclass(frozen=True, eq=False)
 class BinnedMeans:
     """The mean of the responses in each span of time that has one, in order.
@@ -54,7 +96,7 @@ class BinnedMeans:
         )
 
 
-def binned_means(responses: Responses, bin_s: float) -> BinnedMeans:
+def binned_means(responses: Responses, bin_s: float, shared: SharedWindows | None = None) -> BinnedMeans:
     """Mean of the responses whose effective time is in the same span of `bin_s` seconds, counted from time 0.
 
     A response of a machine that was not ready is left out if another one of its span was ready. The bound is from the
@@ -69,6 +111,8 @@ def binned_means(responses: Responses, bin_s: float) -> BinnedMeans:
         In order of time.
     bin_s
         Length of a span.
+    shared
+        Which windows the responses have in common; default: each is from one window.
 
     Examples
     --------
@@ -92,7 +136,7 @@ def binned_means(responses: Responses, bin_s: float) -> BinnedMeans:
         value = np.add.reduceat(known * weight, starts, axis=0) / sums
         error = np.where(used, (known - value[bins]) * weight, 0.0)
         scatter = np.add.reduceat(np.abs(error) ** 2, starts, axis=0)
-        windows = count**2 / _overlaps(responses, used, starts, bins)
+        windows = count**2 / _overlaps(responses, used, starts, bins, shared or SharedWindows(responses.lines.window))
         of_scatter = np.sqrt(scatter * count / (windows - 1)) / np.abs(sums)
         single, single_dof = _of_single(responses, used, starts)
     several = windows >= 2
@@ -163,15 +207,17 @@ def _starts(time_s: Floats, bin_s: float) -> Starts:
     return np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1]).astype(np.int64)
 
 
-def _overlaps(responses: Responses, used: NDArray[np.bool_], starts: Starts, bins: NDArray[Any]) -> Floats:
-    """Σᵢⱼ max(0, 1 − dᵢⱼ/N) over the pairs of windows of each span."""
-    size, sample = responses.lines.window, responses.sample
+def _overlaps(
+    responses: Responses, used: NDArray[np.bool_], starts: Starts, bins: NDArray[Any], shared: SharedWindows
+) -> Floats:
+    """Σᵢⱼ of the correlations of the pairs of responses of each span."""
+    sample = responses.sample
     total = used.astype(np.float64)
     for lag in range(1, len(responses)):
-        share = 1 - (sample[lag:] - sample[:-lag]) / size
-        if not (share > 0).any():
+        apart = sample[lag:] - sample[:-lag]
+        if not (apart < shared.reach).any():
             break
-        share = np.where((bins[lag:] == bins[:-lag]) & (share > 0), share, 0.0)
+        share = np.where(bins[lag:] == bins[:-lag], shared.share(apart), 0.0)
         total[lag:] += 2 * share[:, np.newaxis] * (used[lag:] & used[:-lag])
     return np.asarray(np.add.reduceat(total, starts, axis=0))
 

@@ -17,10 +17,21 @@ with needing("PyArrow", "archive", "a lake"):
     )
     from livebode.lake.lake import Lake
     from livebode.lake.lake_run import LakeRun, runs_of
-    from livebode.lake.schemas import EVENTS, FILES, PARAMETERS, QUANTITIES, QUARANTINE, RESPONSES, RUNS, TABLES
+    from livebode.lake.schemas import (
+        COVARIANCE,
+        EVENTS,
+        FILES,
+        PARAMETERS,
+        QUANTITIES,
+        QUARANTINE,
+        RESPONSES,
+        RUNS,
+        TABLES,
+    )
     from livebode.lake.stream_table import StreamTable
 
 __all__ = [
+    "COVARIANCE",
     "EVENTS",
     "FILES",
     "FLEET_EVENTS",

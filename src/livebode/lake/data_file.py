@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pyarrow as pa
@@ -89,9 +89,9 @@ class DataFileWriter:
         self._writer.close()
 
     def write(self, rows: pa.Table) -> None:
-        """Append rows without the key's columns."""
+        """Append rows without the key's columns; a column that they lack is null."""
         own = [text([word], np.zeros(rows.num_rows, dtype=np.int64)) for word in self._key]
-        columns = [rows[name].cast(self._schema.field(name).type) for name in self._schema.names[len(own) :]]
+        columns = [_column(rows, self._schema.field(name)) for name in self._schema.names[len(own) :]]
         self._waiting.append(pa.table([*own, *columns], schema=self._schema))
         self._rows += rows.num_rows
         self._waiting_bytes += rows.nbytes
@@ -109,6 +109,12 @@ class DataFileWriter:
             whole = pa.concat_tables(self._waiting)
             self._waiting, self._waiting_bytes = [], 0
             self._writer.write_table(whole, row_group_size=max(whole.num_rows, 1))
+
+
+def _column(rows: pa.Table, field: pa.Field[Any]) -> Any:
+    if field.name in rows.column_names:
+        return rows[field.name].cast(field.type)
+    return pa.nulls(rows.num_rows, field.type)
 
 
 def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table]) -> DataFile:

@@ -13,6 +13,7 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 from pyarrow.fs import LocalFileSystem, SubTreeFileSystem
 
@@ -25,7 +26,7 @@ from livebode.locations import Location, Url, delta_options, location, read_byte
 from livebode.locations.storage import make_parent, opened, reporting
 
 try:
-    from deltalake import CommitProperties, DeltaTable, Transaction
+    from deltalake import CommitProperties, DeltaTable, Schema, Transaction
     from deltalake.exceptions import CommitFailedError, DeltaError, TableNotFoundError
     from deltalake.transaction import AddAction, RemoveAction
 except ImportError:
@@ -70,6 +71,20 @@ class Lake:
                 empty = TABLES[name].schema.empty_table()
                 return empty.select(columns) if columns else empty
             return self._rows(name, table, columns, where)
+
+    def rows(self, name: str) -> ds.Dataset | pa.Table | None:
+        """The rows of a table as they are now: on this computer not read yet; None if nothing was written.
+
+        Raises
+        ------
+        ArchiveError
+            If the table cannot be read.
+        """
+        with self.reported(name):
+            table = self.opened(name)
+            if table is None:
+                return None
+            return self._rows(name, table, None) if isinstance(self._place, Url) else self._dataset(name, table)
 
     def rows_of(self, name: str, key: Key) -> pa.Table:
         """The rows of one result in a table of responses, parameters or events, read from as few files as possible.
@@ -206,10 +221,7 @@ class Lake:
         """
         place, schema = self._place / name, TABLES[name].schema
         if isinstance(place, Path):
-            own = SubTreeFileSystem(str(place), LocalFileSystem())
-            # A table of an earlier livebode lacks the newest columns, which are then null.
-            found = table.to_pyarrow_dataset(filesystem=own, schema=schema)
-            return found.to_table(columns=columns, filter=where)
+            return self._dataset(name, table).to_table(columns=columns, filter=where)
 
         def part(uri: str) -> pa.Table:
             source = pa.BufferReader(read_bytes(place / uri.rsplit("/", 1)[-1]))
@@ -218,6 +230,12 @@ class Lake:
         with ThreadPoolExecutor(_DOWNLOADS) as pool:
             empty = schema.empty_table()
             return pa.concat_tables([empty.select(columns) if columns else empty, *pool.map(part, table.file_uris())])
+
+    def _dataset(self, name: str, table: DeltaTable) -> ds.Dataset:
+        """Rows of a table on this computer."""
+        own = SubTreeFileSystem(str(self._place / name), LocalFileSystem())
+        # A table of an earlier livebode lacks the newest columns, which are then null.
+        return table.to_pyarrow_dataset(filesystem=own, schema=TABLES[name].schema)
 
     def opened(self, name: str) -> DeltaTable | None:
         """The table at its newest version; None if it does not exist."""
@@ -231,9 +249,9 @@ class Lake:
         return self._tables[name]
 
     def created(self, name: str) -> DeltaTable:
-        """The table at its newest version, which may be a new one."""
+        """The table at its newest version, which may be a new one, with all columns."""
         if (table := self.opened(name)) is not None:
-            return table
+            return _with_all_columns(table, name)
         one = TABLES[name]
         with suppress(CommitFailedError):  # another process has created it in the same moment
             DeltaTable.create(
@@ -264,6 +282,16 @@ class Lake:
                 table=name,
                 reason=str(error),
             ) from error
+
+
+def _with_all_columns(table: DeltaTable, name: str) -> DeltaTable:
+    """Add the columns that a table of an earlier livebode lacks: compaction would drop those of new files."""
+    known = {field.name for field in table.schema().fields}
+    if missing := [field for field in TABLES[name].schema if field.name not in known]:
+        with suppress(CommitFailedError):  # another process has added them in the same moment
+            table.alter.add_columns(Schema.from_arrow(pa.schema(missing)).fields)
+        table.update_incremental()
+    return table
 
 
 def _rows_of(table: pa.Table, columns: Sequence[str]) -> list[Row]:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.compute as pc
 
-from livebode.core import ArchiveError, Lines, PlantKinds, Responses
+from livebode.core import ArchiveError, Lines, MatrixResponses, PlantKinds, Responses
 from livebode.lake.data_file import Key
 from livebode.lake.lake import Lake
+from livebode.records.matrix_run import entry_missing, entry_named, entry_summary, is_matrix
 from livebode.records.run import kinds_in, lines_in, steady
+from livebode.records.wide_matrices import matrices_from_wide
 from livebode.records.wide_responses import from_wide
 
 _ROWS = 1 << 14
@@ -30,6 +33,8 @@ class LakeRun:
         Where it is.
     row
         Its row of `runs`.
+    selected
+        Output and input of a view of one entry of a matrix run.
 
     Examples
     --------
@@ -39,12 +44,14 @@ class LakeRun:
 
     lake: Lake
     row: Mapping[str, Any]
+    selected: tuple[str, str] | None = None
 
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The entries of run.json in a run directory that its responses depend on.
 
-        `configuration` without recording and machine, `found`, and `left_out_samples` if there is a transient.
+        `configuration` without recording and machine, `found`, `left_out_samples` if there is a transient, and `matrix`
+        of a matrix run. Of a view of one entry, as those of an ordinary run.
         ArchiveError if an earlier livebode tracked it, which did not store them.
         """
         if (text := self.row["summary"]) is None:
@@ -57,7 +64,7 @@ class LakeRun:
                 livebode=self.row["livebode"],
             )
         found: dict[str, Any] = json.loads(text)
-        return found
+        return found if self.selected is None else entry_summary(found, *self.selected)
 
     @property
     def key(self) -> Key:
@@ -90,19 +97,48 @@ class LakeRun:
         """Kinds of the plant's output and input."""
         return kinds_in(self.summary["found"])
 
+    @property
+    def is_matrix(self) -> bool:
+        """Whether it has matrices of responses; a view of one entry has none."""
+        return is_matrix(self.summary)
+
+    def matrix(self) -> MatrixResponses:
+        """All matrices of a matrix run, rounded to float32 when they were stored.
+
+        Raises
+        ------
+        ArchiveError, RecordError
+            If the tables cannot be read, or their rows are not from this run.
+        """
+        responses, covariance = (self.lake.rows_of(name, self.key) for name in ("responses", "covariance"))
+        return matrices_from_wide(responses, covariance, self.summary)
+
+    def entry(self, output: str, input: str) -> LakeRun:
+        """The view of one entry of a matrix run as an ordinary run; RecordError if there is no such entry."""
+        return replace(self, selected=entry_named(self.place, self.summary, f"{output}/{input}"))
+
     def responses(self) -> Responses:
         """All responses, rounded to float32 when they were stored.
 
         Raises
         ------
         ArchiveError, RecordError
-            If the table cannot be read, or its rows are not from this run.
+            If the table cannot be read, or its rows are not from this run, or it is a matrix run.
         """
-        return from_wide(self.lake.rows_of("responses", self.key), self.summary["found"])
+        return from_wide(self._rows(), self.summary["found"])
+
+    def _rows(self) -> pa.Table:
+        if self.is_matrix:
+            raise entry_missing(self.place, self.summary)
+        table = self.lake.rows_of("responses", self.key)
+        if self.selected is None:
+            return table
+        output, input = self.selected
+        return table.filter((pc.field("output") == output) & (pc.field("input") == input))
 
     def batches(self) -> Iterator[Responses]:
         """The same in parts of bounded size."""
-        table = self.lake.rows_of("responses", self.key)
+        table = self._rows()
         for start in range(0, table.num_rows, _ROWS):
             yield from_wide(table.slice(start, _ROWS), self.summary["found"])
 

@@ -14,7 +14,7 @@ from livebode.core.machine_levels import LEVELS
 from livebode.lake.columns import MACHINE, TIME, in_delta, list_of
 from livebode.lake.fleet_schemas import FLEET_SAMPLES, FLEET_SCHEMAS
 from livebode.records import parameter_table
-from livebode.records.wide_responses import wide_schema
+from livebode.records.wide_matrices import covariance_schema, entry_schema
 
 _KEY = [("content", pa.string()), ("recipe", pa.string())]
 
@@ -68,8 +68,13 @@ QUANTITIES = pa.schema(
 )
 """One row for each run and quantity: what a trend reads. The covariates are means over the run."""
 
-RESPONSES = pa.schema([*_KEY, *((field.name, in_delta(field.type)) for field in wide_schema(1))])
-"""One row for each response, in wide form; the lists have a value for each of the run's frequencies_hz."""
+RESPONSES = pa.schema([*_KEY, *((field.name, in_delta(field.type)) for field in entry_schema(1))])
+"""One row for each response, in wide form; the lists have a value for each of the run's frequencies_hz.
+
+Of a matrix of responses one row for each entry; output, input, condition and reason are null in all other rows."""
+
+COVARIANCE = pa.schema([*_KEY, *((field.name, in_delta(field.type)) for field in covariance_schema(1))])
+"""As covariance.parquet of a matrix run, in wide form."""
 
 PARAMETERS = pa.schema([*_KEY, *((field.name, field.type) for field in pa.schema(parameter_table.SCHEMA))])
 """As parameters.parquet of a run."""
@@ -121,6 +126,7 @@ TABLES: Mapping[str, LakeTable] = {
     "files": LakeTable(FILES, ("url", "version")),
     "quantities": LakeTable(QUANTITIES, ("content", "recipe")),
     "responses": LakeTable(RESPONSES),
+    "covariance": LakeTable(COVARIANCE),
     "parameters": LakeTable(PARAMETERS),
     "events": LakeTable(EVENTS),
     "quarantine": LakeTable(QUARANTINE, ("content", "recipe", "livebode")),

@@ -127,16 +127,14 @@ class MatrixMonitor(StatefulBase):
 
     def _is_due(self, responses: MatrixResponses, row: int) -> bool:
         """Whether this matrix shares no window with the one judged before, and can be compared."""
-        # `first` is that of a full memory, so it is before all samples as long as that is not full.
-        shares = self._judged_samples > 0 and responses.first[row] <= self._judged
-        if shares or not responses.dof[row] > len(responses.outputs):
+        if responses.first[row] <= self._judged or not responses.dof[row] > len(responses.outputs):
             return False
         return bool((responses.valid[row] & self._baseline.valid[0]).all(axis=1).any())
 
     def _judge(self, one: MatrixResponses) -> list[Event]:
         pair = MatrixPair.of(self._baseline, one)
         samples, sample = int(one.sample[0] - one.first[0] + 1), int(one.sample[0])
-        self._judged, self._judged_samples = sample, self._judged_samples + min(samples, sample + 1)
+        self._judged, self._judged_samples = sample, self._judged_samples + samples
         if not pair.probability < samples / one.lines.rate_hz / self.false_alarm_interval_s:
             return self._end(one)
         self._agrees_from = -1

@@ -326,6 +326,12 @@ class MatrixSettings:
         return self.span * self.count
 
     @property
+    def settled_window(self) -> int:
+        """Samples of a window and of the settling before it."""
+        assert self.settle is not None
+        return self.lines.window * ((self.settle if self.count > 1 else 0) + 1)
+
+    @property
     def first_place(self) -> int:
         """Samples from the begin of an experiment to the end of its first window that is used."""
         assert self.settle is not None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Emit, Event, MatrixResponses, SignalError, Stage, StatefulBase, hand_over, ignore
+from livebode.estimation.set_aside import NOTHING, Integers, contains
 from livebode.estimation.spectra import LineSpectra, SpectraRows
 from livebode.estimation.watch import InputStatistics
 from livebode.kernel import (
@@ -92,6 +95,15 @@ class MatrixTracker(StatefulBase):
         self._past, self._complete, self._work = MatrixHistory.empty(self._matrices, _AT_ONCE)
         self._next = 0
         self._apart = np.ones(len(bins), dtype=np.bool_)
+        self._aside = NOTHING
+
+    def set_aside(self, spans: Integers, /) -> None:
+        """First sample of each stretch, and the one after its last, shape (spans, 2), as far as the next Block.
+
+        The machine is off, or another one, there. Windows with these samples do not count, and neither do those within
+        `settle` periods after them.
+        """
+        self._aside = spans
 
     @property
     def counts(self) -> dict[str, int]:
@@ -127,6 +139,9 @@ class MatrixTracker(StatefulBase):
             self._complete[:] = False
         rows = self._spectra.process(data)
         self._watch.take(block, rows)
+        if len(self._aside):
+            not_ready = contains(self._aside, rows.sample - s.settled_window + 1, rows.sample)
+            rows = replace(rows, clean=rows.clean & ~not_ready)
         found = self._responses(rows, block)
         hand_over(self._events, emit)
         return found
@@ -136,16 +151,15 @@ class MatrixTracker(StatefulBase):
         settled = np.flatnonzero((rows.sample - s.start) % s.span + 1 >= s.first_place)
         sample = rows.sample[settled]
         found, count = self._estimate(rows, settled)
-        used = s.memory if s.average else 1
-        middle = sample - (s.lines.window - 1) / 2 - s.span * (s.count - 1) / 2
-        if s.average:
-            middle = middle - s.cycle * (count - 1) / 2
+        used = np.maximum(count, 1) if s.average else np.ones_like(count)
+        extent = s.lines.window + np.where(count > 0, s.span * (s.count - 1) + s.cycle * (used - 1), 0)
+        middle = sample - (s.lines.window - 1) / 2 - s.span * (s.count - 1) / 2 - s.cycle * (used - 1) / 2
         return MatrixResponses(
             s.lines,
             tuple(s.output),
             s.columns,
             **vars(found),
-            first=sample - s.lines.window + 1 - s.cycle * (used - 1) - s.span * (s.count - 1),
+            first=sample - extent + 1,
             sample=sample,
             time_s=np.asarray(block.origin_s + middle / block.rate_hz, dtype=np.float64),
             units=(),

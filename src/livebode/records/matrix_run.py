@@ -68,12 +68,14 @@ def entry_missing(path: str, summary: Mapping[str, Any]) -> RecordError:
     )
 
 
-def matrix_unsupported(path: str, what: str) -> RecordError:
+def matrix_unsupported(
+    path: str, what: str, remedy: str = "run the recording with one output and one input"
+) -> RecordError:
     """The error where a whole run with one response is needed, and no entry can be chosen."""
     return RecordError(
         "matrix-unsupported",
         f"{path!r} is a matrix run, and {what} needs a run with one response",
-        "run the recording with one output and one input",
+        remedy,
         path=path,
     )
 

@@ -105,10 +105,12 @@ def covariance_rows(responses: MatrixResponses) -> Table:
     return Table(COVARIANCE_SCHEMA, tuple(columns))
 
 
-def entry_rows(table: Table, output: str, input: str) -> Table:
+def entry_rows(
+    table: Table, output: str, input: str, columns: Sequence[str] = tuple(response_table.SCHEMA.names)
+) -> Table:
     """The rows of one entry, with the columns of any run."""
     at = table.text("output").where(output) & table.text("input").where(input)
-    plain = table.select(response_table.SCHEMA.names)
+    plain = table.select(list(columns))
     return Table(plain.schema, tuple(column[np.flatnonzero(at)] for column in plain.columns))
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from math import nan
 from typing import Any
 
-from livebode.core import Event, UsageError
+from livebode.core import Event
 from livebode.core.clock import RunClock, moment, moments_by
-from livebode.core.installing import needing, not_installed
+from livebode.core.installing import needing
+from livebode.records.confined_sql import QueryResult, QueryTables, answer
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, RunRecord
@@ -35,23 +35,6 @@ _SINGLE_EVENTS = pa.schema(
 _NEVER_MISSING = ("time_s", "frequency_hz")  # as plain columns, so that conditions on them reach the files
 _COUNTS = [("count", pa.int64()), ("first_s", pa.float64()), ("last_s", pa.float64())]
 _EVENTS = pa.schema([*_SINGLE_EVENTS, *_COUNTS])
-# It reads only the given tables and writes nothing, so that an untrusted query can be run.
-_CONFINED = (
-    "SET memory_limit = '2GB'",
-    "SET temp_directory = ''",
-    "SET python_enable_replacements = false",
-    "SET enable_external_access = false",
-    "SET lock_configuration = true",
-)
-
-
-@dataclass(frozen=True)
-class QueryResult:
-    """The rows of a query; `more`: there are others that were omitted."""
-
-    columns: tuple[str, ...]
-    rows: list[tuple[Any, ...]]
-    more: bool
 
 
 def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
@@ -75,62 +58,16 @@ def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
     RecordError
         If the run cannot be read.
     """
-    try:
-        import duckdb
-    except ImportError:
-        raise not_installed("DuckDB is not installed", package="duckdb", extra="query") from None
-    with duckdb.connect(":memory:") as database:
-        try:
-            asked = {str(name).lower() for name in database.get_table_names(sql)} or set(_TABLES)
-        except duckdb.Error:
-            asked = set(_TABLES)  # it is not a SELECT, and is rejected below
-        damages: list[Event] = []  # found in Arrow's threads
+    damages: list[Event] = []  # found in Arrow's threads
+
+    def show(database: Any, asked: set[str]) -> None:
         _show(run, database, asked, damages)
-        for setting in _CONFINED:
-            database.execute(setting)
-        try:
-            found = _answered(database, sql, rows_max)
-        except duckdb.Error as error:
-            # After the sentence the message repeats the query, with an arrow.
-            sentence = " ".join(str(error).split("\n\n")[0].split())
-            tables = _known(run)
-            raise UsageError(
-                "query-rejected",
-                f"the query cannot be run: {sentence}",
-                f"query the tables of this run: {', '.join(tables)}",
-                argument="sql",
-                reason=sentence,
-                tables=tables,
-            ) from None
-        finally:
-            for damage in damages:
-                run.report(damage)
-    if found is None:
-        tables = _known(run)
-        raise UsageError(
-            "missing", "the query is empty", f"write SQL on {', '.join(tables)}", argument="sql", tables=tables
-        )
-    return found
 
-
-def _answered(database: Any, sql: str, rows_max: int) -> QueryResult | None:
-    """The result; None if the SQL is empty. Ctrl-C ends the query."""
-
-    def ask() -> QueryResult | None:
-        answer = database.execute(sql)
-        if answer is None:
-            return None
-        columns, rows = tuple(column[0] for column in answer.description or ()), answer.fetchmany(rows_max + 1)
-        return QueryResult(columns, rows[:rows_max], len(rows) > rows_max)
-
-    # In another thread, because DuckDB checks for signals only occasionally.
-    with ThreadPoolExecutor(1) as worker:
-        running = worker.submit(ask)
-        try:
-            return running.result()
-        except KeyboardInterrupt:
-            database.interrupt()
-            raise
+    try:
+        return answer(sql, rows_max, QueryTables("run", _TABLES, show, lambda: _known(run)))
+    finally:
+        for damage in damages:
+            run.report(damage)
 
 
 def _known(run: RunRecord) -> list[str]:

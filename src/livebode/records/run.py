@@ -227,8 +227,12 @@ class RunRecord:
         none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
         return MatrixResponses.join(list(self.matrix_batches()) or [self._with_units(one) for one in none])
 
-    def matrix_batches(self, size_bytes_max: int | None = None) -> Iterator[MatrixResponses]:
+    def matrix_batches(
+        self, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
+    ) -> Iterator[MatrixResponses]:
         """All readable matrices in order, in parts of bounded size; or the newest, from files up to this size.
+
+        With `span_s`, segments completely outside of that time are skipped.
 
         Raises
         ------
@@ -236,8 +240,9 @@ class RunRecord:
             If it is not a matrix run.
         """
         shape = self._matrix_shape
-        responses = self._whole(self.tables("responses", size_bytes_max), shape.response_rows, (MATRIX_SCHEMA.names,))
-        covariance = self._whole(self.tables("covariance"), shape.covariance_rows, (COVARIANCE_SCHEMA.names,))
+        rows, factors = self.tables("responses", size_bytes_max, span_s), self.tables("covariance", span_s=span_s)
+        responses = self._whole(rows, shape.response_rows, (MATRIX_SCHEMA.names,))
+        covariance = self._whole(factors, shape.covariance_rows, (COVARIANCE_SCHEMA.names,))
         yield from map(self._with_units, matrices(responses, covariance, shape))
 
     def _with_units(self, responses: MatrixResponses) -> MatrixResponses:

@@ -64,7 +64,7 @@ def to_wide(responses: Responses, *, lossless: bool = False) -> pa.Table:
     for name, (real, imaginary) in _COMPLEX.items():
         columns[real], columns[imaginary] = getattr(responses, name).real, getattr(responses, name).imag
     with np.errstate(over="ignore", under="ignore"):
-        arrays = [_as_arrow(columns[field.name], field.type) for field in schema]
+        arrays = [as_arrow(columns[field.name], field.type) for field in schema]
     return pa.Table.from_arrays(arrays, schema=schema)
 
 
@@ -95,7 +95,7 @@ def from_wide(table: pa.Table, found: Mapping[str, Any]) -> Responses:
     """
     lines = lines_in(found)
     schema = wide_schema(len(lines))
-    column = {field.name: _as_numpy(table, field, lines) for field in schema}
+    column = {field.name: as_numpy(table, field, lines) for field in schema}
     values: dict[str, NDArray[Any]] = {name: column[name] for name in (*_COUNTED, "ready", "valid")}
     for name in ("time_s", *_ROUNDED, *_REAL):
         values[name] = column[name].astype(np.float64, copy=False)
@@ -130,30 +130,32 @@ def wide_options(schema: pa.Schema) -> dict[str, Any]:
     }
 
 
-def _as_arrow(values: NDArray[Any], kind: pa.DataType) -> pa.Array[Any]:
+def as_arrow(values: NDArray[Any], kind: pa.DataType) -> pa.Array[Any]:
+    """A column of this type, shape (rows,), or of lists of fixed length, shape (rows, lines)."""
     if not isinstance(kind, pa.FixedSizeListType):
         return from_numpy(values.astype(kind.to_pandas_dtype(), copy=False))
     flat = from_numpy(values.astype(kind.value_type.to_pandas_dtype(), copy=False).ravel())
     return pa.FixedSizeListArray.from_arrays(flat, type=kind)
 
 
-def _as_numpy(table: pa.Table, field: pa.Field[Any], lines: Lines) -> NDArray[Any]:
-    """Shape (rows,), or (rows, lines) for a column of lists."""
+def as_numpy(table: pa.Table, field: pa.Field[Any], lines: Lines) -> NDArray[Any]:
+    """A column, shape (rows,), or of lists, shape (rows, lines); RecordError if it is missing or has other lists."""
     at = table.schema.get_field_index(field.name)
     if at < 0:
-        raise _unexpected(f"has no column {field.name!r}")
+        raise unexpected_rows(f"has no column {field.name!r}")
     array = table.column(at).combine_chunks()
     if pa.types.is_fixed_size_list(field.type):
         if not len(array):
             return np.empty((0, len(lines)), dtype=field.type.value_type.to_pandas_dtype())
         lengths = pc.unique(pc.list_value_length(array)).to_pylist()
         if lengths != [len(lines)]:
-            raise _unexpected(f"has {lengths[0]} lines in a row of {field.name!r}, and its grid has {len(lines)}")
+            raise unexpected_rows(f"has {lengths[0]} lines in a row of {field.name!r}, and its grid has {len(lines)}")
         array = array.flatten()
     if array.null_count:
-        raise _unexpected(f"has a null in {field.name!r}")
+        raise unexpected_rows(f"has a null in {field.name!r}")
     return to_numpy(array).reshape(table.num_rows, -1) if pa.types.is_fixed_size_list(field.type) else to_numpy(array)
 
 
-def _unexpected(what: str) -> RecordError:
+def unexpected_rows(what: str) -> RecordError:
+    """The error of rows that are not from a run."""
     return RecordError("unexpected-content", f"the table of wide responses {what}", "write it again from the run")

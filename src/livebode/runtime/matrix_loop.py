@@ -61,11 +61,16 @@ class MatrixRunLoop(SampleLoop[Outcome]):
             self._stream.announce(responses)
 
     def _compute(self, block: Block) -> list[Block]:
+        if (readiness := self.pipeline.readiness) is not None:
+            self._stream.publish_all(readiness.take(block))
+            self._tracker.set_aside(readiness.spans)
         self._count(block)
         before = time.perf_counter()
         responses = replace(self._tracker.process(block, self._events.append), units=self._units)
         self._counts.take(responses, time.perf_counter() - before)
         self.pipeline.columns.take(responses)
+        if readiness is not None:
+            readiness.left_out(responses.sample - self._tracker.settings.settled_window + 1, responses.sample)
         if len(responses):
             self._remember(responses)
             self._stream.publish(responses)
@@ -116,7 +121,11 @@ class MatrixRunLoop(SampleLoop[Outcome]):
     def _results(self) -> dict[str, Any]:
         done = self._describe() | summary.of_source(self.source)
         done |= summary.done(self._tracker.counts, self._tracker.settings.lines.rate_hz, self._counts)
-        done["monitoring"] = self.pipeline.detection.summary()
+        suppressed_s = 0.0
+        if self.pipeline.readiness is not None:
+            done["readiness"] = self.pipeline.readiness.summary(self._tracker.settings.lines.rate_hz)
+            suppressed_s = done["readiness"]["suppressed_s"]
+        done["monitoring"] = self.pipeline.detection.summary(suppressed_s)
         return done | self.pipeline.columns.summary(self._tracker.settings.lines.frequency_hz)
 
     def _draw(self, into: Path) -> None:

@@ -9,11 +9,12 @@ from livebode.configuration.axis import Axis
 from livebode.configuration.matrix import matrix_settings
 from livebode.core import ConfigError, Lines, LivebodeError, Stateful
 from livebode.estimation.settings import nearest_hop
-from livebode.mimo import MatrixTracker
+from livebode.mimo import MatrixSettings, MatrixTracker
 from livebode.preparation.plan import LIVE_RESPONSES_PER_S
 from livebode.runtime.matrix_columns import MatrixColumns
 from livebode.runtime.matrix_detection import MatrixDetection, matrix_detection
 from livebode.runtime.pipeline import Pipeline, check_channels
+from livebode.runtime.readiness import Readiness
 from livebode.runtime.sample_pipeline import SamplePipeline
 from livebode.sources.live import LiveSource
 
@@ -32,12 +33,15 @@ class MatrixPipeline:
         Counts where the columns are valid, and why not.
     detection
         Detects changes of the machine.
+    readiness
+        Whether the machine is ready, if a channel shows it.
     """
 
     axis: Axis
     tracker: MatrixTracker
     columns: MatrixColumns
     detection: MatrixDetection
+    readiness: Readiness | None = None
 
     @classmethod
     def of(cls, axis: Axis, rate_hz: float, hop: int | None = None) -> MatrixPipeline:
@@ -45,7 +49,7 @@ class MatrixPipeline:
         tracker = MatrixTracker(matrix_settings(axis, rate_hz, hop))
         settings = tracker.settings
         columns = MatrixColumns(settings.columns, len(settings.lines))
-        return cls(axis, tracker, columns, matrix_detection(axis, settings))
+        return cls(axis, tracker, columns, matrix_detection(axis, settings), _readiness(axis, settings))
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> MatrixPipeline:
@@ -86,7 +90,8 @@ class MatrixPipeline:
     @property
     def channels(self) -> list[str]:
         """All channels in use, each once."""
-        return self.signals
+        ready = [] if self.readiness is None else [self.readiness.condition.channel]
+        return list(dict.fromkeys([*self.signals, *ready]))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -96,7 +101,8 @@ class MatrixPipeline:
     @property
     def parts(self) -> Mapping[str, Stateful]:
         """Stages with a state, by name."""
-        return {"tracker": self.tracker, "columns": self.columns, "detection": self.detection}
+        ready = {} if self.readiness is None else {"readiness": self.readiness}
+        return {"tracker": self.tracker, "columns": self.columns, "detection": self.detection, **ready}
 
     def take_over(self, before: SamplePipeline) -> bool:
         """Continue with the state of the previous one, if the settings that it depends on are unchanged.
@@ -107,9 +113,19 @@ class MatrixPipeline:
             self.tracker.restore(before.parts["tracker"].snapshot())
         except LivebodeError:
             return False
-        if isinstance(before, MatrixPipeline) and self.axis.monitoring == before.axis.monitoring:
+        if not isinstance(before, MatrixPipeline):
+            return True
+        if self.readiness and before.readiness and self.readiness.condition == before.readiness.condition:
+            self.readiness.take_over(before.readiness)
+        if self.axis.monitoring == before.axis.monitoring:
             self.detection.take_over(before.detection)
         return True
+
+
+def _readiness(axis: Axis, settings: MatrixSettings) -> Readiness | None:
+    """The state of the machine, if a channel shows it."""
+    window = settings.lines.window
+    return None if axis.ready is None else Readiness(axis.ready, window, settings.settled_window - window)
 
 
 def live_pipeline(axis: Axis, source: LiveSource) -> Pipeline | MatrixPipeline:

@@ -75,13 +75,18 @@ class Readiness(StatefulBase):
         """The responses with the flag whether the machine was ready; each call has later responses than the last."""
         if not len(responses) or not len(self.spans):
             return responses
-        first, last = responses.first - self._reach, responses.sample + self._reach
-        ready = ~contains(self.spans, first, last)
-        later = self.spans[:, 1] > first[-1]
-        later[-1:] |= self._since is not None
-        self.spans = self.spans[later]
-        self._left_out += int(np.count_nonzero(~ready))
-        return replace(responses, ready=ready)
+        left_out = self.left_out(responses.first - self._reach, responses.sample + self._reach)
+        return replace(responses, ready=~left_out)
+
+    def left_out(self, first: NDArray[np.int64], last: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which responses that depend on the samples first … last are left out; as `mark`, and they are counted."""
+        found = contains(self.spans, first, last)
+        if len(first) and len(self.spans):
+            later = self.spans[:, 1] > first[-1]
+            later[-1:] |= self._since is not None
+            self.spans = self.spans[later]
+            self._left_out += int(np.count_nonzero(found))
+        return found
 
     def take_over(self, before: Readiness) -> None:
         """Continue with the machine's state in another run, which reports it again."""

@@ -360,10 +360,10 @@ def _tables(summary: Mapping[str, Any]) -> dict[str, ColumnTable]:
 
 
 def _tiers(summary: Mapping[str, Any]) -> Tiers:
-    """Means of old responses; none of matrices, or of averages, which contain each other."""
+    """Means of old responses; none of averages, which contain each other."""
     averages = (summary.get("configuration", {}).get("tracking") or {}).get("average")
     found = summary.get("found") or {}
-    return no_tiers if averages or is_matrix(summary) or "bins" not in found else Thinning(found).tables
+    return no_tiers if averages or "bins" not in found else Thinning(found).tables
 
 
 def make_way(path: Path) -> None:
