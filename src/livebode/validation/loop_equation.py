@@ -78,14 +78,19 @@ class LoopSignals:
             If there are fewer than 9 periods, or the excitation is zero at all lines.
         """
         period = lines.window
+        whole = starts is None
         if starts is None:
             starts = period * np.arange(len(block) // period - 1)
         count = len(starts)
         if count < WINDOWS_MIN:
+            what, remedy = f"fewer than {WINDOWS_MIN + 1} periods of {period}", "record longer"
+            if not whole:
+                what = f"too few: {count} windows of two settled periods, and {WINDOWS_MIN} are needed"
+                remedy = "record more repetitions, or longer experiments"
             raise SignalError(
                 "too-short",
-                f"{len(block)} samples in a row without a gap are fewer than {WINDOWS_MIN + 1} periods of {period}",
-                "record longer",
+                f"{len(block)} samples in a row without a gap are {what}",
+                remedy,
                 samples=len(block),
                 limit=(WINDOWS_MIN + 1) * period,
             )
@@ -141,11 +146,11 @@ class LoopSignals:
 
 def _spectra(signals: Floats, lines: Lines, starts: NDArray[np.intp]) -> Complex:
     """Of windows of two periods, (windows, signals, lines)."""
-    period = lines.window
-    hann = 1 - np.cos(np.pi * np.arange(2 * period) / period)
-    angle = np.pi / period * np.outer(np.arange(2 * period), 2 * np.array(lines.bins))
-    kernel = hann[:, np.newaxis] * np.exp(-1j * angle) / hann.sum()
-    return np.stack([signals[:, start : start + 2 * period] @ kernel for start in starts])
+    length = 2 * lines.window
+    hann = 1 - np.cos(2 * np.pi * np.arange(length) / length)
+    bins = 2 * np.array(lines.bins)
+    windows = np.stack([signals[:, start : start + length] for start in starts])
+    return np.fft.rfft(windows * hann)[..., bins] / hann.sum()
 
 
 def _moments(about: Complex) -> tuple[Complex, Complex]:
