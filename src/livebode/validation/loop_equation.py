@@ -145,7 +145,10 @@ def _spectra(signals: Floats, lines: Lines, starts: NDArray[np.intp]) -> Complex
     hann = 1 - np.cos(np.pi * np.arange(2 * period) / period)
     angle = np.pi / period * np.outer(np.arange(2 * period), 2 * np.array(lines.bins))
     kernel = hann[:, np.newaxis] * np.exp(-1j * angle) / hann.sum()
-    return np.stack([signals[:, start : start + 2 * period] @ kernel for start in starts])
+    windows = np.stack([signals[:, start : start + 2 * period] for start in starts])
+    # One product of reals: each of a real matrix and a complex one would convert the first and wait for BLAS threads.
+    product = windows.reshape(-1, 2 * period) @ np.ascontiguousarray(kernel).view(float)
+    return product.view(complex).reshape(len(starts), len(signals), -1)
 
 
 def _moments(about: Complex) -> tuple[Complex, Complex]:
