@@ -118,7 +118,7 @@ def test_typed_lines_that_no_window_fits_are_refused():
         )
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(order=st.one_of(st.integers(-5, 1), st.integers(21, 99), st.floats(0, 30), st.booleans()))
 def test_a_prbs_order_out_of_range_is_refused_with_the_nearest(order):
     error = refusal(lambda: prbs(order))

@@ -28,11 +28,10 @@ rate_hz = 4000
 """
 
 
-@pytest.mark.parametrize("resolution_hz", [40, 60])
-def test_the_function_block_brings_the_excitation_in_within_the_peaks_that_were_predicted(resolution_hz, tmp_path):
+def test_the_function_block_brings_the_excitation_in_within_the_peaks_that_were_predicted(tmp_path):
     """From rest: switched on at once the following error is several times that of the periodic state."""
     axis = BeltAxis()
-    spec = ExperimentSpec(band_hz=(20, 140), resolution_hz=resolution_hz, amplitude_n_m=1.0)
+    spec = ExperimentSpec(band_hz=(20, 140), resolution_hz=60, amplitude_n_m=1.0)
     design = choose(spec, belt_machine(axis), MachineLimits(torque_n_m_max=14.5))
     write(tmp_path / "w.st", design.waveform, "w")
     block = Machine((tmp_path / "w.st").read_text()).instance("FB_w")
@@ -54,6 +53,7 @@ def test_the_function_block_brings_the_excitation_in_within_the_peaks_that_were_
 @pytest.mark.parametrize(
     "spec",
     [
+        {"band_hz": (20, 140), "resolution_hz": 40},
         {"kind": "chirp", "band_hz": (20, 140), "resolution_hz": 10},
         {"kind": "prbs", "band_hz": (20, 140), "resolution_hz": 20},
         {"kind": "prbs", "band_hz": (20, 400), "order": 3},

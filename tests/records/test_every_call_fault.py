@@ -1,6 +1,6 @@
 """A call that the record makes on the file system fails once, or is the last one before the power goes.
 
-A third of the calls, drawn at random with a seed; `make crash` takes every one (LIVEBODE_CRASH_CALLS: their share).
+A sixth of the calls, drawn at random with a seed; `make crash` takes every one (LIVEBODE_CRASH_CALLS: their share).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from livebode.core import LivebodeError
 from tests.support.failing_disk import PowerCut, cut, disk_that, full
 from tests.support.recorded import RATE_HZ, check_beginning, check_whole, machine, record_machine, unfinished
 
-SHARE = float(os.environ.get("LIVEBODE_CRASH_CALLS", "0.3333"))
+SHARE = float(os.environ.get("LIVEBODE_CRASH_CALLS", "0.1667"))
 SAMPLES = 2000
 BESIDE = 20
 """Calls that may change places: segments are closed and journals synced in threads of their own."""

@@ -29,7 +29,6 @@ def pushed(dft: Instance, channels: list[str], sample: np.ndarray) -> np.ndarray
 @pytest.mark.parametrize(
     ("window", "bins", "phase"),
     [
-        (400, range(2, 16, 2), "fixed"),
         (400, range(1, 22), "fixed"),
         (37, [1, 5, 18], "window"),
         (50, [1, 24], "window"),

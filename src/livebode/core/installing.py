@@ -7,6 +7,7 @@ import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -111,10 +112,8 @@ def packages_of(extra: str, requires: Sequence[str]) -> list[Requirement]:
     >>> [str(one.name) for one in packages_of("pdf", requires)]
     ['b', 'c']
     """
-    from packaging.requirements import Requirement
-
     found = []
-    for one in map(Requirement, requires):
+    for one in map(_requirement, requires):
         if one.marker is None or one.marker.evaluate({"extra": ""}) or not one.marker.evaluate({"extra": extra}):
             continue
         if one.name == "livebode":
@@ -122,6 +121,13 @@ def packages_of(extra: str, requires: Sequence[str]) -> list[Requirement]:
         else:
             found.append(one)
     return found
+
+
+@cache  # each extra is looked up in all lines
+def _requirement(line: str) -> Requirement:
+    from packaging.requirements import Requirement
+
+    return Requirement(line)
 
 
 def _packages(requires: list[str], extras: tuple[str, ...]) -> list[str]:

@@ -134,7 +134,8 @@ def _bounded(text: str) -> bytes:
 
 def versions() -> dict[str, Any]:
     """livebode, Python, the system, the kernel's instruction sets, and every installed package."""
-    packages = {found.metadata["Name"]: found.version for found in distributions() if found.metadata["Name"]}
+    read = (found.metadata for found in distributions())  # each time from its file
+    packages = {one["Name"]: one["Version"] for one in read if one["Name"]}
     return {
         "livebode": __version__,
         "python": sys.version,

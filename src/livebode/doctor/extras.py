@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from importlib.metadata import PackageNotFoundError, metadata, requires, version
 from typing import TYPE_CHECKING
 
@@ -22,8 +23,10 @@ def check_extras() -> Check:
         extra: [] for extra in metadata("livebode").get_all("Provides-Extra") or () if extra != _ALL
     }
     required = requires("livebode") or []
+    installed = cache(_version)  # several extras need the same package, and its metadata is a file
     for extra in found:
-        found[extra] = [problem for one in packages_of(extra, required) if (problem := _problem(one))]
+        needed = packages_of(extra, required)
+        found[extra] = [problem for one in needed if (problem := _problem(one, installed(one.name)))]
     return judged(found)
 
 
@@ -43,10 +46,15 @@ def judged(problems: dict[str, list[str]]) -> Check:
     return Check(NAME, "ok", "; ".join(parts), remedy, facts)
 
 
-def _problem(requirement: Requirement) -> str:
+def _version(name: str) -> str | None:
     try:
-        found = version(requirement.name)
+        return version(name)
     except PackageNotFoundError:
+        return None
+
+
+def _problem(requirement: Requirement, found: str | None) -> str:
+    if found is None:
         return f"{requirement.name} is missing"
     if requirement.specifier.contains(found, prereleases=True):
         return ""
