@@ -96,7 +96,8 @@ def main(runs: int) -> int:
             bias = (value[:, i].mean() - true[parameter]) / value[:, i].std()
             shares = "".join(f"{100 * one:>9.1f} %" for one in share[:, i])
             print(
-                f"{parameter:16}{true[parameter]:>10.4g}{value[:, i].mean():>10.4g}{bound[i]:>10.2g}{bias:>12.2f}{shares}"
+                f"{parameter:16}{true[parameter]:>10.4g}{value[:, i].mean():>10.4g}{bound[i]:>10.2g}{bias:>12.2f}"
+                + shares
             )
         print(f"{'mean':58}" + "".join(f"{100 * one:>9.1f} %" for one in share.mean(axis=1)), flush=True)
     return 0

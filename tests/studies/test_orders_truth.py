@@ -19,6 +19,8 @@ from livebode.experiment_design.files.angle_table import write_angle_table
 from livebode.interface.example_recordings import write_examples
 from livebode.motion import Shaft, ShaftOrders, order_changes, time_lines
 from livebode.motion.angle_orders import Complex, Stroke
+from studies.friction import SLIDING
+from studies.friction import truth as friction_truth
 from studies.orders import CASES, ECCENTRIC, SHAFT, measured, truth
 from tests.support.command import livebode
 from tools.structured_text import Machine
@@ -152,9 +154,31 @@ def test_an_order_that_grew_is_named_and_the_others_are_not() -> None:
 
 
 def test_ripple_of_the_simulated_axis_is_found_at_three_speeds() -> None:
-    found = measured(CASES["three speeds"], seed=3).shafts[0]
-    assert np.all(np.abs(found.value - truth()) <= found.bound(2.5))
+    case = CASES["three speeds"]
+    found = measured(case, seed=3).shafts[0]
+    assert np.all(np.abs(found.value - truth(case)) <= found.bound(2.5))
     assert [order for order, seen in zip(SHAFT.orders, found.seen) if seen] == [24]
+
+
+def test_a_ripple_is_found_while_an_excitation_runs_whose_lines_it_meets() -> None:
+    """Order 24 is at 20.1 and 40.2 Hz in four of six strokes, and lines are at 20 and 40 Hz."""
+    case = CASES["three speeds, excited"]
+    report = measured(case, seed=3)
+    found = report.shafts[0]
+    assert {20.0, 40.0} <= set(report.subtracted_hz)
+    assert np.all(np.abs(found.value - truth(case)) <= found.bound(2.5))
+    assert [order for order, seen in zip(SHAFT.orders, found.seen) if seen] == [24]
+
+
+def test_a_ripple_that_moves_a_slow_axis_does_not_make_its_inertia_too_small() -> None:
+    """Without the ripple's subtraction, the inertia is 4 % too small here, and the ripple with it."""
+    case = CASES["the same, three times the ripple"]
+    report = measured(case, seed=0)
+    curve, found = report.friction, report.shafts[0]
+    at = curve.index("inertia")
+    assert abs(curve.value[at] - friction_truth(SLIDING)["inertia"]) <= curve.bound(0.99)[at]
+    assert curve.bound()[at] < 0.03 * curve.value[at]
+    assert np.all(np.abs(found.value - truth(case)) <= found.bound(2.5))
 
 
 def test_an_eccentric_encoder_is_told_from_a_torque_ripple() -> None:

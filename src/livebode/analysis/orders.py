@@ -31,6 +31,7 @@ Floats = NDArray[np.float64]
 
 _SHARPEST = 2.01  # samples: σ of the kernel
 _SAME_LINE = 0.02  # of a frequency, within which a line is one that was specified
+_SLOWEST = 0.05  # of the highest speed, from which on an axis counts as moving
 _KEPT = 0.2  # of an amplitude, that the kernel must leave
 
 
@@ -150,12 +151,10 @@ def orders_of(
         )  # fmt: skip
     known = np.zeros(0) if lines_hz is None else np.asarray(lines_hz, dtype=np.float64)
     search = _Search(motion, shafts, _angle(motion, angle) * 2 * np.pi / per_turn, known, highest_hz)
-    found = search.result(friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind,
-                                         band_hz=band_hz))  # fmt: skip
+    top = search.friction(motion.block, band_hz).speed[1]
+    found = search.result(search.friction(motion.block, band_hz, _SLOWEST * top))
     if any(one.seen.any() for one in found.shafts):
-        quiet = search.without_ripple(found.shafts)
-        found = search.result(friction_curve(quiet, input=motion.input, output=motion.output, kind=motion.kind,
-                                             band_hz=band_hz))  # fmt: skip
+        found = search.result(search.friction(search.without_ripple(found.shafts), band_hz, _SLOWEST * top))
     return found
 
 
@@ -168,6 +167,13 @@ class _Search:
     angle: Floats
     known_hz: Floats
     highest_hz: float
+
+    def friction(self, block: Block, band_hz: float, slowest: float | None = None) -> FrictionCurve:
+        """Friction and inertia from these samples of the axis."""
+        motion = self.motion
+        return friction_curve(
+            block, input=motion.input, output=motion.output, kind=motion.kind, band_hz=band_hz, slowest=slowest
+        )
 
     def result(self, curve: FrictionCurve) -> OrderReport:
         """The orders with this friction and inertia."""
@@ -239,8 +245,8 @@ def _unknown_lines(
 
 
 def _slowest(speed: Floats) -> float:
-    """Speed from which on an axis counts as moving: 5 % of the highest."""
-    return 0.05 * float(np.max(np.abs(speed)))
+    """Speed from which on an axis counts as moving."""
+    return _SLOWEST * float(np.max(np.abs(speed)))
 
 
 def _band(rate_hz: float) -> float:
