@@ -1,4 +1,7 @@
-"""Known friction of the simulated axis, and how often its bounds contain it: `python -m studies.friction [runs]`."""
+"""Known friction of the simulated axis, and how often its bounds contain it.
+
+python -m studies.friction [runs] [part of the cases' names]
+"""
 
 from __future__ import annotations
 
@@ -81,8 +84,10 @@ def within(found: FrictionCurve, true: dict[str, float]) -> NDArray[np.bool_]:
     return np.array([error <= found.bound(p) for p in PROBABILITIES])
 
 
-def main(runs: int) -> int:
+def main(runs: int, part: str = "") -> int:
     for name, case in CASES.items():
+        if part not in name:
+            continue
         curves = [measured(case, seed) for seed in range(runs)]
         names = max((curve.names for curve in curves), key=len)
         whole = [curve for curve in curves if curve.names == names]
@@ -104,4 +109,4 @@ def main(runs: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if sys.argv[1:] else RUNS))
+    sys.exit(main(int(sys.argv[1]) if sys.argv[1:] else RUNS, *sys.argv[2:3]))

@@ -1,4 +1,7 @@
-"""A known torque ripple, and how often its bounds contain it: `python -m studies.orders [runs]`."""
+"""A known torque ripple, and how often its bounds contain it.
+
+python -m studies.orders [runs] [part of the cases' names]
+"""
 
 from __future__ import annotations
 
@@ -71,11 +74,13 @@ def truth(case: Case) -> np.ndarray:
     return np.array([-1j * case.ripple_n_m if order == PER_TURN else 0.0 for order in SHAFT.orders])
 
 
-def main(runs: int) -> int:
+def main(runs: int, part: str = "") -> int:
     at = SHAFT.orders.index(PER_TURN)
     print(f"ripple of {RIPPLE_N_M} N m, {PER_TURN} a turn; {runs} runs each")
     print(f"{'':34}{'found':>8}{'± 95 %':>9}{'in 63.2 %':>11}{'in 98.2 %':>11}{'seen':>7}{'false':>7}")
     for name, case in CASES.items():
+        if part not in name:
+            continue
         found = [measured(case, seed).shafts[0] for seed in range(runs)]
         error = np.array([np.abs(one.value - truth(case)) for one in found])
         known = np.isfinite(error)
@@ -89,7 +94,8 @@ def main(runs: int) -> int:
             f"{100 * seen[:, at].mean():>5.0f} %{100 * np.delete(seen, at, axis=1).mean():>5.1f} %",
             flush=True,
         )
-    _print_eccentric(runs)
+    if part in "eccentric encoder":
+        _print_eccentric(runs)
     return 0
 
 
@@ -109,4 +115,4 @@ def _print_eccentric(runs: int) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if sys.argv[1:] else RUNS))
+    sys.exit(main(int(sys.argv[1]) if sys.argv[1:] else RUNS, *sys.argv[2:3]))

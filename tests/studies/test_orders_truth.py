@@ -60,11 +60,17 @@ def _report(
     return orders_of(samples, SHAFTS, **options)  # type: ignore[arg-type]
 
 
+@cache
+def _usual(seed: int) -> OrderReport:
+    """Three speeds, without a tone."""
+    return _report(seed, (1.0, 1.4, 2.0))
+
+
 def test_orders_of_two_shafts_are_within_their_bounds() -> None:
     true = {"motor": [0, RIPPLE * np.exp(0.5j), 0], "pinion": [-0.5j * RIPPLE, 0]}
     errors, bounds = [], []
     for seed in range(20):
-        for one in _report(seed, (1.0, 1.4, 2.0)).shafts:
+        for one in _usual(seed).shafts:
             errors.append(np.abs(one.value - true[one.shaft.name]))
             bounds.append([one.bound(1), one.bound(2)])
             assert one.seen.tolist() == [abs(value) > 0 for value in true[one.shaft.name]]
@@ -142,13 +148,13 @@ def test_changed_orders_have_the_stated_rate_of_false_alarms_over_all_orders(pha
 
 
 def test_an_order_that_grew_is_named_and_the_others_are_not() -> None:
-    before = _report(0, (1.0, 1.4, 2.0))
+    before = _usual(0)
     for seed in range(1, 6):
         changed = [c for c in _report(seed, (1.0, 1.4, 2.0), more=0.02).changes_from(before) if c.changed]
         assert [(c.shaft, c.order) for c in changed] == [("motor", 6)]
         assert abs(abs(changed[0].after) - abs(changed[0].before) - 0.02) <= changed[0].difference_bound
         assert "order 6 of the motor changed: 0.0" in changed[0].sentence("N m")
-        assert not any(c.changed for c in _report(seed + 10, (1.0, 1.4, 2.0)).changes_from(before))
+        assert not any(c.changed for c in _usual(seed + 10).changes_from(before))
     with pytest.raises(UsageError, match="no known order in common"):
         order_changes(before.shafts[:1], before.shafts[1:])
 
@@ -191,7 +197,7 @@ def test_an_eccentric_encoder_is_told_from_a_torque_ripple() -> None:
 def test_position_errors_of_a_torque_ripple_are_not_seen_and_within_their_bounds() -> None:
     errors, bounds, seen = [], [], []
     for seed in range(20):
-        for one in _report(seed, (1.0, 1.4, 2.0)).errors:
+        for one in _usual(seed).errors:
             errors.append(np.abs(one.value))
             bounds.append([one.bound(1), one.bound(2)])
             seen.append(one.seen)

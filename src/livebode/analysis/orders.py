@@ -24,7 +24,7 @@ from livebode.motion.friction_curve import FrictionCurve, friction_curve
 from livebode.motion.line_subtraction import without_lines
 from livebode.motion.order_changes import OrderChange, order_changes
 from livebode.motion.position_errors import PositionErrors, position_errors
-from livebode.motion.smooth_motion import SmoothKernel
+from livebode.motion.smooth_motion import SmoothKernel, SmoothMotion
 from livebode.motion.time_lines import TimeLine, time_lines
 
 Floats = NDArray[np.float64]
@@ -129,12 +129,13 @@ def orders_of(
     turn
         Units of the angle in one turn of the motor. Default: 2π.
     lines_hz
-        Lines of the time, such as those of an excitation that runs at the same time.
+        Lines of the time, such as those of an excitation that runs at the same time. Those that the strokes tell from
+        the orders are subtracted (`without_lines`); windows that meet the others are left out.
     highest_hz
         Highest frequency of an order.
     band_hz
-        Band of the kernel with which friction and inertia are found (`friction_curve`): a ripple of slow strokes within
-        it makes the inertia, and with it the orders, too small.
+        Band of the kernel with which friction and inertia are found (`friction_curve`). The orders that are seen are
+        subtracted first: a ripple of slow strokes within the band would make the inertia too small.
 
     Raises
     ------
@@ -151,10 +152,11 @@ def orders_of(
         )  # fmt: skip
     known = np.zeros(0) if lines_hz is None else np.asarray(lines_hz, dtype=np.float64)
     search = _Search(motion, shafts, _angle(motion, angle) * 2 * np.pi / per_turn, known, highest_hz)
-    top = search.friction(motion.block, band_hz).speed[1]
-    found = search.result(search.friction(motion.block, band_hz, _SLOWEST * top))
+    smooth = SmoothMotion.of(motion.block, motion.input, motion.output, motion.kind, band_hz, None)
+    slowest = _SLOWEST * float(np.max(np.abs(smooth.velocity)))
+    found = search.result(search.friction(motion.block, band_hz, slowest))
     if any(one.seen.any() for one in found.shafts):
-        found = search.result(search.friction(search.without_ripple(found.shafts), band_hz, _SLOWEST * top))
+        found = search.result(search.friction(search.without_ripple(found.shafts), band_hz, slowest))
     return found
 
 
@@ -168,7 +170,7 @@ class _Search:
     known_hz: Floats
     highest_hz: float
 
-    def friction(self, block: Block, band_hz: float, slowest: float | None = None) -> FrictionCurve:
+    def friction(self, block: Block, band_hz: float, slowest: float) -> FrictionCurve:
         """Friction and inertia from these samples of the axis."""
         motion = self.motion
         return friction_curve(
