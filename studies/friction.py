@@ -1,4 +1,7 @@
-"""Known friction of the simulated axis, and how often its bounds contain it: `python -m studies.friction [runs]`."""
+"""Known friction of the simulated axis, and how often its bounds contain it.
+
+python -m studies.friction [runs] [part of the cases' names]
+"""
 
 from __future__ import annotations
 
@@ -81,8 +84,10 @@ def within(found: FrictionCurve, true: dict[str, float]) -> NDArray[np.bool_]:
     return np.array([error <= found.bound(p) for p in PROBABILITIES])
 
 
-def main(runs: int) -> int:
+def main(runs: int, part: str = "") -> int:
     for name, case in CASES.items():
+        if part not in name:
+            continue
         curves = [measured(case, seed) for seed in range(runs)]
         names = max((curve.names for curve in curves), key=len)
         whole = [curve for curve in curves if curve.names == names]
@@ -96,11 +101,12 @@ def main(runs: int) -> int:
             bias = (value[:, i].mean() - true[parameter]) / value[:, i].std()
             shares = "".join(f"{100 * one:>9.1f} %" for one in share[:, i])
             print(
-                f"{parameter:16}{true[parameter]:>10.4g}{value[:, i].mean():>10.4g}{bound[i]:>10.2g}{bias:>12.2f}{shares}"
+                f"{parameter:16}{true[parameter]:>10.4g}{value[:, i].mean():>10.4g}{bound[i]:>10.2g}{bias:>12.2f}"
+                + shares
             )
         print(f"{'mean':58}" + "".join(f"{100 * one:>9.1f} %" for one in share.mean(axis=1)), flush=True)
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if sys.argv[1:] else RUNS))
+    sys.exit(main(int(sys.argv[1]) if sys.argv[1:] else RUNS, *sys.argv[2:3]))

@@ -19,6 +19,8 @@ from livebode.experiment_design.files.angle_table import write_angle_table
 from livebode.interface.example_recordings import write_examples
 from livebode.motion import Shaft, ShaftOrders, order_changes, time_lines
 from livebode.motion.angle_orders import Complex, Stroke
+from studies.friction import SLIDING
+from studies.friction import truth as friction_truth
 from studies.orders import CASES, ECCENTRIC, SHAFT, measured, truth
 from tests.support.command import livebode
 from tools.structured_text import Machine
@@ -58,11 +60,17 @@ def _report(
     return orders_of(samples, SHAFTS, **options)  # type: ignore[arg-type]
 
 
+@cache
+def _usual(seed: int) -> OrderReport:
+    """Three speeds, without a tone."""
+    return _report(seed, (1.0, 1.4, 2.0))
+
+
 def test_orders_of_two_shafts_are_within_their_bounds() -> None:
     true = {"motor": [0, RIPPLE * np.exp(0.5j), 0], "pinion": [-0.5j * RIPPLE, 0]}
     errors, bounds = [], []
     for seed in range(20):
-        for one in _report(seed, (1.0, 1.4, 2.0)).shafts:
+        for one in _usual(seed).shafts:
             errors.append(np.abs(one.value - true[one.shaft.name]))
             bounds.append([one.bound(1), one.bound(2)])
             assert one.seen.tolist() == [abs(value) > 0 for value in true[one.shaft.name]]
@@ -140,21 +148,43 @@ def test_changed_orders_have_the_stated_rate_of_false_alarms_over_all_orders(pha
 
 
 def test_an_order_that_grew_is_named_and_the_others_are_not() -> None:
-    before = _report(0, (1.0, 1.4, 2.0))
+    before = _usual(0)
     for seed in range(1, 6):
         changed = [c for c in _report(seed, (1.0, 1.4, 2.0), more=0.02).changes_from(before) if c.changed]
         assert [(c.shaft, c.order) for c in changed] == [("motor", 6)]
         assert abs(abs(changed[0].after) - abs(changed[0].before) - 0.02) <= changed[0].difference_bound
         assert "order 6 of the motor changed: 0.0" in changed[0].sentence("N m")
-        assert not any(c.changed for c in _report(seed + 10, (1.0, 1.4, 2.0)).changes_from(before))
+        assert not any(c.changed for c in _usual(seed + 10).changes_from(before))
     with pytest.raises(UsageError, match="no known order in common"):
         order_changes(before.shafts[:1], before.shafts[1:])
 
 
 def test_ripple_of_the_simulated_axis_is_found_at_three_speeds() -> None:
-    found = measured(CASES["three speeds"], seed=3).shafts[0]
-    assert np.all(np.abs(found.value - truth()) <= found.bound(2.5))
+    case = CASES["three speeds"]
+    found = measured(case, seed=3).shafts[0]
+    assert np.all(np.abs(found.value - truth(case)) <= found.bound(2.5))
     assert [order for order, seen in zip(SHAFT.orders, found.seen) if seen] == [24]
+
+
+def test_a_ripple_is_found_while_an_excitation_runs_whose_lines_it_meets() -> None:
+    """Order 24 is at 20.1 and 40.2 Hz in four of six strokes, and lines are at 20 and 40 Hz."""
+    case = CASES["three speeds, excited"]
+    report = measured(case, seed=3)
+    found = report.shafts[0]
+    assert {20.0, 40.0} <= set(report.subtracted_hz)
+    assert np.all(np.abs(found.value - truth(case)) <= found.bound(2.5))
+    assert [order for order, seen in zip(SHAFT.orders, found.seen) if seen] == [24]
+
+
+def test_a_ripple_that_moves_a_slow_axis_does_not_make_its_inertia_too_small() -> None:
+    """Without the ripple's subtraction, the inertia is 4 % too small here, and the ripple with it."""
+    case = CASES["the same, three times the ripple"]
+    report = measured(case, seed=0)
+    curve, found = report.friction, report.shafts[0]
+    at = curve.index("inertia")
+    assert abs(curve.value[at] - friction_truth(SLIDING)["inertia"]) <= curve.bound(0.99)[at]
+    assert curve.bound()[at] < 0.03 * curve.value[at]
+    assert np.all(np.abs(found.value - truth(case)) <= found.bound(2.5))
 
 
 def test_an_eccentric_encoder_is_told_from_a_torque_ripple() -> None:
@@ -167,7 +197,7 @@ def test_an_eccentric_encoder_is_told_from_a_torque_ripple() -> None:
 def test_position_errors_of_a_torque_ripple_are_not_seen_and_within_their_bounds() -> None:
     errors, bounds, seen = [], [], []
     for seed in range(20):
-        for one in _report(seed, (1.0, 1.4, 2.0)).errors:
+        for one in _usual(seed).errors:
             errors.append(np.abs(one.value))
             bounds.append([one.bound(1), one.bound(2)])
             seen.append(one.seen)

@@ -24,13 +24,14 @@ from livebode.motion.friction_curve import FrictionCurve, friction_curve
 from livebode.motion.line_subtraction import without_lines
 from livebode.motion.order_changes import OrderChange, order_changes
 from livebode.motion.position_errors import PositionErrors, position_errors
-from livebode.motion.smooth_motion import SmoothKernel
+from livebode.motion.smooth_motion import SmoothKernel, SmoothMotion
 from livebode.motion.time_lines import TimeLine, time_lines
 
 Floats = NDArray[np.float64]
 
 _SHARPEST = 2.01  # samples: σ of the kernel
 _SAME_LINE = 0.02  # of a frequency, within which a line is one that was specified
+_SLOWEST = 0.05  # of the highest speed, from which on an axis counts as moving
 _KEPT = 0.2  # of an amplitude, that the kernel must leave
 
 
@@ -128,12 +129,13 @@ def orders_of(
     turn
         Units of the angle in one turn of the motor. Default: 2π.
     lines_hz
-        Lines of the time, such as those of an excitation that runs at the same time.
+        Lines of the time, such as those of an excitation that runs at the same time. Those that the strokes tell from
+        the orders are subtracted (`without_lines`); windows that meet the others are left out.
     highest_hz
         Highest frequency of an order.
     band_hz
-        Band of the kernel with which friction and inertia are found (`friction_curve`): a ripple of slow strokes within
-        it makes the inertia, and with it the orders, too small.
+        Band of the kernel with which friction and inertia are found (`friction_curve`). The orders that are seen are
+        subtracted first: a ripple of slow strokes within the band would make the inertia too small.
 
     Raises
     ------
@@ -150,12 +152,11 @@ def orders_of(
         )  # fmt: skip
     known = np.zeros(0) if lines_hz is None else np.asarray(lines_hz, dtype=np.float64)
     search = _Search(motion, shafts, _angle(motion, angle) * 2 * np.pi / per_turn, known, highest_hz)
-    found = search.result(friction_curve(motion.block, input=motion.input, output=motion.output, kind=motion.kind,
-                                         band_hz=band_hz))  # fmt: skip
+    smooth = SmoothMotion.of(motion.block, motion.input, motion.output, motion.kind, band_hz, None)
+    slowest = _SLOWEST * float(np.max(np.abs(smooth.velocity)))
+    found = search.result(search.friction(motion.block, band_hz, slowest))
     if any(one.seen.any() for one in found.shafts):
-        quiet = search.without_ripple(found.shafts)
-        found = search.result(friction_curve(quiet, input=motion.input, output=motion.output, kind=motion.kind,
-                                             band_hz=band_hz))  # fmt: skip
+        found = search.result(search.friction(search.without_ripple(found.shafts), band_hz, slowest))
     return found
 
 
@@ -168,6 +169,13 @@ class _Search:
     angle: Floats
     known_hz: Floats
     highest_hz: float
+
+    def friction(self, block: Block, band_hz: float, slowest: float) -> FrictionCurve:
+        """Friction and inertia from these samples of the axis."""
+        motion = self.motion
+        return friction_curve(
+            block, input=motion.input, output=motion.output, kind=motion.kind, band_hz=band_hz, slowest=slowest
+        )
 
     def result(self, curve: FrictionCurve) -> OrderReport:
         """The orders with this friction and inertia."""
@@ -239,8 +247,8 @@ def _unknown_lines(
 
 
 def _slowest(speed: Floats) -> float:
-    """Speed from which on an axis counts as moving: 5 % of the highest."""
-    return 0.05 * float(np.max(np.abs(speed)))
+    """Speed from which on an axis counts as moving."""
+    return _SLOWEST * float(np.max(np.abs(speed)))
 
 
 def _band(rate_hz: float) -> float:

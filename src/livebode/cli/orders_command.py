@@ -77,9 +77,9 @@ def orders_command(
 ) -> None:
     """Find torque that repeats with the angle: cogging, eccentricity, gears; write a feedforward table.
 
-    Shafts and channels default to those of the run or configuration, and the orders to 1 … 48 of the motor. A window
-    in which an order meets a line of the time is left out: record strokes at several speeds. With --baseline, orders
-    are compared with those of an earlier recording.
+    Shafts and channels default to those of the run or configuration, and the orders to 1 … 48 of the motor. Lines of
+    the time are subtracted if the strokes separate them from the orders; else windows that meet them are left out:
+    record strokes at several speeds. With --baseline, orders are compared with those of an earlier recording.
     """
     from livebode.analysis.orders import orders_of
     from livebode.analysis.strokes import read_strokes
@@ -222,7 +222,12 @@ def show_orders(found: OrderReport) -> None:
 
     console = terminal.console(markup=False)
     low, high = found.speed_hz
-    lines = f"; lines of the time: {', '.join(f'{f:g}' for f in found.lines_hz)} Hz" if len(found.lines_hz) else ""
+    left_out = np.setdiff1d(found.lines_hz, found.subtracted_hz)
+    lines = "".join(
+        f"; lines of the time {what}: {', '.join(f'{f:g}' for f in each)} Hz"
+        for what, each in (("subtracted", found.subtracted_hz), ("left out", left_out))
+        if each.size
+    )
     console.print(f"{found.strokes} strokes at {low:.3g} … {high:.3g} turns/s of the motor{lines}", soft_wrap=True)
     for line in found.found_lines:
         size = f"{line.amplitude:.2g} {found.unit}".strip()

@@ -282,18 +282,17 @@ def _stribeck(columns: Floats, motion: SmoothMotion, used: NDArray[np.bool_], to
     def with_decay(speed: float) -> Floats:
         return np.column_stack([columns, _smooth_decay(motion, speed)])
 
-    def fitted(speed: float) -> Floats:
-        return np.linalg.lstsq(with_decay(speed)[used], motion.input[used])[0]
-
     def squares(speed: float) -> float:
-        return float(np.sum((motion.input - with_decay(speed) @ fitted(speed))[used] ** 2))
+        tried = with_decay(speed)[used]
+        return float(np.sum((motion.input[used] - tried @ np.linalg.lstsq(tried, motion.input[used])[0]) ** 2))
 
     speed = min((top * share for share in _STRIBECK), key=squares)
     for _ in range(_ROUNDS):
-        slope = float(fitted(speed)[-1]) * motion.smoothed(np.sign(motion.sharp) * _decay_slope(motion.sharp, speed))
-        full = np.column_stack([with_decay(speed), slope])
-        step = np.linalg.lstsq(full[used], motion.input[used])[0][-1]
-        step = float(np.clip(step, -speed / 2, speed))
+        tried = with_decay(speed)
+        amount = np.linalg.lstsq(tried[used], motion.input[used])[0][-1]
+        slope = amount * motion.smoothed(np.sign(motion.sharp) * _decay_slope(motion.sharp, speed))
+        full = np.column_stack([tried, slope])
+        step = float(np.clip(np.linalg.lstsq(full[used], motion.input[used])[0][-1], -speed / 2, speed))
         speed += step
         if abs(step) < _SETTLED * speed:
             break
