@@ -105,7 +105,7 @@ def solve(
 
 
 def pole_price(lines: int, erring: float) -> float:
-    """Cost of a pole beside that of its parameters; `erring` is the number of real values whose error is the model's."""
+    """Cost of a pole beside its parameters; `erring` is the number of real values whose error is the model's."""
     # A pole is searched for over all lines, so the largest of as many random values is found.
     return float(np.log(lines) + _ERROR_PRICE * erring)
 

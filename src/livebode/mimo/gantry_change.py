@@ -207,7 +207,7 @@ def _explained(name: str, difference: Floats, known: _Known) -> tuple[Cause, Flo
         solved = np.linalg.solve(_unit(known.independent), pair)
         both = pair.T @ solved
         amount = float(both[0, 1] / both[0, 0])
-    by = _scaled(solved[:, 0], known.independent) / both[0, 0]  # of the difference on the amount
+    by = _scaled(np.asarray(solved[:, 0]), known.independent) / both[0, 0]  # of the difference on the amount
     bound = normal_quantile(0.975) * float(np.sqrt(by @ known.covariance @ by))
     size, unit = _before(name, known)
     cause = Cause(name, amount, bound, size, unit, float(both[0, 1] ** 2 / both[0, 0]))

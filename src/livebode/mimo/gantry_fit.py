@@ -97,8 +97,8 @@ def fit_gantry(
     Parameters
     ----------
     responses
-        Matrices with two inputs, the torques of the left and the right motor, and two outputs, their speeds; the mean
-        of those that share no window.
+        All matrices of a recording, with two inputs, the torques of the left and the right motor, and two outputs,
+        their speeds; the mean of those that share no window is fitted.
     description
         The gantry as far as it is known: the start of the fit, and its radius and half width, which are not fitted.
     band_hz

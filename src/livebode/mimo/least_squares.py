@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core.distributions import normal_quantile
 from livebode.core.installing import needing
 from livebode.mimo.whitening import Weighted, stacked
 
@@ -66,7 +67,9 @@ def minimise(weighted: Weighted, model: Model, slopes: Model, start: Floats) -> 
     covariance = _over_lines(weighted, inverse, whole, alone) if np.isfinite(alone).all() else alone
     chi2 = _chi2(_rest(weighted, response, weighted.part(0.0)[0]))
     widened = 1 + (weighted.scatter - 1) * share
-    return MatrixMinimum(found, covariance * widened, alone * widened, epsilon, chi2, dof, weighted.value - response, settled)
+    return MatrixMinimum(
+        found, covariance * widened, alone * widened, epsilon, chi2, dof, weighted.value - response, settled
+    )
 
 
 def _inverse(slope: Floats) -> Floats:
@@ -84,7 +87,8 @@ def _over_lines(weighted: Weighted, inverse: Complex, whole: Complex, alone: Flo
     The errors that the rows of the recording show are taken through the fit. Products of lines that are further apart
     count less and from a distance on nothing, which bounds their scatter and gives a covariance without negative
     eigenvalues (Newey and West, Econometrica 55(3), 1987); the distance grows with the cube root of the lines. A model
-    error is independent from line to line. `alone` is the covariance without this, and the result if there are no rows.
+    error is independent from line to line. Few rows make Student's distribution of it, widest for a parameter that few
+    lines determine. `alone` is the covariance without this, and the result if there are no rows.
     """
     errors = len(weighted.scattered)
     if not errors:
@@ -93,13 +97,17 @@ def _over_lines(weighted: Weighted, inverse: Complex, whole: Complex, alone: Flo
     noise = inverse @ np.linalg.inv(weighted.part(0.0)[0])  # whitened noise, as the weights with ε see it
     by_noise = np.swapaxes(noise, 1, 2) @ influence
     each = np.einsum("rke,kep->rkp", weighted.scattered, by_noise)
-    total = np.einsum("rkp,rkq->pq", each, each.conj()).real
-    reach = int(np.ceil(np.cbrt(each.shape[1])))
-    for lag in range(1, min(reach, each.shape[1] - 1) + 1):
-        product = np.einsum("rkp,rkq->pq", each[:, lag:], each[:, :-lag].conj()).real
-        total += (1 - lag / (reach + 1)) * (product + product.T)
+    lines = np.arange(each.shape[1])
+    counts = np.maximum(1 - np.abs(lines[:, np.newaxis] - lines) / (np.ceil(np.cbrt(lines.size)) + 1), 0)
+    total = np.einsum("rkp,kl,rlq->pq", each, counts, each.conj(), optimize=True).real / (2 * errors)
     of_noise = np.einsum("kep,keq->pq", by_noise, by_noise.conj()).real / 2
-    return np.asarray(total / (2 * errors) + (alone - of_noise))
+    # Degrees of freedom (Satterthwaite's) of a sum of products of lines, each with this power.
+    power = np.einsum("kep,kep->kp", by_noise, by_noise.conj()).real
+    freedom = 2 * errors * power.sum(axis=0) ** 2 / np.einsum("kp,kl,lp->p", power, counts**2, power, optimize=True)
+    with needing("SciPy", "analysis", "a fit of matrices"):
+        from scipy.special import stdtrit
+    few = stdtrit(freedom, 0.975) / normal_quantile(0.975)
+    return np.asarray((total + alone - of_noise) * np.outer(few, few))
 
 
 def _searched(weighted: Weighted, model: Model, slopes: Model, inverse: Complex, start: Floats) -> tuple[Floats, bool]:

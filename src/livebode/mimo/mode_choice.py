@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from livebode.fitting.pole_search import Kind, possible, reduced_structures
 from livebode.fitting.separable import Outputs, Separated, pole_price, solve
 from livebode.mimo.least_squares import MatrixMinimum
+from livebode.mimo.refinement import refined
 from livebode.mimo.whitening import Weighted
 
 Floats = NDArray[np.float64]
@@ -18,17 +19,10 @@ Complex = NDArray[np.complex128]
 Fitted = tuple[Separated, MatrixMinimum]
 
 _ROUNDS = 2
+_HOPELESS = 200.0  # by how much more a structure costs with independent entries that is not fitted again
 
 
-def chosen(
-    weighted: Weighted,
-    outs: Outputs,
-    begun: Sequence[Separated],
-    kind: Kind,
-    refine: Callable[[Separated], Fitted],
-    *,
-    fixed: bool,
-) -> list[Fitted]:
+def chosen(weighted: Weighted, outs: Outputs, begun: Sequence[Separated], kind: Kind, *, fixed: bool) -> list[Fitted]:
     """Fits by increasing cost, the first without the terms that do not lower it.
 
     A search with independent entries takes noise that they share for a pole: outputs whose noise is alike, and the
@@ -39,24 +33,25 @@ def chosen(
     ----------
     begun
         Fits with independent entries.
-    refine
-        Fits again with the covariance of the entries.
     fixed
         Whether the number of poles remains.
     """
 
     def fitted(one: Separated) -> Fitted:
-        found, minimum = refine(one)
+        found, minimum = refined(weighted, outs, one)
         return replace(found, cost=_cost(weighted, found, minimum)), minimum
 
     found = sorted((fitted(one) for one in begun), key=_by_cost)
     while found:
+        of = found[0][0]
+        limit = solve(outs, of.structure, of.theta, rounds=_ROUNDS).cost + _HOPELESS
         smaller = [
             solve(outs, structure, theta, rounds=_ROUNDS)
-            for structure, theta in reduced_structures(found[0][0], kind, fixed=fixed)
+            for structure, theta in reduced_structures(of, kind, fixed=fixed)
             if outs.enough_for(structure)
         ]
-        rivals = [one for one in map(fitted, smaller) if possible(outs, one[0], kind)]
+        rivals = [fitted(one) for one in smaller if one.cost < limit]
+        rivals = [one for one in rivals if possible(outs, one[0], kind)]
         best = min(rivals, key=_by_cost, default=found[0])
         if not best[0].cost < found[0][0].cost:
             break
@@ -73,7 +68,7 @@ def _cost(weighted: Weighted, of: Separated, minimum: MatrixMinimum) -> float:
 
     Noise whose covariance is estimated makes the errors of a line a complex matrix of Student's distribution: (d + m)·
     ln det(I + N⁻¹·E·S⁻¹·E*/d) + m·ln det N, for m inputs (Gupta and Nagar, Matrix Variate Distributions, 2000, ch. 4).
-    The model error adds to N what it is in units of S on average of the inputs, and d grows as the share of noise falls.
+    The model error adds to N its mean over the inputs in units of S, and d grows as the share of noise falls.
     """
     lines, entries = weighted.value.shape
     inputs = weighted.spread.shape[1]

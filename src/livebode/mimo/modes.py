@@ -9,19 +9,16 @@ from numpy.typing import NDArray
 
 from livebode.core import FitError, MatrixResponses, Parameters, Responses
 from livebode.fitting.common_poles import CommonPoles, assembled, check_model, outputs_of
-from livebode.fitting.partial_fractions import PartialFractions, Structure
 from livebode.fitting.physical import Hold
 from livebode.fitting.pole_search import Kind, search
-from livebode.fitting.separable import Outputs, Separated
-from livebode.mimo.least_squares import MatrixMinimum, minimise
+from livebode.fitting.separable import Separated
 from livebode.mimo.mean import mean_matrix
 from livebode.mimo.mode_choice import chosen
+from livebode.mimo.refinement import refined
 from livebode.mimo.whitening import Weighted
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-_TICK_STEP = 1e-4  # of a tick, for the slope by a delay
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,13 +92,18 @@ def fit_matrix(
     all entries. Entries share noise: the scatter of a frequency is therefore larger or smaller than independent entries
     would have it. The noise is estimated with `dof` degrees of freedom; the bounds contain the scatter of such weights.
 
+    A search with independent entries proposes structures. All are fitted again, and the one with the smallest cost by
+    the likelihood of the whole matrix is taken, without the terms that do not lower it.
+
     Delay: none. Bias: none to first order where order and noise are right. The bounds do not contain the choice of the
-    order. Noise is taken as independent from line to line.
+    order. Errors of neighbouring lines are alike beside a slow mode. With six rows of a recording or more, the bounds
+    contain this as the rows show it; with fewer, lines are taken as independent.
 
     Parameters
     ----------
     responses
-        Matrices; the mean of those that share no window (`mean_matrix`). Lines are used where all columns are valid.
+        All matrices of a recording; the mean of those that share no window is fitted (`mean_matrix`). Lines are used
+        where all columns are valid.
     model
         "rational" for complex and real poles, or "modal" for modes between the lines.
     order
@@ -134,15 +136,10 @@ def fit_matrix(
     names = tuple(f"{o}/{i}" for o in matrix.outputs for i in matrix.inputs)
     outs = outputs_of(entries, names, band_hz, hold)
     kind = model if like is None else like.model
-
-    def refine(one: Separated) -> tuple[Separated, MatrixMinimum]:
-        minimum = _refined(weighted, outs, one)
-        return _separated(one, outs, minimum), minimum
-
     if like is not None:
-        best = [refine(_started(like, names))]
+        best = [refined(weighted, outs, _started(like, names))]
     else:
-        best = chosen(weighted, outs, search(outs, model, order), model, refine, fixed=order is not None)
+        best = chosen(weighted, outs, search(outs, model, order), model, fixed=order is not None)
     specified = order is not None or like is not None
     covariance = best[0][1].covariance if best else None
     found = assembled(outs, [one for one, _ in best], names, entries, kind, specified=specified, covariance=covariance)
@@ -164,62 +161,6 @@ def _started(like: MatrixModes, names: tuple[str, ...]) -> Separated:
             status=like.status,
         )
     return like.found
-
-
-def _refined(weighted: Weighted, outs: Outputs, of: Separated) -> MatrixMinimum:
-    structure = of.structure
-    shapes = PartialFractions(structure, outs.grid._replace(frequency_hz=weighted.frequency_hz), outs.unit)
-
-    return minimise(
-        weighted,
-        lambda raw: _response(shapes, structure, raw),
-        lambda raw: _slopes(shapes, structure, raw),
-        np.concatenate([of.theta, of.linear.ravel()]),
-    )
-
-
-def _parts(of: Structure, raw: Floats) -> tuple[Floats, Floats]:
-    """Nonlinear parameters, and weights (entries, linear)."""
-    return raw[: of.nonlinear], raw[of.nonlinear :].reshape(of.outputs, of.linear)
-
-
-def _response(shapes: PartialFractions, of: Structure, raw: Floats) -> Complex:
-    """Of all entries, shape (lines, entries)."""
-    theta, linear = _parts(of, raw)
-    if not of.delays:
-        return np.asarray(shapes.columns(theta, 0.0) @ linear.T)
-    return np.stack([shapes.columns(theta, float(t)) @ c for t, c in zip(of.delays_of(theta), linear)], axis=1)
-
-
-def _slopes(shapes: PartialFractions, of: Structure, raw: Floats) -> Complex:
-    """By all parameters, shape (lines, entries, parameters)."""
-    theta, linear = _parts(of, raw)
-    slope = np.zeros((shapes.grid.frequency_hz.size, of.outputs, raw.size), dtype=np.complex128)
-    step = _TICK_STEP / shapes.grid.rate_hz
-    columns, moves = shapes.columns(theta, 0.0), shapes.moves(theta, 0.0)
-    for k, delay_s in enumerate(of.delays_of(theta).tolist()):
-        if of.delays:
-            columns, moves = shapes.columns(theta, delay_s), shapes.moves(theta, delay_s)
-            later, earlier = (shapes.columns(theta, delay_s + way * step) @ linear[k] for way in (1, -1))
-            slope[:, k, of.poles + k] = (later - earlier) / (2 * step)
-        slope[:, k, : of.poles] = shapes.slopes(moves, linear[k])
-        begin = of.nonlinear + k * of.linear
-        slope[:, k, begin : begin + of.linear] = columns
-    return slope
-
-
-def _separated(of: Separated, outs: Outputs, minimum: MatrixMinimum) -> Separated:
-    structure = of.structure
-    theta, linear = _parts(structure, minimum.values)
-    response = _response(PartialFractions(structure, outs.grid, outs.unit), structure, minimum.values).T
-    measured = outs.measured
-    variance = measured.sigma**2 + (minimum.epsilon * np.abs(measured.value)) ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        weight = np.where(measured.use & (variance > 0), np.sqrt(2 / variance), 0.0)
-    epsilon = np.full(structure.outputs, minimum.epsilon)
-    return replace(
-        of, theta=theta, linear=linear, response=response, weight=weight, epsilon=epsilon, settled=minimum.settled
-    )
 
 
 def _residues(names: tuple[str, ...], values: Floats, entries: tuple[str, ...]) -> Complex:

@@ -72,7 +72,7 @@ class Weighted:
     @property
     def outputs(self) -> int:
         """Dimension of the noise."""
-        return self.noise.shape[1]
+        return int(self.noise.shape[1])
 
     @property
     def covariance(self) -> Complex:
