@@ -145,8 +145,8 @@ class Comparison:
         found = (Section(tr("Details of the measurement"), (paths,)), _settings(*self.found.runs))
         return (*found, Section(tr("Not in this report"), parts)) if parts else found
 
-    def facts(self) -> list[tuple[str, str]]:
-        """Rows of the title block."""
+    def facts(self, *others: Comparison) -> list[tuple[str, str]]:
+        """Rows of the title block; of a matrix run with the `others` of its entries."""
         rows = [
             (tr("before"), run_name(self.found.runs[0])), (tr("after"), run_name(self.found.runs[1])),
             *((words, _measured(run, average)) for words, run, average in zip(
@@ -154,7 +154,7 @@ class Comparison:
             )),
             (tr("responses"), " / ".join(number(a.count, ",") for a in self.found.averages)),
             (tr("compared at"), _span(self.found)),
-            (tr("smallest detectable change"), detectable(self.found.overall)),
+            (tr("smallest detectable change"), detectable(*(one.found.overall for one in (self, *others)))),
         ]  # fmt: skip
         return [(name, value) for name, value in rows if value]
 

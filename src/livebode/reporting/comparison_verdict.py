@@ -101,9 +101,10 @@ def _by_place(places: tuple[ComparedPlace, ...]) -> Iterator[Finding]:
     yield Finding("ok", words)
 
 
-def detectable(d: Difference) -> str:
-    """The smallest detectable change of the response; empty if no line can be compared."""
-    return _sizes(d.seen[np.isfinite(d.p)]) if np.isfinite(d.p).any() else ""
+def detectable(*each: Difference) -> str:
+    """The smallest detectable change of the response, or of several; empty if no line can be compared."""
+    seen = np.concatenate([d.seen[np.isfinite(d.p)] for d in each])
+    return _sizes(seen) if seen.size else ""
 
 
 def _seen(found: Sequence[Difference]) -> str:

@@ -16,6 +16,8 @@ from livebode.mimo import compare_gantries, compare_matrices
 from livebode.records import RunRecord
 from livebode.reporting import first_page
 from livebode.reporting.compare_report import TONES_OF_A_COMPARISON, Comparison, run_name
+from livebode.reporting.comparison_verdict import detectable
+from livebode.reporting.wording import pairs
 from livebode.simulation import Gantry
 
 
@@ -97,7 +99,7 @@ class MatrixComparison:
             Add the settings that differ.
         """
         named = sorted(self.entries.items(), key=lambda one: not one[1].found.overall.differs.any())
-        first = named[0][1]
+        first, *others = (one for _, one in named)
         runs = tr("{before} and {after}", before=run_name(first.found.runs[0]), after=run_name(first.found.runs[1]))
         title = header.machine or runs
         findings = [Finding(f.tone, f"{_arrow(name)}: {f.text}") for name, one in named for f in one.sentences]
@@ -106,7 +108,7 @@ class MatrixComparison:
         return Document(
             kind=tr("Before and after"),
             title=title,
-            facts=first_page.facts(header, title, first.facts(), made),
+            facts=first_page.facts(header, title, first.facts(*others), made),
             verdict=tuple(findings),
             sections=(*(_section(name, one) for name, one in named), first.how(), first.events()),
             foot=" · ".join(filter(None, (title, header.serial_number, header.company))),
@@ -135,8 +137,10 @@ def _arrow(name: str) -> str:
 
 
 def _section(name: str, one: Comparison) -> Section:
-    """Picture and lines of an entry, under its name."""
-    return Section(_arrow(name), (one.picture(), *one.response().parts))
+    """Picture, smallest detectable change and lines of an entry, under its name."""
+    seen = detectable(one.found.overall)
+    least = (pairs([(tr("smallest detectable change"), seen)]),) if seen else ()
+    return Section(_arrow(name), (one.picture(), *least, *one.response().parts))
 
 
 def _whole(
