@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SAMPLES, LAGS = 3000, 40
 FITTED_SAMPLES = 20_000
-RUNS, SHORT = 1000, 30
+RUNS, SHORT = 1000, 20
 BEFORE = 1000  # samples of each run that are left out: its noise's start
 LINES = Lines.parse("20:140:20", RATE_HZ, 400)
 EXCITATION = multisine(LINES)

@@ -28,8 +28,8 @@ def tracked(seed: int, samples: int = 1500) -> Responses:
 
 
 def test_two_runs_of_one_machine_differ_no_more_often_than_the_stated_rate() -> None:
-    """400 pairs of tracked recordings: 5 % of them and three deviations of their count are the most."""
-    pairs = 400
+    """200 pairs of tracked recordings: 5 % of them and three deviations of their count are the most."""
+    pairs = 200
     means = [mean_response(tracked(seed))[0] for seed in range(2 * pairs)]
     found = [Difference.of(means[2 * i], means[2 * i + 1]) for i in range(pairs)]
     claimed = sum(d.differs.any() for d in found)

@@ -124,7 +124,7 @@ def test_design_takes_the_missing_lines_and_with_them_the_axis_is_tuned(tmp_path
     experiment = tmp_path / "experiment.toml"
     experiment.write_text(
         "[excitation]\nband_hz = [4, 400]\nresolution_hz = 4\namplitude_n_m = 0.1\n"
-        '[measured]\nrun = "coarse/run"\nnoise = 0.02\nradius_m = 0.019\n',
+        'phases = "schroeder"\n[measured]\nrun = "coarse/run"\nnoise = 0.02\nradius_m = 0.019\n',
         encoding="utf-8",
     )
     done = livebode("design", experiment, "--lines", wanted[1], "--out", tmp_path / "design", "--json")

@@ -19,7 +19,7 @@ from livebode.locations import find, write_whole
 from tests.support.archives import contents_of, write_archive
 from tests.support.object_storage import BUCKET, object_storage
 
-LAKE, RECORDINGS = f"s3://{BUCKET}/lake", 3
+LAKE, RECORDINGS = f"s3://{BUCKET}/lake", 2
 
 
 @pytest.fixture(scope="module")

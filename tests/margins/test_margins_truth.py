@@ -37,7 +37,7 @@ def cases(draw: st.DrawFn) -> Case:
     )
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(cases())
 def test_margins_are_those_of_python_control(case: Case) -> None:
     assume(abs(case.largest_pole - 1) > 1e-5)

@@ -128,11 +128,11 @@ def test_windows_that_hang_together_are_allowed_for() -> None:
 
 
 def test_the_error_of_a_short_baseline_raises_no_alarm() -> None:
-    """Sixty baselines from forty windows of one place, each judged for 1,500: no alarm.
+    """Thirty baselines from forty windows of one place, each judged for 1,500: no alarm.
 
-    One alarm in 30 days is asked for, and 2.5 hours are judged. A mean that is off by up to three of its standard
-    deviations keeps to that; of the 360 components one is off by more, and only from four and a half on (once in 400
-    such tests) would its sum rise.
+    One alarm in 30 days is asked for, and 75 minutes are judged. A mean that is off by up to three of its standard
+    deviations keeps to that; of the 180 components every second test has one that is off by more, and only from four and a half
+    on (once in 800 such tests) would its sum rise.
     """
 
     def still(windows: int, seed: int) -> WindowRows:
@@ -143,7 +143,7 @@ def test_the_error_of_a_short_baseline_raises_no_alarm() -> None:
             **(vars(rows) | {"value": value, "schedule": nowhere, "step": nowhere, "ok": np.ones(windows) > 0})
         )
 
-    for seed in range(60):
+    for seed in range(30):
         watcher = TableMonitor(learn_table("lines", NAMES, [still(40, 1000 + seed)]), DEFAULT_INTERVAL_S, 0.1)
         assert watcher.process(still(1500, 2000 + seed)) == []
         assert watcher.judged == 1500
