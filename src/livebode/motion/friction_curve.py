@@ -16,9 +16,11 @@ from livebode.motion.smooth_motion import OutputKind, SmoothMotion
 Floats = NDArray[np.float64]
 
 _STANDING = 0.01  # of a kernel: at standstill any smaller input gives the same motion, in a reversal none does
-_EACH_WAY_MIN = 20  # samples a kernel apart, in each direction
+_EACH_WAY_MIN = (
+    20  # samples in each direction; without strokes, feedback and noise move an axis, and look like friction
+)
 _STRIBECK = np.geomspace(0.02, 0.5, 15)  # of the highest speed: places of the search
-_SLIDING = 0.99  # of a kernel in one direction, for the measured friction that is shown
+_SLIDING = 0.99  # of a kernel in one direction: away from reversals
 _ROUNDS = 30
 _SETTLED = 1e-6
 _SEEN = 0.999  # probability that the Stribeck friction is not zero
@@ -205,13 +207,13 @@ def friction_curve(
     motion = SmoothMotion.of(block, input, output, kind, band_hz, slowest)
     top = float(np.max(np.abs(motion.velocity)))
     used = motion.standing < _STANDING
-    each_way = [int(np.count_nonzero(used & (motion.velocity * sign > 0))) for sign in (1, -1)]
+    each_way = [int(np.count_nonzero(used & (motion.sign * sign > _SLIDING))) for sign in (1, -1)]
     if min(each_way) < _EACH_WAY_MIN:
         raise SignalError(
             "too-short",
-            f"the axis moves forward for {each_way[0]} smoothed samples and backward for {each_way[1]}, but "
-            f"{_EACH_WAY_MIN} each way are needed to separate friction from a constant force",
-            "record strokes in both directions",
+            f"away from reversals the axis moves forward for {each_way[0]} smoothed samples and backward for "
+            f"{each_way[1]}, but {_EACH_WAY_MIN} each way are needed",
+            "record longer strokes, in both directions",
             forward=each_way[0],
             backward=each_way[1],
             limit=_EACH_WAY_MIN,
