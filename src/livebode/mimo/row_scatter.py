@@ -11,7 +11,7 @@ Complex = NDArray[np.complex128]
 
 ROWS_LEAST = 6
 _ROWS_MAX = 64
-_VALUES_EACH = 4  # values of a matrix for each row, at least: singular vectors of fewer resemble each other by force
+_VALUES_EACH = 10  # values of a matrix for each row, at least: of fewer, vectors at right angles hide what is alike
 _RANK = 1e-3
 
 
