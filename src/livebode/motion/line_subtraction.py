@@ -71,19 +71,24 @@ def _blocks(stroke: Stroke, shafts: Sequence[Shaft], lines_hz: Floats) -> Iterat
 
 
 def _constant(strokes: Sequence[Stroke], shafts: Sequence[Shaft], lines_hz: Floats, value: Floats) -> NDArray[np.bool_]:
-    """Whether the fit leaves no more at each line than the noise beside it."""
-    at, beside = np.zeros(lines_hz.size), np.zeros(lines_hz.size)
-    for one in strokes:
+    """Whether the fit leaves no more at each line than the noise beside it.
+
+    Long strokes decide. So the degrees of freedom of the sum are those of Satterthwaite.
+    """
+    at, beside = np.zeros((2, len(strokes), lines_hz.size))
+    for number, one in enumerate(strokes):
         rest = (one.torque[0] - _columns(one, shafts, lines_hz) @ value) * _taper(one) ** 2
         time_s = _time_s(one)
+        bins = np.array([0, *_BESIDE]) * one.rate_hz / rest.size
         for i, line in enumerate(lines_hz):
-            bins = np.array([0, *_BESIDE]) * one.rate_hz / rest.size
             power = np.abs(np.exp(-2j * np.pi * np.multiply.outer(line + bins, time_s)) @ rest) ** 2
-            at[i] += power[0]
-            beside[i] += power[1:].mean()
-    dof = 2 * len(strokes)
-    ratio = at / np.maximum(beside, np.finfo(float).tiny)
-    return np.array([f_exceeded(float(one), dof, dof * _BESIDE.size) > _FALSE for one in ratio])
+            at[number, i], beside[number, i] = power[0], power[1:].mean()
+    noise = np.maximum(beside.sum(axis=0), np.finfo(float).tiny)
+    ratio = at.sum(axis=0) / noise
+    dof = [2 * max(int(one), 1) for one in noise**2 / np.maximum((beside**2).sum(axis=0), np.finfo(float).tiny)]
+    return np.array(
+        [f_exceeded(float(one), many, many * _BESIDE.size) > _FALSE for one, many in zip(ratio, dof, strict=True)]
+    )
 
 
 def _time_s(stroke: Stroke) -> Floats:
