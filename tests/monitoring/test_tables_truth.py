@@ -131,8 +131,8 @@ def test_the_error_of_a_short_baseline_raises_no_alarm() -> None:
     """Thirty baselines from forty windows of one place, each judged for 1,500: no alarm.
 
     One alarm in 30 days is asked for, and 75 minutes are judged. A mean that is off by up to three of its standard
-    deviations keeps to that; of the 180 components every second test has one that is off by more, and only from four
-    and a half on (once in 800 such tests) would its sum rise.
+    deviations keeps to that; one of the 180 components is off by more in four of ten such tests, and only from four and
+    a half on (once in 800 such tests) would its sum rise.
     """
 
     def still(windows: int, seed: int) -> WindowRows:
