@@ -16,9 +16,9 @@ from livebode.motion.smooth_motion import OutputKind, SmoothMotion
 Floats = NDArray[np.float64]
 
 _STANDING = 0.01  # of a kernel: at standstill any smaller input gives the same motion, in a reversal none does
-_EACH_WAY_MIN = (
-    20  # samples in each direction; without strokes, feedback and noise move an axis, and look like friction
-)
+_EACH_WAY_MIN = 20  # samples in each direction
+# Of the samples, away from reversals: where feedback and noise alone move an axis, they look like friction.
+_STROKES_LEAST = 0.4
 _STRIBECK = np.geomspace(0.02, 0.5, 15)  # of the highest speed: places of the search
 _SLIDING = 0.99  # of a kernel in one direction: away from reversals
 _ROUNDS = 30
@@ -208,12 +208,13 @@ def friction_curve(
     top = float(np.max(np.abs(motion.velocity)))
     used = motion.standing < _STANDING
     each_way = [int(np.count_nonzero(used & (motion.sign * sign > _SLIDING))) for sign in (1, -1)]
-    if min(each_way) < _EACH_WAY_MIN:
+    if min(each_way) < _EACH_WAY_MIN or sum(each_way) < _STROKES_LEAST * np.count_nonzero(used):
         raise SignalError(
             "too-short",
             f"away from reversals the axis moves forward for {each_way[0]} smoothed samples and backward for "
-            f"{each_way[1]}, but {_EACH_WAY_MIN} each way are needed",
-            "record longer strokes, in both directions",
+            f"{each_way[1]}, of {np.count_nonzero(used)}, but {_EACH_WAY_MIN} each way and {_STROKES_LEAST:.0%} of all "
+            "are needed",
+            "record longer strokes, in both directions, or use a higher band",
             forward=each_way[0],
             backward=each_way[1],
             limit=_EACH_WAY_MIN,
