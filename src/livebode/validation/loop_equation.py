@@ -147,8 +147,9 @@ def _spectra(signals: Floats, lines: Lines, starts: NDArray[np.intp]) -> Complex
     kernel = hann[:, np.newaxis] * np.exp(-1j * angle) / hann.sum()
     windows = np.stack([signals[:, start : start + 2 * period] for start in starts])
     # One product of reals: each of a real matrix and a complex one would convert the first and wait for BLAS threads.
-    product = windows.reshape(-1, 2 * period) @ np.ascontiguousarray(kernel).view(float)
-    return product.view(complex).reshape(len(starts), len(signals), -1)
+    product: Floats = windows.reshape(-1, 2 * period) @ np.ascontiguousarray(kernel).view(np.float64)
+    spectra: Complex = product.view(np.complex128).reshape(len(starts), len(signals), -1)
+    return spectra
 
 
 def _moments(about: Complex) -> tuple[Complex, Complex]:
