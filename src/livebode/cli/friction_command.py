@@ -57,7 +57,7 @@ def friction_command(
     """Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with bounds.
 
     The channels default to those of the run or configuration. The strokes need no excitation; it does not disturb
-    if its lines are above the band.
+    if its lines are above the band, and --slowest is above the speed to which it shakes the axis at standstill.
     """
     from livebode.analysis.friction import friction_of
     from livebode.analysis.strokes import read_strokes
