@@ -141,11 +141,11 @@ class LoopSignals:
 
 def _spectra(signals: Floats, lines: Lines, starts: NDArray[np.intp]) -> Complex:
     """Of windows of two periods, (windows, signals, lines)."""
-    period = lines.window
-    hann = 1 - np.cos(np.pi * np.arange(2 * period) / period)
-    angle = np.pi / period * np.outer(np.arange(2 * period), 2 * np.array(lines.bins))
-    kernel = hann[:, np.newaxis] * np.exp(-1j * angle) / hann.sum()
-    return np.stack([signals[:, start : start + 2 * period] @ kernel for start in starts])
+    length = 2 * lines.window
+    hann = 1 - np.cos(2 * np.pi * np.arange(length) / length)
+    bins = 2 * np.array(lines.bins)
+    windows = np.stack([signals[:, start : start + length] for start in starts])
+    return np.fft.rfft(windows * hann)[..., bins] / hann.sum()
 
 
 def _moments(about: Complex) -> tuple[Complex, Complex]:
