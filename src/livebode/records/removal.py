@@ -14,8 +14,9 @@ from livebode.records.summary_file import read_summary
 
 _SHOWN = 5
 _PARTIAL = r"\.partial(-[0-9a-f]{8})?"  # of livebode.core.files
-_DRAWN = r"(bode|tracking|modes|margins|validation|singular-values)\.png"
-_REPLACED = rf"(run|run-copy|references|notes)\.json|report\.(html|pdf)|{_DRAWN}"
+_DRAWN = r"(bode|tracking|modes|margins|validation|singular-values|tune|friction|orders)\.png"
+_PROPOSED = r"gains\.(toml|csv)|filters\.(h|st)|odrive\.txt|shaper\.(h|st|cfg)"
+_REPLACED = rf"(run|run-copy|references|notes|loop-check|tune)\.json|report\.(html|pdf)|{_DRAWN}|{_PROPOSED}"
 _FILES = re.compile(
     rf"{_REPLACED}|\.({_REPLACED}){_PARTIAL}|(events|manifest)\.jsonl|(responses|covariance|parameters)\.parquet"
 )
