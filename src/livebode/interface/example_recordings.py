@@ -142,12 +142,14 @@ def _strokes() -> Table:
     return _table(block, ("u", "velocity", "position"))
 
 
-def _gantry(seed: int, cart_m: float) -> Callable[[], Table]:
+def _gantry(
+    seed: int, cart_m: float = 0.2, frequencies: str = "6:90:4", amplitude_n_m: float = 0.2, settle: int = 3
+) -> Callable[[], Table]:
     """A gantry in closed loop, whose two motors have orthogonal multisines, with noise of the encoders."""
 
     def simulate() -> Table:
-        lines = Lines.parse("6:90:4", _RATE_HZ, 2000)
-        excitation = MatrixExcitation.orthogonal(lines, 2, amplitude=0.2, dwell=4, settle=3)
+        lines = Lines.parse(frequencies, _RATE_HZ, 2000)
+        excitation = MatrixExcitation.orthogonal(lines, 2, amplitude=amplitude_n_m, dwell=4, settle=settle)
         w = np.tile(excitation.samples, 4)
         noise = 0.02 * np.random.default_rng(seed).standard_normal((3, w.shape[1]))
         block = GantryLoop(gantry=Gantry(cart_m=cart_m)).simulate(w, noise=noise)
@@ -252,6 +254,16 @@ EXAMPLES = {
             "livebode fit runs/gantry --entry velocity1/u1 --entry velocity2/u1 --model modal",
             "livebode run gantry-2.toml",
             "livebode compare runs/gantry runs/gantry-2",
+        ),
+    ),
+    "matrix-tune": Example(
+        "the gantry excited to beyond its resonances, with its two controllers described",
+        {"gantry-tune.parquet": _gantry(12, frequencies="4:100:2, 104:400:8", amplitude_n_m=0.1, settle=1)},
+        ("gantry-tune.toml",),
+        (
+            "livebode run gantry-tune.toml",
+            "livebode check-loop runs/gantry-tune",
+            "livebode tune runs/gantry-tune --entry velocity1/u1",
         ),
     ),
     "hall": Example(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import isfinite
+from dataclasses import dataclass, replace
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,6 +32,17 @@ class PredictedMargins:
     disk_margin: float
     bandwidth_hz: float
 
+    def with_unknown(self, largest: float) -> PredictedMargins:
+        """The same if |L| is up to `largest` with any phase at other frequencies."""
+        size = min(largest, 1.0)
+        return replace(
+            self,
+            gain_margin_db=min(self.gain_margin_db, float(-20 * np.log10(max(size, 1e-300)))),
+            phase_margin_deg=self.phase_margin_deg if size < 1 else min(self.phase_margin_deg, 0.0),
+            max_sensitivity=max(self.max_sensitivity, 1 / (1 - size) if size < 1 else inf),
+            disk_margin=min(self.disk_margin, 2 * (1 - size) / (1 + size)),
+        )
+
     def plain(self) -> dict[str, float | None]:
         """For JSON; infinite ones are null."""
         return {name: value if isfinite(value) else None for name, value in vars(self).items()}
@@ -51,10 +62,7 @@ def disk_margin(loop: ArrayLike) -> float:
 
 
 def predicted(frequency_hz: Floats, loop: Complex, radius: Floats) -> PredictedMargins:
-    """Margins of L, shape (places, frequencies), for the worst point of the disc around each point.
-
-    Above the lines, L is replaced by its limit, whose phase is not known: give its size as radius there.
-    """
+    """Margins of L, shape (places, frequencies), for the worst point of the disc around each point."""
     one = loop.ravel()
     size = radius.ravel()
     edge = one[:, np.newaxis] + size[:, np.newaxis] * np.exp(2j * np.pi * np.arange(_POINTS) / _POINTS)

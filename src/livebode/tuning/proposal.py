@@ -214,10 +214,14 @@ def _promises(found: SearchResult, plant: PlantBand, bandwidth_hz: float) -> boo
 
 
 def margins_of(plant: PlantBand, feedback: Model, share: float) -> PredictedMargins:
-    """Margins with this share of the band's radius, over the lines and between them."""
-    at = ~plant.above
-    behind = feedback.response(plant.frequency_hz[at])
-    return predicted(plant.frequency_hz[at], plant.value[:, at] * behind, share * plant.radius[:, at] * np.abs(behind))
+    """Margins with this share of the band's radius, over the lines and between them.
+
+    With a share also above the highest line, where only the largest |L| is known.
+    """
+    behind, at = feedback.response(plant.frequency_hz), ~plant.above
+    loop, radius = plant.value * behind, share * plant.radius * np.abs(behind)
+    found = predicted(plant.frequency_hz[at], loop[:, at], radius[:, at])
+    return found.with_unknown(float(np.abs(loop[:, plant.above]).max())) if share else found
 
 
 def _stable_margins(plant: PlantBand, loop: Loop, share: float) -> PredictedMargins | None:
