@@ -129,6 +129,8 @@ def test_margins_before_and_after_and_of_the_worst_plant_are_those_of_tune(tab: 
         for kind, share in (("measured", 0.0), ("worst", 1.0)):
             radius = share * plant.radius[:, at] * np.abs(feedback[at])
             expected = predicted(f[at], plant.value[:, at] * feedback[at], radius)
+            if share:
+                expected = expected.with_unknown(float(np.abs(plant.value * feedback)[:, ~at].max()))
             found = tab.js(f"whatIf.margins.{side}.{kind}")
             for name, own in NAMES.items():
                 value = found[name] if found[name] is not None else np.inf

@@ -78,7 +78,8 @@ function horizontal({ ctx, px, u }, value, text) {
   line(ctx, u.bbox.left, y, u.bbox.left + u.bbox.width, y);
   ctx.setLineDash([]);
   ctx.textAlign = "right";
-  ctx.fillText(text, u.bbox.left + u.bbox.width - 4 * px, y - 3 * px);
+  ctx.textBaseline = "alphabetic";
+  ctx.fillText(text, u.bbox.left + u.bbox.width - 4 * px, y - 4 * px);
 }
 
 /** @param {Sheet} sheet @param {number} f @param {number[]} dash @param {string} paint @param {number} width */
@@ -125,6 +126,8 @@ export function marksOf(bode) {
 /** @param {Mark} mark */
 export const paintOf = ({ of }) => look(of ?? "model").ink;
 
+const NARROW = 420; // width of a plot, in pixels of the page
+
 /** @param {Sheet} sheet */
 function drawLoop(sheet) {
   const { u, bode, index, ctx, px } = sheet,
@@ -133,10 +136,12 @@ function drawLoop(sheet) {
   if (index === PHASE)
     for (let deg = 360 * Math.ceil((min - 180) / 360) + 180; deg <= max; deg += 360)
       horizontal(sheet, deg, `${deg < 0 ? "−" : ""}${Math.abs(deg)}°`);
+  // On a telephone the line above the plot has the margins of what is tried: words would hide the curves.
+  const wordless = bode.trying && u.bbox.width < NARROW * px;
   let outside = 0;
   for (const mark of marksOf(bode)) {
     if (!inSight(sheet, mark.hz)) {
-      if (mark.chart === index) beyond(sheet, mark, outside++);
+      if (mark.chart === index && !wordless) beyond(sheet, mark, outside++);
       continue;
     }
     const base = baseOf(bode, index, mark),
@@ -147,7 +152,7 @@ function drawLoop(sheet) {
       const [y0, y1] = [u.valToPos(base, "y", true), u.valToPos(base + mark.level, "y", true)];
       line(ctx, x, y0, x, y1);
       for (const y of [y0, y1]) line(ctx, x - 4 * px, y, x + 4 * px, y);
-      label(sheet, mark.words, x, (y0 + y1) / 2, paintOf(mark));
+      if (!wordless) label(sheet, mark.words, x, (y0 + y1) / 2, paintOf(mark));
     } else if (index !== 2 && mark.name !== "delay_margin") {
       // The crossover, where the other curve passes 0 dB or −180°.
       ctx.lineWidth = 1.8 * px;

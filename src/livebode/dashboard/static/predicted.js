@@ -151,6 +151,14 @@ export const keepsClear = (places, known) =>
 export const largestAbove = (places, known) =>
   Math.max(0, ...places.flatMap(({ re, im }) => Array.from(re.subarray(known), (v, i) => length(v, im[known + i]))));
 
+/** The same if |L| is up to `largest`, below 1, with any phase at other frequencies. @param {Predicted} found @param {number} largest @returns {Predicted} */
+export const withUnknown = (found, largest) => ({
+  ...found,
+  gainMarginDb: Math.min(found.gainMarginDb, -20 * Math.log10(largest)),
+  ms: Math.max(found.ms, 1 / (1 - largest)),
+  disk: Math.min(found.disk, (2 * (1 - largest)) / (1 + largest)),
+});
+
 /** The frequency at which L is nearest to −1. @param {Numbers} hz @param {Disc[]} places @param {number} known */
 export function nearestHz(hz, places, known) {
   let [best, least] = [hz[0], Infinity];

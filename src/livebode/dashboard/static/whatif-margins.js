@@ -2,7 +2,7 @@
 // Bandwidth and margins of the described loop and of a trial: of the measured plant, and of the worst within its bounds.
 import { tr } from "./language.js";
 import { element } from "./make.js";
-import { keepsClear, largestAbove, nearestHz, predicted, stable } from "./predicted.js";
+import { keepsClear, largestAbove, nearestHz, predicted, stable, withUnknown } from "./predicted.js";
 import { recognised } from "./recognition.js";
 import { feedback, nothing } from "./trial.js";
 import { orNoLimit } from "./whatif-text.js";
@@ -41,9 +41,10 @@ export function loops(band, facts, trial) {
 /** @param {LoopBand} band @param {Disc[]} places @returns {Both} */
 export function both({ frequency_hz: hz, known }, places) {
   if (!places.every((place) => stable(hz, place))) return null;
+  const above = largestAbove(places, known);
   return {
     measured: predicted(hz, places, known, false),
-    worst: keepsClear(places, known) ? predicted(hz, places, known, true) : null,
+    worst: keepsClear(places, known) && above < 1 ? withUnknown(predicted(hz, places, known, true), above) : null,
   };
 }
 
@@ -144,12 +145,12 @@ export class TrialMargins {
 export function briefWords(found) {
   if (!found) return tr("after: unstable");
   const { bandwidthHz, gainMarginDb, phaseMarginDeg, ms } = found.measured;
-  return tr("after: {bandwidth} Hz · {gain} dB · {phase}° · Ms {ms}", {
-    bandwidth: orNoLimit(bandwidthHz),
-    gain: orNoLimit(gainMarginDb),
-    phase: orNoLimit(phaseMarginDeg),
-    ms: orNoLimit(ms),
-  });
+  const margins = [
+    gainMarginDb < Infinity ? `${orNoLimit(gainMarginDb)} dB` : tr("any gain"),
+    phaseMarginDeg < Infinity ? `${orNoLimit(phaseMarginDeg)}°` : tr("any phase"),
+  ];
+  const bandwidth = bandwidthHz < Infinity ? `${orNoLimit(bandwidthHz)} Hz` : tr("any bandwidth");
+  return tr("after: {margins} · Ms {ms}", { margins: [bandwidth, ...margins].join(" · "), ms: orNoLimit(ms) });
 }
 
 /** @param {LoopBand} band */
