@@ -150,7 +150,7 @@ def _spectra(signals: Floats, lines: Lines, starts: NDArray[np.intp]) -> Complex
     hann = 1 - np.cos(2 * np.pi * np.arange(length) / length)
     bins = 2 * np.array(lines.bins)
     windows = np.stack([signals[:, start : start + length] for start in starts])
-    return np.fft.rfft(windows * hann)[..., bins] / hann.sum()
+    return np.asarray(np.fft.rfft(windows * hann)[..., bins] / hann.sum())
 
 
 def _moments(about: Complex) -> tuple[Complex, Complex]:
