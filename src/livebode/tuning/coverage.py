@@ -41,16 +41,16 @@ def check_coverage(plant: PlantBand, loop: Complex, lines: Lines) -> None:
 
 def missing_resonances(plant: PlantBand, lines: Lines) -> MissingLines | None:
     """The lines that would resolve what the lines do not show."""
-    spans = _spans(plant, plant.spread.max(axis=0) > _GAP_MAX)
+    spans = _spans(plant, plant.coarseness.max(axis=0) > _GAP_MAX)
     return MissingLines.of(lines, spans) if spans else None
 
 
 def _check_gaps(plant: PlantBand, size: Floats, lines: Lines) -> None:
     matters = (size > _MATTERS[0]) & (size < _MATTERS[1])
-    wrong = np.any(matters & (plant.spread > _GAP_MAX), axis=0)
+    wrong = np.any(matters & (plant.coarseness > _GAP_MAX), axis=0)
     if not wrong.any():
         return
-    at = float(plant.frequency_hz[int(np.argmax(np.where(wrong, plant.spread.max(axis=0), 0)))])
+    at = float(plant.frequency_hz[int(np.argmax(np.where(wrong, plant.coarseness.max(axis=0), 0)))])
     if lacking := [f for f in plant.dropped_hz.tolist() if _in_gap(plant, wrong, f)]:
         raise TuneError(
             "coherence-low",
@@ -95,7 +95,7 @@ def _spans(plant: PlantBand, wrong: NDArray[np.bool_]) -> list[_Span]:
     for group in groups:
         low, high = float(plant.lines_hz[group[0]]), float(plant.lines_hz[group[-1] + 1])
         inside = (plant.frequency_hz >= low) & (plant.frequency_hz <= high)
-        finer = float(np.ceil((plant.spread[:, inside].max() / _GAP_GOOD) ** (1 / 3)))
+        finer = float(np.ceil((plant.coarseness[:, inside].max() / _GAP_GOOD) ** (1 / 3)))
         # Across a resonance the third difference says too little: at least as fine as beside the gaps.
         beside = distance[max(0, group[0] - 1) : group[-1] + 2].min()
         found.append((low, high, float(min(distance[group].min() / max(finer, 2.0), beside))))

@@ -17,6 +17,7 @@ _BETWEEN = 3  # points between neighbouring lines
 _LOWEST = 1e-4  # of the lowest line
 _PER_DECADE, _ABOVE = 6, 24
 _LINES_MIN = 8
+_NOISE = 0.5  # of the radius: half of the difference of two parabolas through noise is below 0.28 of it
 _TO_95 = float(np.sqrt(np.log(20.0)))  # bound over sigma of circular normal noise
 _BEYOND = np.pi / 2  # a sampled integrator at half the rate, compared with 1/f
 
@@ -26,11 +27,12 @@ class PlantBand:
     """The plant of each place on a grid of frequencies up to half the rate, with a radius that contains the truth.
 
     At the lines the value is the measured one; the radius covers all lines and places together with the confidence
-    (Bonferroni: 1 − exp(−c²) = 1 − (1 − confidence)/(lines·places), widened for the degrees of freedom). Between lines,
-    log G is the mean of the two parabolas through three neighbouring lines, and half of their difference, the size of
-    the first term that they lack, widens the radius. Below the lowest line the plant continues as
-    1, 1/f or 1/f², whichever has the phase of the lowest line. Above the
-    highest it is not known: only its size is limited, to π/2 times a fall as 1/f.
+    (Bonferroni: 1 − exp(−c²) = 1 − (1 − confidence)/(lines·places), widened for the degrees of freedom). Between two
+    lines G, log G or 1/G is the cubic through the four next ones, the weighted mean of two parabolas, and half of the
+    difference of these widens the radius. It is log G where the radius may explain its difference, since noise could
+    make a pole of 1/G; else the one of the three whose parabolas differ least: near a resonance 1/G is almost a
+    parabola, near an antiresonance G. Below the lowest line the plant continues as 1, 1/f or 1/f², whichever has the
+    phase of the lowest line. Above the highest it is not known: only its size is limited, to π/2 times a fall as 1/f.
 
     Biased where a resonance lies between two lines without a trace at either of them.
 
@@ -45,7 +47,10 @@ class PlantBand:
     above
         Which frequencies are above the highest line.
     spread
-        Share of the radius that is due to interpolation, shape (places, frequencies).
+        Share of |G| by which interpolation widens the radius, shape (places, frequencies).
+    coarseness
+        Half of the difference of both parabolas of log G: above 0.5 the lines do not resolve a resonance; shape
+        (places, frequencies).
     sigma
         Standard deviation, so large that 95 % of normal noise are within the 95 % bound of few degrees of freedom;
         shape (places, frequencies).
@@ -59,6 +64,7 @@ class PlantBand:
     measured: NDArray[np.bool_]
     above: NDArray[np.bool_]
     spread: Floats
+    coarseness: Floats
     sigma: Floats
     lines_hz: Floats
     dropped_hz: Floats
@@ -93,19 +99,19 @@ class PlantBand:
 
     def only(self, columns: NDArray[np.bool_]) -> PlantBand:
         """The same at some of the frequencies."""
-        named = ("frequency_hz", "value", "radius", "measured", "above", "spread", "sigma")
+        named = ("frequency_hz", "value", "radius", "measured", "above", "spread", "coarseness", "sigma")
         return replace(self, **{name: getattr(self, name)[..., columns] for name in named})
 
     def at(self, places: Sequence[int]) -> PlantBand:
         """The same at some of the places."""
-        named = ("value", "radius", "spread", "sigma")
+        named = ("value", "radius", "spread", "coarseness", "sigma")
         return replace(self, **{name: getattr(self, name)[places] for name in named})
 
     @classmethod
     def at_lines(cls, lines_hz: Floats, value: Complex, radius: Floats, sigma: Floats, rate_hz: float) -> PlantBand:
         """The same from a radius at each line; shapes (lines,) and (places, lines)."""
         inside, share, left = _refined(lines_hz)
-        middle, gap = _between(lines_hz, value, inside, left)
+        middle, gap, coarse = _between(lines_hz, value, radius, inside, left)
         mixed = (1 - share) * radius[:, left] + share * radius[:, left + 1]
         deviation = (1 - share) * sigma[:, left] + share * sigma[:, left + 1]
         low = np.geomspace(_LOWEST * lines_hz[0], lines_hz[0], int(-np.log10(_LOWEST) * _PER_DECADE), endpoint=False)
@@ -130,6 +136,7 @@ class PlantBand:
             measured=np.concatenate([np.zeros(count[0], bool), np.isin(inside, lines_hz), np.zeros(count[2], bool)]),
             above=np.repeat([False, False, True], count),
             spread=joined(zero, gap, zero).astype(np.float64),
+            coarseness=joined(zero, coarse, zero).astype(np.float64),
             sigma=joined(sigma[:, :1] * rise, deviation, zero).astype(np.float64),
             lines_hz=lines_hz,
             dropped_hz=np.empty(0),
@@ -147,25 +154,69 @@ def _refined(lines_hz: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
     return at, part, left
 
 
-def _between(lines_hz: Floats, value: Complex, at: Floats, left: NDArray[np.int64]) -> tuple[Complex, Floats]:
-    """G at the frequencies, and half the difference of both parabolas of log G, shape (places, frequencies)."""
+def _between(
+    lines_hz: Floats, value: Complex, radius: Floats, at: Floats, left: NDArray[np.int64]
+) -> tuple[Complex, Floats, Floats]:
+    """G at the frequencies, half the difference of its parabolas as a share of |G|, and that of log G.
+
+    Shape (places, frequencies).
+    """
     log = np.log(np.abs(value)) + 1j * np.unwrap(np.angle(value), axis=1)
-    last = lines_hz.size - 3
-    before, after = (_parabola(lines_hz, log, at, np.clip(left - i, 0, last)) for i in (1, 0))
-    gap = np.abs(before - after) / 2
-    # At the ends only one parabola exists; the neighbouring gap stands for the missing difference.
+    share = _share(lines_hz, at, left)
+    middles, gaps = [], []
+    for transformed, back in ((log, np.exp), (value, np.asarray), (1 / value, np.reciprocal)):
+        before, after = _parabolas(lines_hz, transformed, at, left)
+        with np.errstate(all="ignore"):  # a cubic of 1/G may pass 0
+            middle = back((1 - share) * before + share * after)
+            gap = np.abs(back(before) - back(after)) / np.abs(middle) / 2
+        middles.append(middle)
+        gaps.append(_to_ends(np.where(np.isfinite(gap), gap, np.inf)))
+    starts = np.flatnonzero(np.diff(left, prepend=-1))
+    least = np.argmin(np.add.reduceat(gaps, starts, axis=2), axis=0)[:, left]
+    before, after = _parabolas(lines_hz, log, at, left)
+    coarse = _to_ends(np.abs(before - after) / 2)
+    noise = radius / np.abs(value)
+    noisy = np.maximum.reduceat(coarse, starts, axis=1) <= _NOISE * np.maximum(noise[:, :-1], noise[:, 1:])
+    least = np.where(noisy[:, left], 0, least)
+    middle, gap = (np.take_along_axis(np.array(of), least[np.newaxis], 0)[0] for of in (middles, gaps))
+    on_line = np.isin(at, lines_hz)
+    gap[:, on_line] = coarse[:, on_line] = 0.0
+    return middle, gap, coarse
+
+
+def cubic(lines_hz: Floats, values: Complex, at: Floats) -> Complex:
+    """Values of the lines, shape (rows, lines), between them by the cubic through four; beyond them constant."""
+    within = np.clip(at, lines_hz[0], lines_hz[-1])
+    left = np.clip(np.searchsorted(lines_hz, within, side="right") - 1, 0, lines_hz.size - 2)
+    share = _share(lines_hz, within, left)
+    before, after = _parabolas(lines_hz, values, within, left)
+    return np.asarray((1 - share) * before + share * after)
+
+
+def _share(lines_hz: Floats, at: Floats, left: NDArray[np.int64]) -> Floats:
+    """Of the way from the line before to the next one."""
+    return np.asarray((at - lines_hz[left]) / (lines_hz[left + 1] - lines_hz[left]))
+
+
+def _to_ends(gap: Floats) -> Floats:
+    """At the ends only one parabola exists; the neighbouring gap stands for the missing difference."""
     width = _BETWEEN + 1
     gap[:, :width] = np.maximum(gap[:, :width], gap[:, width : 2 * width])
     gap[:, -width - 1 :] = np.maximum(gap[:, -width - 1 :], gap[:, -2 * width - 1 : -width])
-    gap[:, np.isin(at, lines_hz)] = 0.0
-    return np.exp((before + after) / 2), gap
+    return gap
 
 
-def _parabola(lines_hz: Floats, log: Complex, at: Floats, first: NDArray[np.int64]) -> Complex:
+def _parabolas(lines_hz: Floats, values: Complex, at: Floats, left: NDArray[np.int64]) -> tuple[Complex, Complex]:
+    """Through the line before each gap, and through the line after it."""
+    before, after = (_parabola(lines_hz, values, at, np.clip(left - i, 0, lines_hz.size - 3)) for i in (1, 0))
+    return before, after
+
+
+def _parabola(lines_hz: Floats, values: Complex, at: Floats, first: NDArray[np.int64]) -> Complex:
     """Through three lines from `first` on (Lagrange)."""
     x = [lines_hz[first + i] for i in range(3)]
-    total = np.zeros((len(log), at.size), dtype=np.complex128)
+    total = np.zeros((len(values), at.size), dtype=np.complex128)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        total += log[:, first + i] * ((at - x[j]) * (at - x[k]) / ((x[i] - x[j]) * (x[i] - x[k])))
+        total += values[:, first + i] * ((at - x[j]) * (at - x[k]) / ((x[i] - x[j]) * (x[i] - x[k])))
     return total

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Model
 from livebode.core.controllers import integral
-from livebode.tuning.plant_band import PlantBand
+from livebode.tuning.plant_band import PlantBand, cubic
 from livebode.tuning.step_response import step_response
 
 Floats = NDArray[np.float64]
@@ -89,10 +89,9 @@ def _banded(frequency_hz: Floats, closed: Complex, time_s: Floats) -> PredictedS
 
 
 def _noise(frequency_hz: Floats, lines_hz: Floats) -> Complex:
-    """Circular noise of the lines, interpolated between them, shape (draws, frequencies)."""
-    drawn = np.random.default_rng(0).standard_normal((2 * _DRAWS, lines_hz.size)) / np.sqrt(2)
-    between = np.stack([np.interp(frequency_hz, lines_hz, row) for row in drawn])
-    return np.asarray(between[:_DRAWS] + 1j * between[_DRAWS:])
+    """Circular noise of the lines, interpolated between them as the plant is, shape (draws, frequencies)."""
+    real, imaginary = np.random.default_rng(0).standard_normal((2, _DRAWS, lines_hz.size)) / np.sqrt(2)
+    return cubic(lines_hz, real + 1j * imaginary, frequency_hz)
 
 
 def _in_discs(count: int) -> Complex:
