@@ -84,7 +84,7 @@ MISTAKES = [
     ("export runs/monday --to xlsx", "choose csv, mat, netcdf or uff"),
     (
         "run log.csv --excitation w --input u --output y --baseline none.json --force",
-        "there is no baseline 'none.json'",
+        "none.json'; learn one from runs",
     ),
     ("run log.csv key.toml", "a configuration cannot be combined"),
     ("design key.toml", "there is neither [belt] nor [measured]"),

@@ -226,11 +226,9 @@ def test_without_a_baseline_the_run_says_what_is_missing(folder: Path, tmp_path:
     )
 
 
-@pytest.mark.parametrize("key", ["covariates", "ready_mask", "ready_value"])
-def test_keys_of_a_single_response_are_refused(key: str) -> None:
-    value = ["temperature"] if key == "covariates" else 7
-    with refused(ConfigError, "key-conflict", key=f"monitoring.{key}"):
-        axis(Path(), "log", {key: value})
+def test_covariates_belong_to_a_single_response() -> None:
+    with refused(ConfigError, "key-conflict", key="monitoring.covariates"):
+        axis(Path(), "log", {"covariates": ["temperature"]})
 
 
 def test_a_gantry_is_refused_for_a_single_response() -> None:

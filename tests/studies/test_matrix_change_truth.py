@@ -227,10 +227,11 @@ def test_the_mean_uses_rows_that_share_no_window(healthy: list[MatrixResponses])
         ]
     )
     mean = mean_matrix(rows)
-    assert np.allclose(mean.value[0], rows.value.mean(axis=0))
+    # All have as many repetitions, so that the weights differ only by the noise of the inputs.
+    assert np.allclose(mean.value[0], rows.value.mean(axis=0), rtol=0, atol=0.01 * rows.sigma.max())
     noise, spread = np.einsum("rkoo->rko", rows.noise).real, np.einsum("rkii->rki", rows.spread).real
     expected = noise.mean(axis=0)[:, :, np.newaxis] * spread.mean(axis=0)[:, np.newaxis] / 3
-    assert np.allclose(mean.sigma[0] ** 2, expected)
+    assert np.allclose(mean.sigma[0] ** 2, expected, rtol=0.01)
     same = MatrixResponses.join(healthy[:2])
     assert np.array_equal(mean_matrix(same).value, healthy[1].value[-1:])
 
