@@ -60,7 +60,7 @@ def _transfer(gain: float, integral_time_s: float, biquads: list[dict[str, Any]]
 
 
 def _decay(controllers: list[control.TransferFunction]) -> float:
-    """Size of the largest pole of the whole loop, but for the place where the gantry comes to rest."""
+    """Size of the largest pole of the whole loop, without those of the place where the gantry stops."""
     a, b, c = LOOP.mechanism.sampled(RATE_HZ)
     plant = control.ss(a, b, c[:2], 0, 1 / RATE_HZ)
     poles = control.feedback(plant, control.append(*(control.ss(one) for one in controllers))).poles()

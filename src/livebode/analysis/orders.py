@@ -153,7 +153,7 @@ def orders_of(
     known = np.zeros(0) if lines_hz is None else np.asarray(lines_hz, dtype=np.float64)
     search = _Search(motion, shafts, _angle(motion, angle) * 2 * np.pi / per_turn, known, highest_hz)
     smooth = SmoothMotion.of(motion.block, motion.input, motion.output, motion.kind, band_hz, None)
-    slowest = _SLOWEST * float(np.max(np.abs(smooth.velocity)))
+    slowest = _slowest(smooth.velocity)
     found = search.result(search.friction(motion.block, band_hz, slowest))
     if any(one.seen.any() for one in found.shafts):
         found = search.result(search.friction(search.without_ripple(found.shafts), band_hz, slowest))

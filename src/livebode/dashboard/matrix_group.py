@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -72,14 +72,17 @@ class MatrixGroup:
 
 def _of_record(run: RunRecord, time_s: float | None) -> MatrixResponses | None:
     """The one in the segments near that time, else in the whole run."""
-    found = None
     if segments := [one for one in run.segments if one.table == "responses"]:
         near_s = (segments[-1].first_s, inf) if time_s is None else (time_s - _NEAR_S, time_s + _NEAR_S)
-        for part in run.matrix_batches(span_s=near_s):
-            found = _better(found, part, time_s)
+        found = _best(run.matrix_batches(span_s=near_s), time_s)
         if found is not None and (time_s is None or abs(found.time_s[0] - time_s) <= _NEAR_S):
             return found
-    for part in run.matrix_batches():
+    return _best(run.matrix_batches(), time_s)
+
+
+def _best(parts: Iterable[MatrixResponses], time_s: float | None) -> MatrixResponses | None:
+    found = None
+    for part in parts:
         found = _better(found, part, time_s)
     return found
 

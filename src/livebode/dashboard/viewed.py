@@ -61,7 +61,7 @@ class Viewed:
             return False
         first = next(self._run.between(-inf, segments[0].first_s))
         newest = Responses.join(list(self._run.between(newest_s - _RECENT_S, inf)))
-        each = len(self._run.lines) * max(1, len(RunRecord.open(self.directory, matrix=True).entries))
+        each = len(self._run.lines) * (1 if state.group is None else len(state.group.entries))
         count = sum(segment.rows for segment in segments) // each
         count += int(np.count_nonzero(newest.time_s > newest_s))
         self._sample, self._last_s = int(newest.sample[-1]), float(newest.time_s[-1])

@@ -12,7 +12,6 @@ from livebode.fitting.common_poles import CommonPoles, assembled, check_model, o
 from livebode.fitting.physical import Hold
 from livebode.fitting.pole_search import Kind, search
 from livebode.fitting.separable import Separated
-from livebode.mimo.mean import mean_matrix
 from livebode.mimo.mode_choice import chosen
 from livebode.mimo.refinement import refined
 from livebode.mimo.whitening import Weighted
@@ -129,8 +128,8 @@ def fit_matrix(
     ('ok', 2, ('velocity1/u1', 'velocity1/u2', 'velocity2/u1', 'velocity2/u2'))
     """
     check_model(model, order)
-    matrix = mean_matrix(responses)
     weighted = Weighted.of(responses, band_hz)
+    matrix = weighted.mean
     whole = matrix.valid[0].all(axis=1)
     entries = [_entry(matrix, o, i, whole) for o in range(len(matrix.outputs)) for i in range(len(matrix.inputs))]
     names = tuple(f"{o}/{i}" for o in matrix.outputs for i in matrix.inputs)

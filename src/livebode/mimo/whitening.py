@@ -23,6 +23,8 @@ class Weighted:
 
     Attributes
     ----------
+    mean
+        The mean matrix with all its lines.
     value
         Entries, those of an output after each other, shape (lines, entries).
     noise, spread
@@ -33,6 +35,7 @@ class Weighted:
         Whitened errors of all lines together (`row_scatter`), shape (errors, lines, entries).
     """
 
+    mean: MatrixResponses
     frequency_hz: Floats
     value: Complex
     noise: Complex
@@ -60,6 +63,7 @@ class Weighted:
         if not whole.any():
             raise FitError("too-few-lines", "no line has all its columns valid", "see why() for the reasons", lines=0)
         found = cls(
+            matrix,
             matrix.frequency_hz[whole],
             matrix.value[0, whole].reshape(np.count_nonzero(whole), -1),
             matrix.noise[0, whole],

@@ -1,4 +1,4 @@
-"""Lines of the time with a constant amplitude, told from orders by one fit of both."""
+"""Lines of the time with a constant amplitude, separated from orders by one fit of both."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _FALSE = 1e-3  # probability that a constant line is taken for one that varies
 
 
 def without_lines(strokes: Sequence[Stroke], shafts: Sequence[Shaft], lines_hz: Floats) -> tuple[list[Stroke], Floats]:
-    """The strokes without the lines that are told from the orders, and the lines that are not.
+    """The strokes without the lines that can be separated from the orders, and the other lines.
 
     An order has one phase over the angle in all strokes, and a line one phase over the time. So least squares of both
     over all strokes tell them apart even where their frequencies meet in some of them, if the line has another phase

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -163,9 +163,10 @@ def _between(
     """
     log = np.log(np.abs(value)) + 1j * np.unwrap(np.angle(value), axis=1)
     share = _share(lines_hz, at, left)
+    parabolas = [_parabolas(lines_hz, transformed, at, left) for transformed in (log, value, 1 / value)]
+    backs: list[Callable[[Complex], Complex]] = [np.exp, np.asarray, np.reciprocal]
     middles, gaps = [], []
-    for transformed, back in ((log, np.exp), (value, np.asarray), (1 / value, np.reciprocal)):
-        before, after = _parabolas(lines_hz, transformed, at, left)
+    for (before, after), back in zip(parabolas, backs):
         with np.errstate(all="ignore"):  # a cubic of 1/G may pass 0
             middle = back((1 - share) * before + share * after)
             gap = np.abs(back(before) - back(after)) / np.abs(middle) / 2
@@ -173,7 +174,7 @@ def _between(
         gaps.append(_to_ends(np.where(np.isfinite(gap), gap, np.inf)))
     starts = np.flatnonzero(np.diff(left, prepend=-1))
     least = np.argmin(np.add.reduceat(gaps, starts, axis=2), axis=0)[:, left]
-    before, after = _parabolas(lines_hz, log, at, left)
+    before, after = parabolas[0]
     coarse = _to_ends(np.abs(before - after) / 2)
     noise = radius / np.abs(value)
     noisy = np.maximum.reduceat(coarse, starts, axis=1) <= _NOISE * np.maximum(noise[:, :-1], noise[:, 1:])

@@ -78,15 +78,14 @@ class LoopSignals:
             If there are fewer than 9 periods, or the excitation is zero at all lines.
         """
         period = lines.window
-        whole = starts is None
         if starts is None:
             starts = period * np.arange(len(block) // period - 1)
+            what, remedy = f"fewer than {WINDOWS_MIN + 1} periods of {period}", "record longer"
+        else:
+            what = f"too few: {len(starts)} windows of two settled periods, and {WINDOWS_MIN} are needed"
+            remedy = "record more repetitions, or longer experiments"
         count = len(starts)
         if count < WINDOWS_MIN:
-            what, remedy = f"fewer than {WINDOWS_MIN + 1} periods of {period}", "record longer"
-            if not whole:
-                what = f"too few: {count} windows of two settled periods, and {WINDOWS_MIN} are needed"
-                remedy = "record more repetitions, or longer experiments"
             raise SignalError(
                 "too-short",
                 f"{len(block)} samples in a row without a gap are {what}",
