@@ -84,7 +84,7 @@ MISTAKES = [
     ("export runs/monday --to xlsx", "choose csv, mat, netcdf or uff"),
     (
         "run log.csv --excitation w --input u --output y --baseline none.json --force",
-        "none.json'; learn one from runs",
+        "there is no baseline '{folder}/none.json'; learn one from runs",
     ),
     ("run log.csv key.toml", "a configuration cannot be combined"),
     ("design key.toml", "there is neither [belt] nor [measured]"),
@@ -98,7 +98,7 @@ def test_a_first_mistake_is_one_sentence(
     monkeypatch.chdir(folder)
     result = livebode(*command.split())
     assert result.code == 2
-    assert sentence in result.err
+    assert sentence.replace("{folder}", str(folder)) in result.err
     assert result.err.count("\n") == 1, "one sentence"
 
 
