@@ -14,6 +14,7 @@ from livebode.fleet.server_cluster import ClusterMember
 from livebode.fleet.settings import LogSection, ServerSection
 from livebode.fleet.subjects import LOG_STREAM
 from tests.support.fleet_runs import PARTITIONS
+from tests.support.peers.peer import PATIENCE_S
 
 
 @dataclass(frozen=True)
@@ -55,5 +56,5 @@ def log_cluster(folder: Path) -> Iterator[LogCluster]:
     with ExitStack() as stack:
         for server in servers.values():
             stack.enter_context(server)
-        asyncio.run(create())
+        asyncio.run(asyncio.wait_for(create(), PATIENCE_S))  # without a majority it would wait forever
         yield LogCluster(servers, settings)

@@ -17,6 +17,7 @@ from livebode.fleet.server_cluster import ClusterMember
 from livebode.fleet.server_config import server_configuration
 
 _START_S, _STEP_S = 10.0, 0.02
+_given: set[int] = set()
 
 
 class NatsServer:
@@ -141,7 +142,11 @@ class LogServer(NatsServer):
 
 
 def free_port() -> int:
-    """A port of the loopback at which nothing listens."""
+    """A port of the loopback at which nothing listens, and that was not given before: servers bind theirs later."""
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
+        port = int(found.getsockname()[1])
+        if port not in _given:
+            _given.add(port)
+            return port
+        return free_port()  # while this one is bound, so that it is another
