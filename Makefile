@@ -6,13 +6,15 @@ BUILT   = $(VENV)/.built
 NODE    = node_modules/.package-lock.json
 # Small products only make BLAS's threads wait for each other; the command line does the same for itself.
 export OPENBLAS_NUM_THREADS ?= 1
+# One more than there are processors: a test that waits, for a server or a child, leaves them to others.
+WORKERS ?= $(shell $(PYTHON) -c "import os; print((os.cpu_count() or 1) + 1)")
 WHEELS  = .venv-wheels
 # A Python that has the wheel of the stable ABI: the newest of pyenv, else that of the system.
 LATER_PYTHON ?= $(or $(lastword $(sort $(wildcard $(HOME)/.pyenv/versions/3.1[2-9].*/bin/python3))),python3.13)
-NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
-C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
+NATIVE  = $(shell find kernel native simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt -o -name '*.cmake')
+C_SOURCES = $(shell find kernel native simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest publishing outage peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test test-changed mutations size pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest publishing outage peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage deletions archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -45,14 +47,25 @@ $(VENV)/.compiled: $(BUILT)
 	touch $@
 
 pytest: $(BUILT) $(NODE) $(VENV)/.compiled
-	@$(BIN)/python -m pytest -n auto --dist worksteal  # neighbouring tests share what they compute once
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal  # neighbouring tests share what they compute once
+
+BASE ?=
+MUTATIONS ?= 20
+test-changed: $(BUILT)  ## the tests that what changed since a commit can concern (BASE=COMMIT; default: the last one)
+	@$(BIN)/python -m tools.changed_tests $(or $(BASE),HEAD) -n $(WORKERS) --dist worksteal
+
+mutations: $(BUILT)  ## break 20 lines of the hull and of each wing at random: which does no test notice (hours; MUTATIONS=2: less)
+	for package in livebode $(notdir $(wildcard wings/*/src/*)); do $(BIN)/python -m tools.mutations $$package $(MUTATIONS) 1 || exit; done
+
+size: $(BUILT)   ## lines, files and imports of each package beside their limits (tests/meta/size_limits.toml)
+	@$(BIN)/python -m tools.size
 
 $(VENV)/.docs: $(BUILT) requirements-docs.lock
 	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-docs.lock
 	touch $@
 
 docs: $(VENV)/.docs  ## the documentation as a site in build/docs, its tutorials executed; every warning is an error
-	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m sphinx -W --keep-going -q -b html -c docs . build/docs
 
 lint: $(BUILT) $(NODE)  ## style, types and the import contract
 	$(BIN)/ruff check .
@@ -92,7 +105,6 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.archive
 	$(BIN)/python -m bench.growth
 
-BASE ?=
 bench-compare: $(BUILT)  ## the speed of this version and of another commit, alternately (BASE=REV; default: newest tag or stored result)
 	$(BIN)/python -m bench.versions --base "$(BASE)"
 
@@ -150,7 +162,7 @@ fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lac
 common-modes: $(BUILT) ## order and coverage of the bounds of modes common to two outputs (docs/explanation/fits.md)
 	$(BIN)/python -m studies.common_modes
 
-trends: $(BUILT) ## trends over a year of runs: coverage, power, false discoveries of a fleet (docs/explanation/trends.md, 10 min)
+trends: $(BUILT) ## trends over a year of runs: coverage, power, false discoveries of a fleet (wings/plant/docs/trends.md, 10 min)
 	$(BIN)/python -m studies.archive_trends
 
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/how-to/monitoring.md
@@ -163,24 +175,32 @@ HEALTHY_RUNS ?= 1000
 healthy: $(BUILT) ## false alarms in 1,000 healthy runs with ripple, eccentricity, delay and others (2 h; HEALTHY_RUNS=20: 10 min)
 	$(BIN)/python -m studies.healthy --runs $(HEALTHY_RUNS) --processes 2
 
-fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources, the configuration and the dashboard
+fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources, the commands, the configuration and the dashboard
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/sources/test_readers_damage_fault.py
 	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/configuration/test_axes_fault.py
-	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/sources/test_live_parsers_fault.py tests/sources/test_live_variants_fault.py
-	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/structured_text/test_settings_property.py
+	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/sources/test_live_parsers_fault.py wings/drives/tests/test_live_variants_fault.py
+	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto wings/drives/tests/test_settings_property.py
 	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/dashboard/test_requests_fault.py
+	LIVEBODE_COMMANDS_FUZZ=1000 $(BIN)/python -m pytest -n auto tests/cli/test_unusual_recordings_fault.py
 
-damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile ones
-	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/records/test_bit_flips_fault.py
+damage: $(BUILT) ## flip, cut and zero files of runs, baselines, lakes and edge buffers 1,000 times each, and open 1,000 hostile runs
+	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/records/test_file_damage_fault.py
+	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s wings/plant/tests/lake/test_damage_fault.py
+	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/monitoring/test_baseline_damage_fault.py
 	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/records/test_hostile_run_fault.py
+	LIVEBODE_DAMAGE_BUFFER=1000 $(BIN)/python -m pytest -s wings/plant/tests/fleet/test_edge_buffer_damage_fault.py
 
-crash: $(BUILT)  ## kill processes that record at 1,000 random moments, as often with each of ten kinds of live source, and fail every call
+deletions: $(BUILT) ## every command that removes or replaces files, in 1,000 hostile directories: what of others is touched (10 min)
+	LIVEBODE_DELETIONS=1000 $(BIN)/python -m pytest -n 0 -q -s --show-capture=no tests/cli/test_deletions_fault.py
+
+crash: $(BUILT)  ## kill processes that record at 1,000 random moments, as often with each of fourteen kinds of live source, and fail every call
 	LIVEBODE_CRASH_CALLS=1 $(BIN)/python -m pytest tests/records/test_every_call_fault.py
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/records/test_kills_fault.py
 	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 10 -rP tests/records/test_live_kills_fault.py  # they mostly wait
+	LIVEBODE_CRASH_KILLS_EACH=200 $(BIN)/python -m pytest -n 4 -rP tests/records/test_stored_backlog_fault.py
 
 archive-faults: $(BUILT) ## an archive with bad recordings: kill workers and coordinators 100 times, compare with a loop (20 min)
-	LIVEBODE_ARCHIVE_KILLS=100 $(BIN)/python -m pytest -q -s tests/archive/test_kills_fault.py
+	LIVEBODE_ARCHIVE_KILLS=100 $(BIN)/python -m pytest -q -s wings/plant/tests/archive/test_kills_fault.py
 
 soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth of memory, length of the stop, docs/images/soak.png
 	$(BIN)/python -m studies.soak
@@ -189,7 +209,7 @@ FLEET_FAULTS ?= 1000
 fleet-faults: $(BUILT) ## kill, freeze and disturb a fleet 1,000 times, and compare every response bit for bit (20 min; continues after an interruption)
 	$(BIN)/python -m studies.fleet_faults $(FLEET_FAULTS)
 
-fleet-scale: $(BUILT) ## costs of an axis of a fleet on this computer, and what 100,000 axes need (docs/explanation/fleet-scale.md; 5 min)
+fleet-scale: $(BUILT) ## costs of an axis of a fleet on this computer, and what 100,000 axes need (wings/plant/docs/fleet-scale.md; 5 min)
 	$(BIN)/python -m bench.fleet_path
 	$(BIN)/python -m bench.fleet_parts
 	$(BIN)/python -m bench.fleet_load

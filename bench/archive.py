@@ -34,22 +34,22 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import tomli_w
 
-from livebode.archive.alone import handle_alone
-from livebode.archive.clusters import Cluster, started
-from livebode.archive.committing import Committer
-from livebode.archive.distributing import Distribution
-from livebode.archive.grouping import RecordingGroups
-from livebode.archive.job import Job
-from livebode.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places, longest_first
-from livebode.archive.results import Handled, Tracked, each_result, lost
-from livebode.archive.settings import ArchiveSettings, ClusterSection
-from livebode.archive.tasks import handle, handle_one
-from livebode.archive.template import Template
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.core import Lines
 from livebode.excitation import multisine
-from livebode.lake import RUNS, Lake
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
+from livebode_plant.archive.alone import handle_alone
+from livebode_plant.archive.clusters import Cluster, started
+from livebode_plant.archive.committing import Committer
+from livebode_plant.archive.distributing import Distribution
+from livebode_plant.archive.grouping import RecordingGroups
+from livebode_plant.archive.job import Job
+from livebode_plant.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places, longest_first
+from livebode_plant.archive.results import Handled, Tracked, each_result, lost
+from livebode_plant.archive.settings import ArchiveSettings, ClusterSection
+from livebode_plant.archive.tasks import handle, handle_one
+from livebode_plant.archive.template import Template
+from livebode_plant.lake import RUNS, Lake
 
 WORKERS, RATE_HZ, WINDOW = 2, 4000.0, 400
 POOL_RATIO_MAX, LOOP_RATIO_MIN, KNOWN_S_MAX, MEMORY_MB_MAX = 1.05, 1.9, 5.0, 300

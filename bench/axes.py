@@ -18,16 +18,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from livebode.analysis.learning import learn
-from livebode.configuration.axis import Axis
-from livebode.configuration.recording import open_recording
+from livebode.analysis import learn
+from livebode.configuration import Axis, open_recording
 from livebode.core import Block
-from livebode.interface.example_recordings import write_examples
-from livebode.preparation.plan import make_follower
-from livebode.runtime.destination import Destination
-from livebode.runtime.fits_together import process_together
-from livebode.runtime.pipeline import Pipeline
-from livebode.runtime.run import run
+from livebode.interface import write_examples
+from livebode.preparation import make_follower
+from livebode.runtime import Destination, SingleResponse, run
+from livebode_plant.fleet.fits_together import process_together
 
 AXES, ROUNDS = 100, 3
 FITS_PER_S = 2
@@ -60,7 +57,7 @@ def machine(folder: Path) -> tuple[Axis, Block]:
     found["monitoring"]["baseline"] = str(folder / "healthy.json")
     axis = Axis.of(found, "today.toml")
     log = open_recording(axis)
-    pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
+    pipeline = SingleResponse.of(axis, make_follower(axis, log), log.channels)
     blocks = list(log.blocks(pipeline.channels))
     return axis, replace(blocks[0], data=np.concatenate([block.data for block in blocks], axis=1))
 
@@ -68,7 +65,7 @@ def machine(folder: Path) -> tuple[Axis, Block]:
 def shares(axis: Axis, every: Block, block_ms: int) -> dict[str, float]:
     """Percent of a core of one axis."""
     log = open_recording(axis)
-    pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
+    pipeline = SingleResponse.of(axis, make_follower(axis, log), log.channels)
     assert pipeline.detection is not None
     assert pipeline.fits is not None
     tracking, monitoring, fits = Spent(), Spent(), Spent()
@@ -98,7 +95,7 @@ def fits_together(axis: Axis, every: Block) -> float:
     log = open_recording(axis)
     tracker = make_follower(axis, log)
     found = tracker.process(every)
-    fits = [Pipeline.of(axis, make_follower(axis, log), log.channels).fits for _ in range(AXES)]
+    fits = [SingleResponse.of(axis, make_follower(axis, log), log.channels).fits for _ in range(AXES)]
     known = [one for one in fits if one is not None]
     process_together(known, [found[:16]] * AXES)
     spent, calls = Spent(), 10

@@ -12,7 +12,7 @@ import pyarrow.csv as pc
 import pyarrow.parquet as pq
 
 from bench.job import RATE_HZ, best_s, run_livebode, signals
-from livebode.records.content import content_sha256
+from livebode.records import content_sha256
 
 
 def main() -> None:

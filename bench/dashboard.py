@@ -19,11 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from bench.browser import chromium
-from livebode.analysis.overview import Overview
+from livebode.analysis import Overview
 from livebode.core import Block, Lines, Parameters, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
-from livebode.runtime import RunControl
-from livebode.runtime.documents import FitResults, RunStarted, TrackerResults
+from livebode.runtime import FitResults, RunControl, RunStarted, TrackerResults
 
 RATE_HZ, WINDOW, UPDATES_PER_S = 4000.0, 2000, 30.0
 FRAMES_MIN, CPU_MAX = 50.0, 0.10

@@ -15,11 +15,11 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import least_squares
 
-from livebode.configuration.fit_section import FitSection
+from livebode.configuration import FitSection
 from livebode.core import PID, Lines, Loop, Responses
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit_together, two_masses
-from livebode.runtime.fits import Fits
-from livebode.runtime.fits_together import process_together
+from livebode.runtime import Fits
+from livebode_plant.fleet.fits_together import process_together
 
 TARGET_US = 60.0
 RATE_HZ, AXES, TARGET_AXES, LIVE = 200, 16, 8, 32

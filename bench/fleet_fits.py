@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.axes import TARGET_PERCENT, machine
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.core import Block
-from livebode.fleet.axis_stream import AxisStream, outputs_together
-from livebode.fleet.message import write_message
-from livebode.fleet.partition import RESULTS_S
-from livebode.fleet.result_message import PendingResults
 from livebode.sources.live import Batch
+from livebode_plant.fleet.axis_stream import AxisStream, outputs_together
+from livebode_plant.fleet.message import write_message
+from livebode_plant.fleet.partition import RESULTS_S
+from livebode_plant.fleet.result_message import PendingResults
 
 MONITORING_TARGET_PERCENT = 0.2
 BLOCKS_MS, ROUNDS, SECONDS, WARM_S = (500, 100), 3, 12.0, 9.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bench.fleet_loads import AxisLoad
-from livebode.fleet.subjects import EDGE
+from livebode_plant.fleet.subjects import EDGE
 
 _STEP_S, _CONFIRMED_S = 0.01, 60.0
 

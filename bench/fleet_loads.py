@@ -7,14 +7,13 @@ from functools import cache
 
 import numpy as np
 
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.core import Channel, Lines, SpectraLayout
 from livebode.excitation import multisine
-from livebode.fleet.message import write_message
-from livebode.fleet.settings import machine_key
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
-from livebode.sources.live import Batch, SpectraBatch
-from livebode.sources.live.spectra_batch import AnyBatch
+from livebode.sources.live import AnyBatch, Batch, SpectraBatch
+from livebode_plant.fleet.message import write_message
+from livebode_plant.fleet.settings import machine_key
 
 RATE_HZ, WINDOW, FREQUENCIES = 4000.0, 400, "20:140:20"
 NAMES = ("w", "u", "velocity")

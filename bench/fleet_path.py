@@ -30,16 +30,16 @@ import psutil
 
 from bench.fleet_generator import Generated, generate
 from bench.fleet_loads import MOTION, SAMPLES_100, SAMPLES_500, SPECTRA, AxisLoad
-from livebode.fleet.log import FleetLog
-from livebode.fleet.reader import stored_messages
-from livebode.fleet.result_message import ResultMessage
-from livebode.fleet.server import LogServer
-from livebode.fleet.settings import LogSection
-from livebode.fleet.status import status_of
-from livebode.fleet.stored_states import STATE_S_MIN, STATE_SHARE
-from livebode.fleet.subjects import LOG, LOG_STREAM, RESULT_STREAM, RESULTS, STATE_STREAM, key_of
-from livebode.fleet.worker import own_partitions
-from livebode.sources.live.framing import read_header
+from livebode.sources.live import read_header
+from livebode_plant.fleet.log import FleetLog
+from livebode_plant.fleet.reader import stored_messages
+from livebode_plant.fleet.result_message import ResultMessage
+from livebode_plant.fleet.server import LogServer
+from livebode_plant.fleet.settings import LogSection
+from livebode_plant.fleet.status import status_of
+from livebode_plant.fleet.stored_states import STATE_S_MIN, STATE_SHARE
+from livebode_plant.fleet.subjects import LOG, LOG_STREAM, RESULT_STREAM, RESULTS, STATE_STREAM, key_of
+from livebode_plant.fleet.worker import own_partitions
 
 LOAD = 0.6
 """Of a core, for which axes are counted."""

@@ -18,13 +18,13 @@ import numpy as np
 from livebode.core import Lines, Parameters, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.fleet.log import StoredMessage
-from livebode.fleet.result_message import ResultMessage
-from livebode.fleet.settings import SinkSection
-from livebode.fleet.sink_tables import SinkTables
-from livebode.fleet.wide_rows import AxisFits, AxisRows, grid_of, parameter_table, response_table
-from livebode.lake import Lake
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
+from livebode_plant.fleet.log import StoredMessage
+from livebode_plant.fleet.result_message import ResultMessage
+from livebode_plant.fleet.settings import SinkSection
+from livebode_plant.fleet.sink_tables import SinkTables
+from livebode_plant.fleet.wide_rows import AxisFits, AxisRows, grid_of, parameter_table, response_table
+from livebode_plant.lake import Lake
 
 RATE_HZ, WINDOW, LINES, HOP, TRACKED_S = 4000.0, 400, 7, 2000, 60.0
 AXES, SECONDS, EVERY_S, RESPONSES_PER_S = 10, 3000.0, 2.0, 2.0

@@ -11,7 +11,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from livebode.report.style import DARK, LIGHT, drawing, heading, new_figure, plain
+from livebode.report import drawing, heading, new_figure, plain
+from livebode.report._style import DARK, LIGHT
 from livebode.report.svg import themed_svg, variables
 from livebode.report.svg_renderer import draw_svg
 

@@ -23,16 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.monitoring_live import RATE_HZ, UNITS, at_hop, standing
-from livebode.configuration import Axis
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import Axis, RecordSection
 from livebode.core import Channel
-from livebode.dashboard import Dashboard, Serving
-from livebode.dashboard.hub import Hub
-from livebode.runtime import Destination, Document, Session, live
-from livebode.runtime.documents import TrackerResults
-from livebode.sources.live import Batch, LiveSource
-from livebode.sources.live.address import Address
-from livebode.sources.live.settings import SourceSettings
+from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.runtime import Destination, Document, Session, TrackerResults, live
+from livebode.sources.live import Address, Batch, LiveSource, SourceSettings
 
 BATCH, HOP = 100, 200
 MAILBOX_MAX, MAILBOXES_MAX = 40, 400

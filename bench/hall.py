@@ -32,8 +32,7 @@ from bench.live import BATCH, CHANNELS, CORES, HOP, free_ports, show, wake
 from livebode.cli.start import OBJECTS_NEW
 from livebode.configuration import Axis
 from livebode.core import Block, Responses, SpectraLayout
-from livebode.runtime import Destination, Document, Session
-from livebode.runtime.documents import TrackerResults
+from livebode.runtime import Destination, Document, Session, TrackerResults
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples, encode_spectra, encode_spectra_layout
 from livebode.sources.live.kernel_drive import KernelDrive
 

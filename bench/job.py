@@ -106,7 +106,7 @@ def bound(log: Path, run: Path, out: Path) -> None:
 def pictures(run: Path) -> None:
     """Draw the pictures of a run; print the seconds of the first time, which loads Matplotlib, and of the best."""
     import livebode.report
-    from livebode.analysis.overview import Overview
+    from livebode.analysis import Overview
     from livebode.cli.start import OBJECTS_NEW
     from livebode.records import RunRecord
 

@@ -30,8 +30,7 @@ from bench.job import LINES, RATE_HZ, WINDOW, signals
 from livebode.configuration import Axis
 from livebode.core import Block, Channel, Responses
 from livebode.dashboard import Dashboard, Serving
-from livebode.runtime import Destination, Document, Session, Subscriber
-from livebode.runtime.documents import TrackerResults
+from livebode.runtime import Destination, Document, Session, Subscriber, TrackerResults
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "rad/s"))

@@ -18,11 +18,8 @@ from pathlib import Path
 from bench.growth_live import sources_from
 from bench.hall import Frames, Hall, axis
 from bench.job import RATE_HZ
-from livebode.runtime import Destination, Document, RunControl, run
-from livebode.runtime.documents import TrackerResults
-from livebode.sources.live import SourceSettings
-from livebode.sources.live.address import Address
-from livebode.sources.live.spectra_batch import AnyBatch
+from livebode.runtime import Destination, Document, RunControl, TrackerResults, run
+from livebode.sources.live import Address, AnyBatch, SourceSettings
 from livebode.sources.live.udp import UdpSource
 
 SECONDS, ROUNDS = 60.0, 3

@@ -26,17 +26,13 @@ import pyarrow.parquet as pq
 
 from bench.axes import Spent
 from bench.axes import machine as moving
-from livebode.analysis.learning import learn
-from livebode.configuration.axis import Axis
-from livebode.configuration.monitoring_section import MonitoringSection
-from livebode.configuration.recording import open_recording
+from livebode.analysis import learn
+from livebode.configuration import Axis, MonitoringSection, open_recording
 from livebode.core import Block, Lines
 from livebode.excitation import multisine
-from livebode.preparation.plan import make_follower
-from livebode.runtime.destination import Destination
+from livebode.preparation import make_follower
+from livebode.runtime import Destination, SingleResponse, run
 from livebode.runtime.fit_budget import SHARE
-from livebode.runtime.pipeline import Pipeline
-from livebode.runtime.run import run
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 
 UNITS = {"u": "N m", "velocity": "rad/s", "w": "N m"}
@@ -114,7 +110,7 @@ def blocks(every: Block) -> Iterator[Block]:
 def shares(axis: Axis, every: Block) -> Shares:
     """What one axis costs, in the order of a live run."""
     log = open_recording(axis)
-    pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
+    pipeline = SingleResponse.of(axis, make_follower(axis, log), log.channels)
     detection, fits = pipeline.detection, pipeline.fits
     assert detection is not None
     assert fits is not None

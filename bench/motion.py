@@ -30,12 +30,11 @@ from livebode.kernel import (
     belt_each,
     belt_replay,
     belt_response,
-    belt_twin,
     curve_at,
 )
 from livebode.motion import MotionCorrection
-from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
-from livebode.simulation.open_belt import Pair, open_belt
+from livebode.simulation import BeltAxis, Pair, Sensor, SimulatedAxis, Strokes, open_belt
+from tests.twins import belt as belt_twin
 
 RATE_HZ, WINDOW, CHUNK_S, RADIUS_M = 4000.0, 400, 4.0, 0.019
 LINES = Lines.parse("20:140:20", RATE_HZ, WINDOW)

@@ -22,10 +22,8 @@ from bench.job import LINES, RATE_HZ, WINDOW
 from livebode.configuration import Axis
 from livebode.core import Channel
 from livebode.excitation import multisine
-from livebode.records import RunRecord
-from livebode.records.grouped_events import event_counts
-from livebode.runtime import Destination, Document, RunControl, run
-from livebode.runtime.documents import TrackerResults
+from livebode.records import RunRecord, event_counts
+from livebode.runtime import Destination, Document, RunControl, TrackerResults, run
 from livebode.sources.live import Batch, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "A"), Channel("y", "rad/s"))

@@ -14,11 +14,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.records.response_table import RESPONSES, SCHEMA
-from livebode.tables import Table
-from livebode.tables.parquet_file import ParquetFile
-from livebode.tables.parquet_footer import read_footer
-from livebode.tables.parquet_writer import ParquetWriter
+from livebode.records import RESPONSE_SCHEMA, RESPONSES
+from livebode.tables import ParquetFile, ParquetWriter, Table, read_footer
 
 ROUNDS, LINES, HOP, RATE_HZ = 15, 13, 20, 4000.0
 COUNTS = 1, 40, 2520
@@ -40,8 +37,8 @@ def responses(count: int) -> Table:
         "valid": np.ones(rows, bool),
         "ready": np.ones(rows, bool),
     }
-    columns = (known[name] if name in known else rng.standard_normal(rows) for name in SCHEMA.names)
-    return Table(SCHEMA, tuple(columns))
+    columns = (known[name] if name in known else rng.standard_normal(rows) for name in RESPONSE_SCHEMA.names)
+    return Table(RESPONSE_SCHEMA, tuple(columns))
 
 
 def samples(rows: int) -> Table:

@@ -1,7 +1,7 @@
 """Cost of the generated function blocks on a PLC: LREAL operations per sample, counted at run time, and memory.
 
-`python -m bench.plc` prints the tables of docs/how-to/plc.md. An operation is +, -, *, /, ABS, a comparison or a sign
-change of LREAL numbers.
+`python -m bench.plc` prints the tables of wings/drives/docs/plc.md. An operation is +, -, *, /, ABS, a comparison or a
+sign change of LREAL numbers.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from livebode.core import Lines
 from livebode.excitation import multisine as multisine_period
 from livebode.excitation import schroeder_phases
 from livebode.kernel import SlidingDFT
-from livebode.kernel.twin import TwinDFT
-from livebode.structured_text import multisine, sliding_dft
+from livebode.structured_text import multisine
+from livebode_drives.structured_text.sliding_dft import sliding_dft
+from tests.twins.sliding import TwinDFT
 from tools.structured_text import Instance, Machine
 from tools.structured_text.types import Array, Scalar
 

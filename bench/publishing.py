@@ -28,7 +28,7 @@ import numpy as np
 from bench.live import Clock, Scenario, axis, free_ports, send
 from livebode.configuration import Axis
 from livebode.core import Event
-from livebode.publishing.publisher import Publisher
+from livebode.publishing import Publisher
 from livebode.runtime import Destination, Session
 
 ROUND_S, ROUNDS, AXES = 5.0, 4, 4

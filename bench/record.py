@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from bench.job import LINES, RATE_HZ, WINDOW, processor_s, signals
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import RecordSection
 from livebode.core import Block, Channel
 from livebode.estimation import Settings, Tracker
-from livebode.preparation.checks import ChannelCheck
+from livebode.preparation import ChannelCheck
+from livebode.records import RESPONSE_TABLES
 from livebode.runtime.run_counts import RunCounts
 from livebode.runtime.segmented import SegmentedRecord
 
@@ -54,7 +55,8 @@ def record(data: np.ndarray, samples: bool) -> tuple[float, float, float, int]:
     tracking_s = pause_s = 0.0
     with tempfile.TemporaryDirectory() as folder:
         run = SegmentedRecord(
-            Path(folder) / "run", RecordSection(samples=samples), summary={"configuration": {}, "found": {}},
+            Path(folder) / "run", RecordSection(samples=samples), tables=RESPONSE_TABLES,
+            summary={"configuration": {}, "found": {}},
             channels=[Channel(name) for name in NAMES], rate_hz=RATE_HZ, parts={"tracker": tracker, "counts": counts},
             force=False, again=True, ends=lambda: True, publish=print,
         )  # fmt: skip

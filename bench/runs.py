@@ -19,8 +19,7 @@ from typing import Any
 from bench.browser import chromium
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.run_catalogue import RunCatalogue
-from livebode.runtime import Destination
-from livebode.runtime.demo import demo, demo_baseline
+from livebode.runtime import Destination, demo, demo_baseline
 from tools.run_copies import copy_run
 
 LIST_S_MAX, TRENDS_S_MAX = 1.0, 2.0

@@ -27,14 +27,9 @@ import numpy as np
 
 from bench.job import LINES
 from livebode.core import Responses
-from livebode.dashboard import Dashboard, Serving
-from livebode.dashboard.past import Past
-from livebode.records import RESPONSES, RunRecord, as_batch
-from livebode.records.query import query
+from livebode.dashboard import Dashboard, Past, Serving
+from livebode.records import RESPONSES, RunRecord, SegmentLimits, Store, Thinning, as_batch, query
 from livebode.records.segments import shelf
-from livebode.records.segments.limits import SegmentLimits
-from livebode.records.segments.store import Store
-from livebode.records.tiers import Thinning
 
 SEGMENT_S, RESPONSES_EACH, TARGET_S = 6307.2, 30, 0.5
 HOP = round(SEGMENT_S / RESPONSES_EACH * LINES.rate_hz)

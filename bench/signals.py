@@ -21,7 +21,7 @@ from livebode.dashboard import Hub
 from livebode.dashboard.signal_answer import answer
 from livebode.dashboard.signal_tap import SignalTap
 from livebode.estimation import Settings, Tracker
-from livebode.runtime.documents import Channels, TrackerResults
+from livebode.runtime import Channels, TrackerResults
 
 RATE_HZ, WINDOW, SECONDS = 4000.0, 400, 4.0
 CHANNELS = tuple(Channel(name, unit) for name, unit in {"w": "N m", "u": "N m", "y": "rad/s", "x": "m"}.items())

@@ -6,7 +6,7 @@ Three signals at 4 kHz, joint estimator, window 400. Processor time of the threa
 machine, the least of several rounds; of blocks, the median block. `kernel` is the sliding DFT, `samples` what is
 checked and cut before it, `lines` the line stage, `repeating` the errors that repeat with the excitation, and `rest`
 blocks, times, events and the Responses. The last three columns use the NumPy twins of the line stage
-(`livebode.kernel.line_twin`) and of the verdicts on lines (`livebode.estimation.repeating_twin`), with the same results
+(`tests/twins/lines.py`) and of the verdicts on lines (`tests/twins/repeating.py`), with the same results
 to the bit, in the same rounds.
 """
 
@@ -24,12 +24,12 @@ import numpy as np
 
 from bench.fleet_loads import samples_of
 from livebode.core import Block, Lines, Responses
-from livebode.estimation import Settings, Tracker, line_stage, repeating_twin
-from livebode.estimation.line_stage import LineStage
+from livebode.estimation import LineSpectra, LineStage, Settings, Tracker, line_stage
 from livebode.estimation.repeating import RepeatingErrors
-from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.verdicts import Judge
-from livebode.kernel import SlidingDFT, line_twin
+from livebode.kernel import SlidingDFT
+from tests.twins import lines as line_twin
+from tests.twins import repeating as repeating_twin
 
 RATE_HZ, WINDOW, ROUNDS = 4000.0, 400, 5
 SMALL_S = 30.0

@@ -19,9 +19,9 @@ import duckdb
 import numpy as np
 import pyarrow as pa
 
-from livebode.lake import TABLES, Lake
-from livebode.simulation.machine_year import MachineYear
-from livebode.trending import Selection, assess, histories, history
+from livebode_plant.lake import TABLES, Lake
+from livebode_plant.trending import Selection, assess, histories, history
+from livebode_plant.trending.machine_year import MachineYear
 
 RUNS, MACHINES, QUANTITIES = 10_000, 50, 8
 LIMIT_S = 2.0
@@ -61,7 +61,7 @@ def seconds(work: Callable[[], object]) -> float:
 
 def plain_slopes(path: Path) -> int:
     """What a script without bounds would do: SQL for the rows of a quantity, and least squares for each machine."""
-    files = str(path / "quantities" / "*.parquet")
+    files = str(path / "tables" / "quantities" / "*.parquet")
     rows = duckdb.sql(f"SELECT machine, epoch(recorded_from) t, value FROM '{files}' WHERE name = 'Keff'").df()
     return len([np.polyfit(own["t"], own["value"], 1) for _, own in rows.groupby("machine")])
 

@@ -19,11 +19,10 @@ import numpy as np
 
 from bench.browser import chromium
 from bench.dashboard import RATE_HZ, WINDOW, responses
-from livebode.analysis.overview import Overview
+from livebode.analysis import Overview
 from livebode.core import Lines
 from livebode.dashboard import Dashboard, Serving
-from livebode.runtime import RunControl
-from livebode.runtime.documents import RunStarted
+from livebode.runtime import RunControl, RunStarted
 
 FRAMES_MIN = 30.0
 _ADDRESS = "#quantity=open+loop&sliders=1&what-if=notch~60~20~0.3~~notch~120~10~0.5~~low-pass~600"

@@ -14,7 +14,9 @@ os.environ |= {"TTY_COMPATIBLE": "0", "COLUMNS": "80"}  # a page has no spinner
 project = "livebode"
 author = "the authors of livebode"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "numpydoc", "mathml", "api_pages"]
-exclude_patterns = ["_build", "**/README.md"]
+include_patterns = ["docs/**", "wings/*/README.md", "wings/*/docs/**"]  # the source is the whole repository
+exclude_patterns = ["docs/_build", "docs/**/README.md"]
+root_doc = "docs/index"
 
 # Markdown
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]

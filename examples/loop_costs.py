@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from livebode import PID, Block, Cascade, Lines, Loop, Settings, Tracker, multisine
-from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop, TwoMassPlant
+from livebode.simulation import TwoMassLoop, TwoMassPlant
+from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from livebode.simulation.machine_year import START_S, MachineYear
-from livebode.trending import FALSE_DISCOVERIES, MONTH_S, NotAssessed, Trend, discoveries, trend_of
+from livebode_plant.trending import FALSE_DISCOVERIES, MONTH_S, NotAssessed, Trend, discoveries, trend_of
+from livebode_plant.trending.machine_year import START_S, MachineYear
 
 
 def trend(year: MachineYear, seed: int) -> Trend:

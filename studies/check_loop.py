@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.loop_check import LoopCheck, check_loop
-from livebode.configuration.loop_section import LoopSection
+from livebode.configuration import LoopSection
 from livebode.core import Block, Lines
 from livebode.excitation import multisine
-from livebode.validation import LoopSignals
+from livebode_control.loop_check.loop_check import LoopCheck, check_loop
+from livebode_control.loop_check.loop_equation import LoopSignals
 from studies.loop_words import Drive, Machine, record
 
 PERIODS = 30

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.loop_check import LoopCheck, check_loop
-from livebode.analysis.run_loop_check import settled_starts
-from livebode.configuration.loop_section import LoopSection
+from livebode.configuration import LoopSection
 from livebode.core import Block, Lines
 from livebode.mimo import MatrixExcitation
 from livebode.simulation import GantryLoop
-from livebode.validation import LoopSignals
+from livebode_control.loop_check.loop_check import LoopCheck, check_loop
+from livebode_control.loop_check.loop_equation import LoopSignals
+from livebode_control.loop_check.run_loop_check import settled_starts
 from studies.result import Verdict
 
 RUNS, RATE_HZ, REPETITIONS = 200, 4000.0, 8

@@ -14,17 +14,17 @@ from typing import Any
 
 import psutil
 
-from livebode.core.errors import FleetError
-from livebode.fleet.check import CheckResult, check_results
-from livebode.fleet.log import FleetLog
-from livebode.fleet.message import read_message
-from livebode.fleet.reader import stored_messages
-from livebode.fleet.result_message import ResultMessage
-from livebode.fleet.server import LogServer
-from livebode.fleet.settings import FleetSettings
-from livebode.fleet.simulated import BLOCK_S, RATE_HZ, SimulatedMachines, write_simulated_fleet
-from livebode.fleet.status import fleet_status, status_of
-from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS, key_of
+from livebode.core import FleetError
+from livebode_plant.fleet.check import CheckResult, check_results
+from livebode_plant.fleet.log import FleetLog
+from livebode_plant.fleet.message import read_message
+from livebode_plant.fleet.reader import stored_messages
+from livebode_plant.fleet.result_message import ResultMessage
+from livebode_plant.fleet.server import LogServer
+from livebode_plant.fleet.settings import FleetSettings
+from livebode_plant.fleet.simulated import BLOCK_S, RATE_HZ, SimulatedMachines, write_simulated_fleet
+from livebode_plant.fleet.status import fleet_status, status_of
+from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS, key_of
 
 PARTITIONS, WORKERS = 4, 2
 _BUFFER_BYTES, _SMALL_BUFFER_BYTES = 1 << 30, 100_000
@@ -40,7 +40,8 @@ _REPORTED_S = 1.0
 """From the end of the messages to the report that counts."""
 _STEP_S, _RECOVERY_S_MAX, _WORKER_S_MAX = 0.2, 600.0, 120.0
 _COMMAND = "from livebode.cli import main; main()"
-_WORKER = "spawn_main"
+_SERVER = "multiprocessing.forkserver"
+"""The process from which the coordinator forks its workers."""
 
 
 class FaultyMachines(SimulatedMachines):
@@ -49,13 +50,6 @@ class FaultyMachines(SimulatedMachines):
     swapped = 0
     """Pairs of messages that are still to be swapped."""
     _late: int | None = None
-
-    def _send(self) -> None:
-        while True:
-            try:
-                return super()._send()
-            except FleetError:  # the log did not answer in time; a service manager would start it again
-                time.sleep(_STEP_S)
 
     def _take_batches(self, number: int) -> None:
         if self._late is not None:
@@ -223,8 +217,8 @@ class FaultyFleet:
         with contextlib.suppress(psutil.NoSuchProcess):
             for child in self._process.children():
                 with contextlib.suppress(psutil.NoSuchProcess):  # it has just ended
-                    if _WORKER in " ".join(child.cmdline()):
-                        found.append(child)
+                    if _SERVER in " ".join(child.cmdline()):
+                        found += child.children()
         self._workers.update(found)
         return found
 
@@ -263,12 +257,22 @@ class FaultyFleet:
             self._server.start()
 
     def _coordinator(self) -> None:
+        """Kill the coordinator: its workers continue until those of the next one claim their partitions."""
+        self._restart(with_workers=False)
+
+    def _service(self) -> None:
+        """Kill the coordinator and its workers, as a service manager does that kills all processes of a service."""
+        self._restart(with_workers=True)
+
+    def _restart(self, *, with_workers: bool) -> None:
         with self._coordinating:
             workers = self._children()
-            self._process.kill()
+            for process in [self._process, *(workers if with_workers else [])]:
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    process.kill()
             self._process.wait()
             self._start()
-        # They end when they notice it, and may store results until then; a frozen one when it continues.
+        # Those that live end when others have claimed their partitions; a frozen one when it continues.
         until = time.monotonic() + _WORKER_S_MAX
         while any(map(_alive, set(workers) - self._frozen)) and time.monotonic() < until:
             time.sleep(_STEP_S)

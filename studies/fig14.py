@@ -10,7 +10,8 @@ from scipy import signal
 
 from livebode import Block, Lines, Response, Settings, Tracker, multisine
 from livebode.fitting import Fit, fit
-from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop, TwoMassPlant
+from livebode.simulation import TwoMassLoop, TwoMassPlant
+from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.validation import Validation, validate
 from studies.common import SIGMA, Floats
 from studies.drawing import LIGHT, figure_of

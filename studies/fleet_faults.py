@@ -2,10 +2,10 @@
 
 `python -m studies.fleet_faults 1000` starts fleets, several at once, each with a log, a coordinator with two workers,
 and simulated axes that send in real time. It kills a worker, freezes one and lets it continue, kills and restarts the
-log or the coordinator, repeats and reorders messages, and stops the log for so long that the buffers at the edge are
-full. One to five faults begin at random moments within three seconds, and so most of them meet the consequences of
-another one: a kill during a takeover, a restart of the log while a worker is frozen. The next ones begin only when
-every partition has stored results of messages that were sent after the last fault.
+log, the coordinator, or the coordinator with its workers, repeats and reorders messages, and stops the log for so long
+that the buffers at the edge are full. One to five faults begin at random moments within three seconds, and so most of
+them meet the consequences of another one: a kill during a takeover, a restart of the log while a worker is frozen. The
+next ones begin only when every partition has stored results of messages that were sent after the last fault.
 
 After each round of faults all responses of its fleet are computed again from the log, without interruption, and
 compared bit for bit. The longest time without a new result is measured first, by faults that happen alone.
@@ -31,13 +31,22 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from livebode.fleet.check import AxisCheck
-from livebode.fleet.status import silences
+from livebode_plant.fleet.check import AxisCheck
+from livebode_plant.fleet.status import silences
 from studies.faulty_fleet import LATE_MAX, PARTITIONS, FaultyFleet
 
-SHARES = {"kill": 8, "freeze": 6, "broker": 8, "coordinator": 4, "repeats": 6, "reordering": 6, "buffer": 2}
+SHARES = {
+    "kill": 8,
+    "freeze": 6,
+    "broker": 8,
+    "coordinator": 2,
+    "service": 2,
+    "repeats": 6,
+    "reordering": 6,
+    "buffer": 2,
+}
 """How often a kind occurs among 40 faults."""
-TARGETS_S = {"kill": 5.0, "broker": 7.0, "freeze": 15.0, "coordinator": 15.0}
+TARGETS_S = {"kill": 5.0, "broker": 7.0, "freeze": 15.0, "coordinator": 15.0, "service": 15.0}
 ROUND = sum(SHARES.values())
 """Faults before a check; each round has a log of its own."""
 GROUP_MAX, WITHIN_S = 5, 3.0

@@ -21,7 +21,7 @@ from bench.fleet_loads import SAMPLES_500, SPECTRA, AxisLoad
 from bench.fleet_path import LOAD, PathCosts, measured, state_every_s
 from bench.fleet_sink import SinkCosts
 from bench.fleet_sink import measured as measured_sink
-from livebode.fleet.axis_stream import AxisStream
+from livebode_plant.fleet.axis_stream import AxisStream
 from studies.fleet_queue import WorkerCosts, arrivals, caught_up_s, stored_times
 
 DAY_S, YEAR_S = 86400.0, 365.25 * 86400.0

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.configuration.loop_section import LoopSection
+from livebode.configuration import LoopSection
 from livebode.simulation.hold import held
 
 Floats = NDArray[np.float64]
@@ -25,6 +25,7 @@ class Drive:
     gain: float = 0.2308
     integral_time_s: float = 0.2
     integrator: Literal["backward", "forward", "trapezoidal"] = "backward"
+    velocity_ticks: int = 1
     position_gain: float = 1.0
     position_ticks: int = 2
     delay_ticks: int = 0
@@ -44,7 +45,8 @@ class Drive:
             "velocity": {
                 "gain": self.gain,
                 "integral_time_s": self.integral_time_s,
-                "rate_hz": self.rate_hz,
+                "rate_hz": self.rate_hz / self.velocity_ticks,
+                "rate_divider": self.velocity_ticks,
                 "integrator": self.integrator,
                 "delay_ticks": self.delay_ticks,
                 "lowpass_s": self.lowpass_s,
@@ -89,12 +91,23 @@ class Machine:
 
 
 def record(
-    drive: Drive, machine: Machine, w: Floats, periods: int, runs: int, seed: int
+    drive: Drive,
+    machine: Machine,
+    w: Floats,
+    periods: int,
+    runs: int,
+    seed: int,
+    *,
+    settling: int = 10,
+    load: Floats | None = None,
 ) -> tuple[Floats, Floats, Floats]:
-    """Logged w (ticks,), u and velocity y (runs, ticks), after ten periods of settling.
+    """Logged w (ticks,), u and velocity y (runs, ticks), after so many periods of settling.
+
+    `load` is a further torque on the motor for each tick, settling included, shape (ticks, runs).
 
     The velocity is the difference of the last two angles, so it has the steps of the encoder, and the position loop
-    reads the same angles. Noise has the spectrum of a first-order process with the pole `noise_pole`.
+    reads the same angles, in ticks of the velocity loop. Noise has the spectrum of a first-order process with the pole
+    `noise_pole`.
     """
     rng = np.random.default_rng(seed)
     plant, into = machine.discrete(drive.rate_hz)
@@ -102,9 +115,10 @@ def record(
     angle_before, integral, before, held_speed, filtered = np.zeros((5, runs))
     line = [np.zeros(runs)] * drive.delay_ticks
     noises = np.zeros((3, runs))
-    ticks = (periods + 10) * w.size
+    ticks = (periods + settling) * w.size
     u, y, logged = np.empty((ticks, runs)), np.empty((ticks, runs)), np.empty((ticks, runs))
-    step, slow = 1 / drive.rate_hz, drive.lowpass_s * drive.rate_hz
+    step = drive.velocity_ticks / drive.rate_hz
+    slow = drive.lowpass_s / step
     fresh = np.sqrt(1 - machine.noise_pole**2)
     sizes = np.array([machine.torque_noise_n_m, machine.load_noise_n_m, machine.angle_noise_rad])[:, np.newaxis]
     for n in range(ticks):
@@ -117,24 +131,26 @@ def record(
         angle_before = angle
         if n % drive.position_ticks == 0:
             held_speed = -drive.position_gain * angle
-        error = held_speed - speed
-        if drive.integrator == "backward":
-            integral = integral + step * error
-        elif drive.integrator == "trapezoidal":
-            integral = integral + step * (error + before) / 2
-        control = drive.gain * (error + integral / drive.integral_time_s)
-        if drive.integrator == "forward":
-            integral = integral + step * error
-        before = error
-        filtered = (slow * filtered + control) / (1 + slow)
+        if n % drive.velocity_ticks == 0:
+            error = held_speed - speed
+            if drive.integrator == "backward":
+                integral = integral + step * error
+            elif drive.integrator == "trapezoidal":
+                integral = integral + step * (error + before) / 2
+            control = drive.gain * (error + integral / drive.integral_time_s)
+            if drive.integrator == "forward":
+                integral = integral + step * error
+            before = error
+            filtered = (slow * filtered + control) / (1 + slow)
         line.append(filtered)
         torque = line.pop(0) + w[n % w.size]
         logged[n], y[n], u[n] = torque + torque_noise, speed, torque
         acting = torque + machine.cogging_n_m * np.sin(machine.cogging_per_turn * state[:, 0])
         acting = acting - machine.friction_n_m * np.tanh(state[:, 1] / 0.05)
+        acting = acting if load is None else acting + load[n]
         state = state @ plant.T + np.multiply.outer(acting + load_noise, into)
-    late = [10 * w.size - by for by in (drive.excitation_late, drive.input_late, -drive.output_late)]
-    first = 10 * w.size
+    late = [settling * w.size - by for by in (drive.excitation_late, drive.input_late, -drive.output_late)]
+    first = settling * w.size
     count = ticks - first - 1
     rows = [np.resize(w, ticks), logged.T, y.T]
     w_logged, u_logged, y_logged = (row[..., at : at + count] for row, at in zip(rows, late))

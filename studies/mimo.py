@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Lines
-from livebode.core.controllers import PID
+from livebode.core import PID, Block, Lines
 from livebode.mimo import MatrixExcitation, MatrixLoop, MatrixResponses, MatrixSettings, MatrixTracker
 from livebode.simulation import Gantry, GantryLoop
 from livebode.simulation.gantry import CHANNELS

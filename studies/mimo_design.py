@@ -12,8 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block
-from livebode.mimo import MatrixSettings, MatrixTracker
-from livebode.mimo.design import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
+from livebode.mimo import (
+    MatrixDesign,
+    MatrixLimits,
+    MatrixSettings,
+    MatrixSpec,
+    MatrixTracker,
+    MechanismMachine,
+    choose_matrix,
+)
 from livebode.mimo.design.spec import KINDS
 from livebode.simulation import CoreXYLoop, GantryLoop
 

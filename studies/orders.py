@@ -6,15 +6,15 @@ python -m studies.orders [runs] [part of the cases' names]
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from livebode import Lines, multisine
-from livebode.analysis.orders import OrderReport, orders_of
-from livebode.analysis.strokes import MotionSamples
-from livebode.motion.angle_orders import Shaft
+from livebode.motion import Shaft
 from livebode.simulation import BeltAxis, Drive, Friction, Mechanics, Sensor, SimulatedAxis, Strokes, StrokeSequence
+from livebode_control.strokes.motion_samples import MotionSamples
+from livebode_control.strokes.orders import OrderReport, orders_of
 
 RUNS = 100
 RATE_HZ = 4000.0
@@ -26,12 +26,16 @@ THERE_AND_BACK = (0.3, 0.8, 0.3, 0.8, 0.3, 0.8, 0.3)
 
 @dataclass(frozen=True)
 class Case:
-    """A motion, a ripple, an excitation that runs at the same time, and the eccentricity of the encoder."""
+    """A motion, a ripple, an excitation that runs at the same time, and the eccentricity of the encoder.
+
+    Each torque is recorded `late_samples` late, beside a later motion; negative: the motion is late.
+    """
 
     motion: StrokeSequence | Strokes
     ripple_n_m: float = RIPPLE_N_M
     excitation_n_m: float = 0.0
     eccentricity_rad: float = 0.0
+    late_samples: int = 0
 
 
 def _sequence(*speeds_m_per_s: float) -> StrokeSequence:
@@ -46,6 +50,13 @@ CASES = {
     "the same, three times the ripple": Case(SLOW_RAMPS, ripple_n_m=3 * RIPPLE_N_M),
     "three speeds, excited": Case(_sequence(0.1, 0.1, 0.15, 0.15, 0.2, 0.2), excitation_n_m=0.2),
     "always accelerating, excited": Case(SLOW_RAMPS, excitation_n_m=0.2),
+    **{
+        f"three speeds, {abs(samples) / 4:g} ms late": Case(
+            _sequence(0.1, 0.1, 0.15, 0.15, 0.2, 0.2), late_samples=samples
+        )
+        for samples in (2, 4, 8)
+    },
+    "three speeds, motion 0.5 ms late": Case(_sequence(0.1, 0.1, 0.15, 0.15, 0.2, 0.2), late_samples=-2),
 }
 
 ECCENTRIC = Case(_sequence(0.15, 0.15, 0.3, 0.3, 0.3, 0.3), eccentricity_rad=0.02)
@@ -64,6 +75,10 @@ def measured(case: Case, seed: int) -> OrderReport:
         seed=seed,
     )
     block, _ = SimulatedAxis(axis).run()
+    torque, late = block.index("u"), case.late_samples
+    data = block.data[:, max(late, 0) : len(block) + min(late, 0)].copy()
+    data[torque] = block.data[torque, max(-late, 0) :][: data.shape[1]]
+    block = replace(block, data=data)
     samples = MotionSamples(block, "u", "velocity", "velocity", len(block), None, {})
     lines_hz = LINES.frequency_hz if case.excitation_n_m else None
     return orders_of(samples, [SHAFT], angle="position", lines_hz=lines_hz)
@@ -77,7 +92,10 @@ def truth(case: Case) -> np.ndarray:
 def main(runs: int, part: str = "") -> int:
     at = SHAFT.orders.index(PER_TURN)
     print(f"ripple of {RIPPLE_N_M} N m, {PER_TURN} a turn; {runs} runs each")
-    print(f"{'':34}{'found':>8}{'± 95 %':>9}{'in 63.2 %':>11}{'in 98.2 %':>11}{'seen':>7}{'false':>7}")
+    print(
+        f"{'':34}{'found':>8}{'± 95 %':>9}{'in 63.2 %':>11}{'in 98.2 %':>11}{'seen':>7}{'false':>7}{'24 in 98.2 %':>14}"
+        f"{'with delay':>12}"
+    )
     for name, case in CASES.items():
         if part not in name:
             continue
@@ -85,13 +103,17 @@ def main(runs: int, part: str = "") -> int:
         error = np.array([np.abs(one.value - truth(case)) for one in found])
         known = np.isfinite(error)
         shares = [100 * np.mean((error <= [one.bound(c) for one in found])[known]) for c in (1, 2)]
+        bounds = np.array([one.bound(2)[at] for one in found])
+        delayed = bounds + np.array([one.per_delay_s[at] for one in found]) * abs(case.late_samples) / RATE_HZ
+        ripple_share, delayed_share = (100 * np.mean(error[:, at] <= each) for each in (bounds, delayed))
         seen = np.array([one.seen for one in found])
         amplitude, bound = (np.nanmean([one[at] for one in each]) for each in (
             [one.amplitude for one in found], [one.bound() for one in found],
         ))  # fmt: skip
         print(
             f"{name:34}{amplitude:>8.4f}{bound:>9.4f}{shares[0]:>9.0f} %{shares[1]:>9.0f} %"
-            f"{100 * seen[:, at].mean():>5.0f} %{100 * np.delete(seen, at, axis=1).mean():>5.1f} %",
+            f"{100 * seen[:, at].mean():>5.0f} %{100 * np.delete(seen, at, axis=1).mean():>5.1f} %"
+            f"{ripple_share:>12.0f} %{delayed_share:>10.0f} %",
             flush=True,
         )
     if part in "eccentric encoder":

@@ -31,9 +31,8 @@ from typing import Any
 import livebode
 from livebode.configuration import Axis
 from livebode.core import Event
-from livebode.publishing.publisher import Publisher
-from livebode.runtime import RunControl
-from livebode.runtime.documents import ClockSet, RunStarted
+from livebode.publishing import Publisher
+from livebode.runtime import ClockSet, RunControl, RunStarted
 
 KINDS = ("webhook", "influxdb", "email", "syslog", "mqtt")
 BACK_S = 90.0

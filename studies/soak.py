@@ -36,9 +36,9 @@ from livebode.configuration import Axis
 from livebode.core import Channel, Lines
 from livebode.dashboard import Dashboard, Serving
 from livebode.excitation import multisine
-from livebode.runtime import Destination, Document, Session, segmented
-from livebode.runtime.documents import TrackerResults
-from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
+from livebode.runtime import Destination, Document, Session, TrackerResults, segmented
+from livebode.simulation import TwoMassLoop
+from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from studies.drawing import LIGHT, figure_of
 

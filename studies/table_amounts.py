@@ -51,8 +51,8 @@ def learned() -> ScheduleTable:
     return learn_table("lines", names, parts, len(places(WINDOW, SETTINGS.step)))
 
 
-def judged(table: ScheduleTable, loss: float, seed: int) -> tuple[list[bool], float]:
-    """Whether each reported amount covers the truth, and how many windows off the date is."""
+def judged(table: ScheduleTable, loss: float, seed: int) -> tuple[list[bool], float, bool]:
+    """Whether each reported amount covers the truth, how many windows off the date is, and whether it covers it."""
     axis, parts = rows(seed, START_S + 10.0, TensionLoss(loss=loss, start_s=START_S))
     before, after = (axis.linear(0.8, t).sampled(RATE_HZ).response(LINES.frequency_hz) for t in (0.0, START_S + 5.0))
     quotient = dict(zip(table.names, after / before))
@@ -63,7 +63,10 @@ def judged(table: ScheduleTable, loss: float, seed: int) -> tuple[list[bool], fl
         q = quotient[change["name"]]
         truth = 100 * (abs(q) - 1) if change["of"] == "magnitude" else float(np.degrees(np.angle(q)))
         covered.append(bool(abs(change["amount"] - truth) <= change["bound"]))
-    return covered, abs(event.details["since_s"] - START_S) * RATE_HZ / WINDOW
+    off = abs(event.details["since_s"] - START_S) * RATE_HZ / WINDOW
+    earliest_s = event.details["since_earliest_s"]
+    dated = (earliest_s is None or earliest_s <= START_S) and event.details["since_latest_s"] >= START_S
+    return covered, off, dated
 
 
 def main() -> None:
@@ -73,10 +76,11 @@ def main() -> None:
     table = learned()
     for loss in (0.02, 0.05, 0.1):
         done = [judged(table, loss, 100 + seed) for seed in range(options.seeds)]
-        covered = [c for each, _ in done for c in each]
+        covered = [c for each, _, _ in done for c in each]
         print(
             f"belt −{100 * loss:g} %: {sum(covered)} of {len(covered)} amounts within their bound "
-            f"({100 * np.mean(covered):.1f} %), dates off by at most {max(off for _, off in done):.1f} windows",
+            f"({100 * np.mean(covered):.1f} %), dates off by at most {max(off for _, off, _ in done):.1f} windows, "
+            f"{sum(dated for _, _, dated in done)} of {len(done)} within their interval",
             flush=True,
         )
 

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode import PID, Lines, Loop, Responses, TuneError
-from livebode.margins.stability import stable
+from livebode.margins import stable
 from livebode.simulation import Friction, Mechanics, Sampled, Spans, linear
-from livebode.tuning import ControllerProposal, LoopSpecification, PredictedMargins, tune
-from livebode.tuning.predicted import predicted
+from livebode_control.tuning import ControllerProposal, LoopSpecification, PredictedMargins, tune
+from livebode_control.tuning.predicted import predicted
 from studies.result import Table, Verdict
 
 Floats = NDArray[np.float64]

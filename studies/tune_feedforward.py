@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.errors import SignalError
-from livebode.motion.friction_curve import friction_curve
+from livebode.core import SignalError
+from livebode.motion import friction_curve
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
-from livebode.tuning.feedforward import Feedforward, rigid_inertia
+from livebode_control.tuning.feedforward import Feedforward, rigid_inertia
 from studies.result import Table, Verdict
 from studies.tune import show
 from studies.tune_steps import RATE_HZ, axes, measured

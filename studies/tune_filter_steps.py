@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from livebode import PID, Lines, TuneError
 from livebode.margins import Biquad
 from livebode.simulation import Sampled
-from livebode.tuning import tune
-from livebode.tuning.predicted_steps import predicted_steps
+from livebode_control.tuning import tune
+from livebode_control.tuning.predicted_steps import predicted_steps
 from studies.result import Table, Verdict
 from studies.tune import LIMITS, LINES, RATE_HZ, machines, measured, show
 

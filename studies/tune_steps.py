@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from livebode import Block, Cascade, Lines, Responses, Settings, Tracker, TuneError, multisine
 from livebode.fitting import mean_response
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, SimulatedAxis
-from livebode.tuning import ControllerProposal, LoopSpecification, tune
-from livebode.tuning.predicted_steps import PredictedStep, predicted_steps
+from livebode_control.tuning import ControllerProposal, LoopSpecification, tune
+from livebode_control.tuning.predicted_steps import PredictedStep, predicted_steps
 from studies.result import Table, Verdict
 from studies.tune import show
 

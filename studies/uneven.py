@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode import Lines, Response, Responses, Settings, multisine
-from livebode.estimation.uneven_tracker import UnevenTracker
+from livebode.estimation import UnevenTracker
 from livebode.fitting import mean_response
-from livebode.preparation.uneven_spectra import UnevenSource
-from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop, TwoMassPlant
-from livebode.sources.recording import Chunk, Column, Recording
-from livebode.sources.uneven import UnevenLog
+from livebode.preparation import UnevenSource
+from livebode.simulation import TwoMassLoop, TwoMassPlant
+from livebode.simulation.two_mass_loop import RATE_HZ
+from livebode.sources import Chunk, Column, Recording, UnevenLog
 from studies.common import Floats
 
 TARGET = (0.60, 0.95)

@@ -1,7 +1,7 @@
 """The catalogues of report and dashboard: extracts the English sentences, and writes what is read at run time.
 
-``make catalogues`` updates `src/livebode/language/catalogues/*.po` from the source, and writes the JSON files from
-them.
+``make catalogues`` updates `src/livebode/language/catalogues/*.po` from the source of the hull and the wings, and
+writes the JSON files from them.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import gettext
 import json
 import re
 import sys
+from collections.abc import Iterable
 from functools import cache
 from html.parser import HTMLParser
 from io import BytesIO
@@ -21,43 +22,65 @@ from babel.messages.catalog import Catalog, Message
 from babel.messages.extract import extract
 from babel.messages.pofile import read_po, write_po
 
-from livebode.language.recorded import NAMES, SENTENCES
+from livebode.dashboard.quantities import QUANTITIES
+from livebode.estimation.verdicts import KINDS as DOUBTS
+from livebode.fitting import model_named
+from livebode.fitting.extended import LAG, MODE, RESIDUAL, Extended
+from livebode.fitting.models import MODELS
+from livebode.margins._margins import NAMES as MARGINS
+from livebode.monitoring import ALARMS, RETURNS, UNMONITORED
+from livebode.monitoring.sensitivity import DIRECTIONS
+from livebode.runtime.event_groups import CAUSES
 
 ROOT = Path(__file__).parents[1]
-PACKAGE = ROOT / "src/livebode"
-FOLDER = PACKAGE / "language/catalogues"
-STATIC = PACKAGE / "dashboard/static"
-_KEYWORDS = {"tr": None, "marked": None, "trn": (1, 2)}
-_CALL = re.compile(r"\b(?:trn?|marked)\(")
+FOLDER = ROOT / "src/livebode/language/catalogues"
+_KEYWORDS = {"tr": None, "Message": None, "trn": (1, 2)}
+_CALL = re.compile(r"\b(?:trn?|Message)\(")
+_EVENT = re.compile(r"\b(?:Event|report|_report_to_axes|_tell)\(\s*\"([a-z]+(?:-[a-z]+)*)\"")
 _SHOWN = ("title", "aria-label", "placeholder", "alt")
-_RECORDED = "recorded sentence"
 _NO_WORDS = re.compile(r"[\W\d_]*|livebode", re.ASCII)
+VALUES = (
+    "margins", "missing", "model", "no fit", "none needed", "ok", "parameters", "plant input", "refused", "suggested",
+    "tables", "the sender", "velocity reference",
+)  # fmt: skip
+"""Values of configurations and records that a report or a page shows."""
 Key = str | tuple[str, str]
 
 
+def sources(pattern: str) -> list[Path]:
+    """Files of the hull and the wings."""
+    return [
+        path for folder in (ROOT / "src", *sorted(ROOT.glob("wings/*/src"))) for path in sorted(folder.rglob(pattern))
+    ]
+
+
 @cache
-def extracted() -> dict[Key, tuple[set[str], bool]]:
-    """Every sentence of the source, with the files that have it, and whether it is the template of a recorded one."""
-    found: dict[Key, tuple[set[str], bool]] = {}
+def extracted() -> dict[Key, set[str]]:
+    """Every sentence and name of the source, with the files that have it."""
+    found: dict[Key, set[str]] = {}
 
-    def add(key: Key, where: str, recorded: bool = False) -> None:
-        files, before = found.get(key, (set(), False))
-        found[key] = files | {where}, before or recorded
+    def add(keys: Iterable[Key], where: str) -> None:
+        for key in keys:
+            found[key] = found.get(key, set()) | {where}
 
-    for path in sorted(PACKAGE.rglob("*.py")):
-        for key in _called("python", path):
-            add(key, str(path.relative_to(ROOT)))
-    for path in sorted(STATIC.glob("*.js")):
-        for key in _called("javascript", path):
-            add(key, str(path.relative_to(ROOT)))
-    for path in sorted(STATIC.glob("*.html")):
-        for key in html_texts(path.read_text("utf-8")):
-            add(key, str(path.relative_to(ROOT)))
-    for key in SENTENCES:
-        add(key, "src/livebode/language/recorded.py", recorded=True)
-    for key in NAMES:
-        add(key, "src/livebode/language/recorded.py")
+    for path in sources("*.py"):
+        add(_called("python", path), str(path.relative_to(ROOT)))
+        add(_EVENT.findall(path.read_text("utf-8")), str(path.relative_to(ROOT)))
+    for path in sources("static/*.js"):
+        add(_called("javascript", path), str(path.relative_to(ROOT)))
+    for path in sources("static/*.html"):
+        add(html_texts(path.read_text("utf-8")), str(path.relative_to(ROOT)))
+    add(_names(), "tools/catalogues.py")
     return found
+
+
+def _names() -> set[str]:
+    """Names that are data: of quantities, parameters, margins and alarms."""
+    found = {*QUANTITIES, *DIRECTIONS, *ALARMS, *RETURNS, *UNMONITORED, *CAUSES, *DOUBTS, *VALUES}
+    for model in map(model_named, MODELS):
+        extended = Extended(model, (LAG, RESIDUAL, MODE), 100.0)
+        found |= {name.replace("_", " ") for name in (*extended.names, *model.derived_names)}
+    return found | {name.replace("_", " ") for name in MARGINS}
 
 
 def _called(kind: str, path: Path) -> list[Key]:
@@ -106,11 +129,10 @@ def catalogues() -> dict[str, Catalog]:
 def updated(old: Catalog) -> Catalog:
     """The catalogue with the sentences of the source, and its translations of them."""
     new = Catalog(locale=old.locale_identifier, fuzzy=False, charset="utf-8")
-    for key, (files, recorded) in extracted().items():
+    for key, files in extracted().items():
         before = old.get(key if isinstance(key, str) else key[0])
         string: Any = before.string if before is not None and isinstance(before.id, str) == isinstance(key, str) else ""
-        comments = [_RECORDED] if recorded else []
-        new.add(key, string or None, locations=[(name, None) for name in sorted(files)], auto_comments=comments)
+        new.add(key, string or None, locations=[(name, None) for name in sorted(files)])
     return new
 
 
@@ -151,20 +173,18 @@ def run_time(of: Catalog) -> dict[str, Any]:
     locale = of.locale
     assert locale is not None
     form, symbols = gettext.c2py(of.plural_expr), locale.number_symbols["latn"]
-    messages, recorded = {}, []
+    messages = {}
     for message in of:
         if not message.id or not translated(message):
             continue
-        if _RECORDED in message.auto_comments:
-            recorded.append([message.id, message.string])
-        elif isinstance(message.id, str):
+        if isinstance(message.id, str):
             messages[message.id] = message.string
         else:
             messages[message.id[0]] = list(message.string)
     return {
         "code": of.locale_identifier.replace("_", "-"), "name": own_name(locale), "decimal": symbols["decimal"],
         "group": symbols["group"], "date": date_format(locale),
-        "plural": "".join(str(form(n)) for n in range(200)), "messages": messages, "recorded": recorded,
+        "plural": "".join(str(form(n)) for n in range(200)), "messages": messages,
     }  # fmt: skip
 
 

@@ -13,9 +13,9 @@ from livebode.cli.app import app
 
 HEAD = """# Command line
 
-`livebode COMMAND --help` prints the same. Exit codes: 0 success, 1 internal error, 2 usage error, 3 no model fits,
-4 a limit is not met (`report --check`); 128 + n: stopped by signal n. [Errors](errors.md) have a code, and `--json`
-prints them in machine-readable form.
+`livebode COMMAND --help` prints the same. Exit codes: 0 success, 1 internal error, 2 wrong as it is, such as an option,
+3 no model fits, 4 a limit is not met (`report --check`), 75 what may pass, such as a full disk; 128 + n: stopped by
+signal n. [Errors](errors.md) have a code, and `--json` prints them in machine-readable form.
 """
 
 

@@ -8,9 +8,9 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from livebode.archive.settings import archive_schema
-from livebode.configuration.schema import axis_schema
+from livebode.configuration import axis_schema
 from livebode.experiments.experiment_schema import experiment_schema, matrix_experiment_schema
+from livebode_plant.archive.settings import archive_schema
 
 HEAD = """# Configuration
 
@@ -59,7 +59,7 @@ MORE = {
     "belt": "See [the simulated axis](axis.md).",
     "measured": "A limit on a quantity whose extremes are not known is rejected.",
     "drives": "See [several motors](../how-to/excitation.md#several-motors).",
-    "cluster": "See [archives](../how-to/archive.md).",
+    "cluster": "See [archives](../../wings/plant/docs/archive.md).",
     "measure": "See [measuring](../how-to/measure.md).",
     "excitation": "See [excitation design](../how-to/excitation.md).",
 }

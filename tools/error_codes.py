@@ -12,8 +12,12 @@ Every error that livebode raises on purpose is a `LivebodeError` of one of these
 `message`, a `remedy` and its `facts`, each of which is also an attribute; `as_dict()` gives them as plain data. A code
 never changes its meaning; new ones may come.
 
-On the command line an error is one line on standard error, and the exit code is 2. It names the options of the command
-that it is about. With `--json` the last line on standard error is an object instead, with these options as a fact:
+On the command line an error is one line on standard error, and the exit code is 2: the request is wrong as it is, and
+would be again. The exit code is 75 (`EX_TEMPFAIL`) where the same request may succeed later: for the codes marked with
+an asterisk, and for any error whose fact `errno` is that of a full or failing disk, of a resource that others use now,
+or of a network or device that does not answer. `temporary` is this as an attribute. The line names the options of the
+command that it is about. With `--json` the last line on standard error is an object instead, with these options as a
+fact:
 
     $ livebode run standstill.csv --json
     {"error": {"code": "usage.missing", "place": "", "message": "the output channel is not named", "remedy": "...",
@@ -31,7 +35,10 @@ def page() -> str:
 
 
 def _section(kind: type[LivebodeError]) -> str:
-    codes = "\n".join(f"| `{kind.area}.{code}` | {text} |" for code, text in kind.codes.items())
+    codes = "\n".join(
+        f"| `{kind.area}.{code}`{' *' if code in kind.temporary_codes else ''} | {text} |"
+        for code, text in kind.codes.items()
+    )
     meaning = (inspect.getdoc(kind) or "").partition("\n\nExamples\n")[0]
     return f"## {kind.__name__}\n\n{meaning}\n\n| code | meaning |\n|---|---|\n{codes}\n"
 

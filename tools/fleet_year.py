@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from livebode.core.machine_levels import LEVELS
-from livebode.lake import PARAMETER_MEANS, Lake, StreamTable
+from livebode.core import LEVELS
+from livebode_plant.lake import PARAMETER_MEANS, Lake, StreamTable
 
 LOST_A_MONTH = 0.004
 """Share of the stiffness."""

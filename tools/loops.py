@@ -8,7 +8,7 @@ import control
 import numpy as np
 
 from livebode.core import PID, Cascade, Loop, Parameters
-from livebode.fitting.chains import TwoMass
+from livebode.fitting import TwoMass
 from livebode.margins import OpenLoop
 
 RADIUS_M = 0.019

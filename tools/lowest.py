@@ -20,7 +20,19 @@ from tools.release.builds import built
 BINARY = ("--only-binary", ":all:", "--no-binary", "nkeys")
 LOWEST = ("--resolution", "lowest-direct", *BINARY)
 TESTS = ("blark", "hypothesis", "playwright", "pytest", "pytest-xdist")
-PARTS = ("core", "kernel", "estimation", "excitation", "fitting", "margins", "records", "export", "sources", "runtime")
+PARTS = (
+    "core",
+    "kernel",
+    "native",
+    "estimation",
+    "excitation",
+    "fitting",
+    "margins",
+    "records",
+    "export",
+    "sources",
+    "runtime",
+)
 
 
 def pinned(lock: Path, names: tuple[str, ...]) -> list[str]:

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from livebode.records.parquet_part import ParquetPart, sha256_of_next
+from livebode.records.table_file import ParquetPart, sha256_of_next
 
 
 def parts_of(path: Path) -> list[dict[str, Any]]:

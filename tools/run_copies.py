@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from livebode.core import Event
+from livebode.records import RUN, read_summary
 from livebode.records.segments.json_lines import to_line
-from livebode.records.summary_file import COPY, RUN, read_summary, to_document
-from livebode.tables import Table
-from livebode.tables.parquet_file import ParquetFile
-from livebode.tables.parquet_writer import ParquetWriter
+from livebode.records.summary_file import COPY, to_document
+from livebode.tables import ParquetFile, ParquetWriter, Table
 from tools.parquet_parts import parts_of
 
 
@@ -53,8 +54,10 @@ def copy_run(
         summary["clock"] = [[0.0, begun]]
     events = []
     if alarm:
-        events.append({"kind": "change", "sample": 1000, "time_s": 1.0, "message": alarm, "details": {}})
-    (to / "events.jsonl").write_bytes(b"".join(map(to_line, events)))
+        events.append(asdict(Event("change", 1000, 1.0, alarm)))
+    lines = b"".join(map(to_line, events))
+    (to / "events.jsonl").write_bytes(lines)
+    summary["size_bytes"] = {"events.jsonl": len(lines)}
     for name in (RUN, COPY):
         (to / name).write_bytes(to_document(summary | dict(changes or {})))
     return to

@@ -20,12 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.records.segments.disk import AppendFile
-from livebode.records.segments.frames import ROWS, to_frame
-from livebode.records.segments.journal import FOLDER, Commit, Journal, head, name_of
-from livebode.records.table_file import ColumnTable
-from livebode.tables import Table
-from livebode.tables.record_batch import from_message, to_message
+from livebode.records import FOLDER, AppendFile, ColumnTable, to_frame
+from livebode.records.segments.frames import ROWS
+from livebode.records.segments.journal import Commit, Journal, head, name_of
+from livebode.tables import Table, from_message, to_message
 
 STATE, SAMPLES, RESPONSES, LINES, SYNC_S = 60_000, 1000, 5, 21, 1.0
 KILLS, FLIPS = 10, 200

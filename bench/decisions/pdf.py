@@ -13,10 +13,8 @@ from pathlib import Path
 import numpy as np
 from pypdf import PdfReader
 
-from livebode.core import Lines, Responses
-from livebode.core.document import Document, Finding, Paragraph, Picture, Section
-from livebode.report import pdf
-from livebode.report.svg import pictures_svg
+from livebode.core import Document, Finding, Lines, Paragraph, Picture, Responses, Section
+from livebode.report import pdf, pictures_svg
 
 RUNS = 3
 WORDS = ("frequency in Hz", "phase in degrees", "u to ω", "Keff", "力矩")

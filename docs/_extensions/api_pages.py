@@ -10,7 +10,7 @@ import pkgutil
 import re
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from types import GenericAlias, ModuleType
 
 from sphinx.application import Sphinx
 
@@ -52,15 +52,18 @@ def _home(own: str, name: str, module: ModuleType) -> str:
 
 def _entry(package: str, name: str, value: object) -> str:
     """The directive that documents one name."""
-    if inspect.isclass(value):
+    alias = isinstance(value, GenericAlias)  # which Python 3.11 takes for a class
+    if inspect.isclass(value) and not alias:
         return f".. autoclass:: {package}.{name}\n   :members:\n"
-    if callable(value):
+    if callable(value) and not alias:
         return f".. autofunction:: {package}.{name}\n"
+    if alias or type(value).__module__ == "numpy":  # whose documentation is that of the type
+        return f".. py:data:: {package}.{name}\n"
     return f".. autodata:: {package}.{name}\n   :no-value:\n"
 
 
 def write_pages(app: Sphinx) -> None:
-    folder = Path(app.srcdir) / "reference" / "api"
+    folder = Path(app.confdir) / "reference" / "api"
     folder.mkdir(exist_ok=True)
     wanted = {f"{name}.rst": page(name, module) for name, module in {"livebode": livebode, **packages()}.items()}
     for old in folder.glob("*.rst"):

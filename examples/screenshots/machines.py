@@ -18,14 +18,10 @@ from livebode.core import Block, Channel, Lines
 from livebode.dashboard import Hub
 from livebode.estimation import Settings, Tracker, plant_kinds
 from livebode.excitation import multisine
-from livebode.mimo.excitation import MatrixExcitation
+from livebode.mimo import MatrixExcitation
 from livebode.monitoring import Baseline, Monitor
-from livebode.runtime import Destination
-from livebode.runtime.change_detection import ChangeDetection
-from livebode.runtime.demo import RATE_HZ, demo_axis, described_loop
-from livebode.runtime.fits import Fits
-from livebode.runtime.pipeline import Pipeline
-from livebode.runtime.run_loop import RunLoop
+from livebode.runtime import ChangeDetection, Destination, Fits, RunLoop, SingleResponse
+from livebode.runtime._demo import RATE_HZ, demo_axis, described_loop
 from livebode.simulation import BeltAxis, GantryLoop, Sensor, SimulatedAxis, Standstill, TwoMassLoop
 
 Afterwards = Literal["live", "silent", "over"]
@@ -128,7 +124,7 @@ class Tracked:
         drive = held.machine.axis.drive
         fit, loop = FitSection(radius_m=held.machine.axis.mechanics.radius_m), described_loop(drive)
         enough = len(settings.lines) > _PARAMETERS
-        pipeline = Pipeline(
+        pipeline = SingleResponse(
             Tracker(settings),
             Fits(fit, loop.build(RATE_HZ), plant_kinds(held.channels, settings)) if enough else None,
             None if baseline is None else ChangeDetection(Monitor(baseline, settings), "healthy strokes"),

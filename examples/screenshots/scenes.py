@@ -14,7 +14,7 @@ from playwright.sync_api import Page
 from examples.screenshots.studio import AXIS, DESK, HALL, LANDSCAPE, MOMENT_S, PHONE, Studio, picture
 from livebode.core import Event, Lines
 from livebode.dashboard import Dashboard, Serving
-from livebode.runtime.demo import RATE_HZ
+from livebode.runtime._demo import RATE_HZ
 from tools.run_copies import copy_run
 
 Scene = Callable[[Studio], bytes]

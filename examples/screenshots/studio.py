@@ -19,9 +19,8 @@ from examples.screenshots.machines import Afterwards, Tracked, at_standstill, he
 from livebode.core import Lines
 from livebode.dashboard import Dashboard, Serving
 from livebode.monitoring import Baseline
-from livebode.runtime import Destination
-from livebode.runtime.demo import RATE_HZ, demo, demo_baseline, demo_settings
-from livebode.runtime.documents import ClockSet
+from livebode.runtime import ClockSet, Destination, demo, demo_baseline
+from livebode.runtime._demo import RATE_HZ, demo_settings
 from tools.fleet_year import write_year
 from tools.run_copies import copy_run
 
@@ -142,16 +141,17 @@ class Studio(ExitStack):
     @cached_property
     def fleet_url(self) -> str:
         """A simulated fleet with a floor plan, and a year of AXIS; one of its partitions has no worker."""
-        from livebode.dashboard.fleet_demo import DemoFeed, DemoFleet
-        from livebode.dashboard.fleet_view import FleetView
-        from livebode.dashboard.floor_plan import floor_plan
+        from livebode_plant.page.fleet_demo import DemoFeed, DemoFleet
+        from livebode_plant.page.fleet_site import FleetSite
+        from livebode_plant.page.fleet_view import FleetView
+        from livebode_plant.page.floor_plan import floor_plan
 
         fleet, lake = DemoFleet(10_000), self.folder / "lake"
         feed = DemoFeed(fleet, silent=[3], began_s=time.time() - 150)
         status = fleet.status(150.0, time.time())
         write_year(lake, AXIS, float(status["value"][fleet.paths.index(AXIS)]))
         dashboard = Dashboard(Serving("127.0.0.1", 0))
-        dashboard.view_fleet(FleetView(feed, floor_plan(_PLAN), lake=str(lake)))
+        dashboard.show(FleetSite(FleetView(feed, floor_plan(_PLAN), lake=str(lake))))
         return self.enter_context(dashboard).url
 
     def page(

@@ -1,25 +1,34 @@
-"""Packages that load a module when one of its names is first used."""
+"""Packages whose names load their module when they are first used."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 
-def on_first_use(package: str, names: Mapping[str, Iterable[str]]) -> Callable[[str], Any]:
-    """The `__getattr__` of a package whose names are in these modules of it.
+def on_first_use(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """The `__getattr__`, `__dir__` and `__all__` of a package whose names its `__init__.pyi` imports.
 
-    A command that prints its help needs the errors of `core` and not the arrays.
+    The stub is the only list of the names: a type checker reads it too. Each is there as `name as name`, which is how a
+    stub exports it. A command that prints its help needs the errors of `core` and not the arrays.
     """
-    module = {name: home for home, found in names.items() for name in found}
+    homes: dict[str, tuple[str, str]] = {}
+    home = ""
+    with open(f"{file}i", encoding="utf-8") as stub:
+        for line in stub:
+            words = line.replace("(", " ").replace(",", " ").split()
+            if words and words[0] == "from":
+                home, words = words[1], words[3:]
+            homes |= {shown: (home, name) for name, shown in zip(words[::3], words[2::3], strict=False)}
 
     def attribute(name: str) -> Any:
-        if name not in module:
+        if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(f"{package}.{module[name]}"), name)
+        home, own = homes[name]
+        value = getattr(import_module(home), own)
         setattr(sys.modules[package], name, value)
         return value
 
-    return attribute
+    return attribute, lambda: sorted({*vars(sys.modules[package]), *homes}), sorted(homes)

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from livebode.analysis.acceptance import NO_FIT, NO_LINE, NO_LOOP, LimitEvidence, MeasuredValues, accepted, judged
-from livebode.configuration.report_section import LimitSection
+from livebode.analysis import LimitEvidence, accepted
+from livebode.analysis.acceptance import NO_FIT, NO_LINE, NO_LOOP, MeasuredValues, judged
+from livebode.configuration import LimitSection
 from livebode.core import PID, Loop
 from livebode.fitting import mean_response
 from tests.support.reports import LINES, measured, plant

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.analysis.difference import ALPHA, Difference, compare
+from livebode.analysis import ALPHA, Difference, compare
 from livebode.core import PER_LINE, Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import mean_response
@@ -91,8 +91,7 @@ def test_runs_of_another_direction_or_speed_are_reported(tmp_path: Path) -> None
 
 def test_a_stiffness_lost_halfway_is_the_change_of_the_fitted_parameter(tmp_path: Path) -> None:
     """The belt axis as `run` writes it: 5 % less stiffness halfway is 5 % of Keff between the halves."""
-    from livebode.fitting.chains import TwoMass
-    from livebode.fitting.physical import EvaluationGrid
+    from livebode.fitting import EvaluationGrid, TwoMass
 
     model = TwoMass(radius_m=0.019)
     fit = {"model": "two-mass", "output": "velocity", "radius_m": 0.019}

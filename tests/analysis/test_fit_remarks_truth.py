@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.analysis.averaged import averaged
-from livebode.analysis.fits import fit_averaged, plain_fit
-from livebode.configuration import Axis
-from livebode.configuration.fit_section import FitSection
+from livebode.analysis import averaged, fit_averaged, plain_fit
+from livebode.configuration import Axis, FitSection
 from livebode.core import Lines, Response
 from livebode.excitation import multisine
 from livebode.fitting import fit

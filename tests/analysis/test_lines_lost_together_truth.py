@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.analysis.averaged import averaged
+from livebode.analysis import averaged
 from livebode.core import Block, Channel, Responses, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.analysis.overview import Overview
+from livebode.analysis import Overview
 from livebode.core import Lines, Responses
 
 LINES = Lines((4,), 100, 1000.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from livebode.analysis.overview import Overview
+from livebode.analysis import Overview
 from livebode.core import UsageError
 from livebode.dashboard import Hub
 from livebode.dashboard.state import State
@@ -17,10 +17,8 @@ from livebode.dashboard.verdict import verdict
 from livebode.estimation import Tracker
 from livebode.monitoring import Monitor
 from livebode.records import RunRecord
-from livebode.runtime import RunControl
-from livebode.runtime.change_detection import ChangeDetection
-from livebode.runtime.demo import LOSS, check_seconds, demo_axis, demo_settings
-from livebode.runtime.documents import RunStarted
+from livebode.runtime import ChangeDetection, RunControl, RunStarted, check_seconds
+from livebode.runtime._demo import LOSS, demo_axis, demo_settings
 from livebode.simulation import SimulatedAxis
 from tests.support.command import livebode
 from tests.support.demonstrated import learned, shown

@@ -15,7 +15,7 @@ from livebode import Lines, open_log
 from livebode.core import LivebodeError
 from livebode.excitation import multisine
 from livebode.experiment_design import Waveform, choose, write
-from livebode.experiments.experiment import Experiment
+from livebode.experiments import Experiment
 from livebode.records import RunRecord
 from livebode.report import save_excitation_picture
 from livebode.simulation import SimulatedAxis

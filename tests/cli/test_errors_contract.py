@@ -51,7 +51,7 @@ def test_a_process_that_fails_prints_one_object_and_ends_with_2(tmp_path: Path) 
 
 
 def test_an_internal_error_is_an_object_with_its_traceback_and_ends_with_1(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("livebode.preparation.inspection.inspect", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("livebode.preparation.inspect", lambda *_, **__: 1 / 0)
     error = error_of(livebode("inspect", "log.parquet", "--json"), code=1)
     assert (error["code"], error["message"]) == ("internal", "ZeroDivisionError: division by zero")
     assert error["facts"]["traceback"].startswith("Traceback")

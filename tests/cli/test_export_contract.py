@@ -14,7 +14,7 @@ import pyuff
 import scipy.io
 import xarray as xr
 
-from livebode.export import FORMATS, at
+from livebode.export import at, writers
 from livebode.fitting import mean_response
 from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_parquet
@@ -58,7 +58,7 @@ def test_every_format_of_a_whole_run(run: Path) -> None:
     valid = int(np.count_nonzero(responses.valid.sum(axis=1) >= 2))
     assert pyuff.UFF(str(run.with_suffix(".uff"))).get_n_sets() == valid
     assert f"; {len(responses) - valid} with fewer than two valid lines left out" in done.out
-    assert set(FORMATS) == {"csv", "mat", "netcdf", "uff"}
+    assert set(writers("responses")) == {"csv", "mat", "netcdf", "uff"}
 
 
 def test_one_response_or_the_mean_of_a_run_is_exported(run: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import livebode as package
-from livebode.configuration.axis import serve_section
+from livebode.configuration import read_serve_section
 from livebode.core.installing import _clone, _packages
 from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_csv, write_parquet
@@ -128,11 +128,11 @@ def test_first_mistakes_in_python_are_sentences_too(folder: Path) -> None:
 
 def test_view_takes_a_file_that_has_only_the_section_serve(folder: Path) -> None:
     (folder / "serve.toml").write_text('[serve]\nport = 9000\ntoken_file = "token"\n')
-    found = serve_section(folder / "serve.toml")
+    found = read_serve_section(folder / "serve.toml")
     assert (found.port, found.token_file) == (9000, folder / "token")
     (folder / "wrong.toml").write_text("[serve]\nprot = 9000\n")
     with pytest.raises(package.ConfigError, match="did you mean 'port'"):
-        serve_section(folder / "wrong.toml")
+        read_serve_section(folder / "wrong.toml")
 
 
 def test_an_extra_is_installed_from_the_clone_while_it_is_there_and_by_its_packages_after(tmp_path: Path) -> None:

@@ -13,10 +13,11 @@ import typer
 
 import livebode as package
 from livebode.cli.app import app
-from livebode.cli.commands import SUMMARIES
 from livebode.cli.first_page import ABOUT, OPTIONS, first_page
+from livebode.plugins import named
 from tests.support.command import livebode
 
+COMMANDS = named("commands")
 PROGRAM = str(Path(sys.executable).with_name("livebode"))
 
 
@@ -27,7 +28,7 @@ def group() -> Any:
 
 def test_the_page_has_the_first_paragraph_of_the_help_of_every_command(group: Any) -> None:
     found = {name: " ".join(command.help.split("\n\n")[0].split()) for name, command in group.commands.items()}
-    assert dict(SUMMARIES) == found
+    assert {name: command.summary for name, command in named("commands").items()} == found
     assert group.help == ABOUT
 
 
@@ -43,7 +44,7 @@ def test_the_page_fits_the_terminal_and_loses_no_word(width: int) -> None:
     page = first_page(width, colours=False)
     framed = [line for line in page.splitlines() if line[:1] in tuple("╭│╰")]
     assert {len(line) for line in framed} == {max(width, 40)}
-    wanted = " ".join([*OPTIONS.values(), *SUMMARIES.values()]).split()
+    wanted = " ".join([*OPTIONS.values(), *(command.summary for command in named("commands").values())]).split()
     assert sorted(set(wanted) - set(page.replace("│", " ").split())) == []
 
 
@@ -65,14 +66,14 @@ def test_help_is_a_success_and_no_arguments_are_a_usage_error_with_the_same_page
 def test_a_page_that_cannot_be_printed_is_reported() -> None:
     with open("/dev/full", "w") as full:
         done = subprocess.run([PROGRAM, "--help"], stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 2
+    assert done.returncode == 75
     assert done.stderr.startswith("livebode: ")
     assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(
     ("typed", "wanted"),
-    [("livebode ", set(SUMMARIES)), ("livebode schema --js", {"--json"})],
+    [("livebode ", set(named("commands"))), ("livebode schema --js", {"--json"})],
 )
 def test_a_shell_completes_commands_and_their_options(typed: str, wanted: set[str]) -> None:
     asked = {"_LIVEBODE_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}

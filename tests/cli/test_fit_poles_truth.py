@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from livebode.analysis.averaged import averaged
+from livebode.analysis import averaged
 from livebode.core import Lines
 from livebode.excitation import multisine
 from livebode.records import RunRecord

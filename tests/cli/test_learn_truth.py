@@ -16,8 +16,8 @@ from livebode.core import BaselineError, Block, Channel, Lines
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
-from livebode.sources.live import Batch
-from livebode.sources.live.ndjson import encode_line
+from livebode.sources.live import Batch, encode_line
+from tests.support.baselines import with_checksum
 from tests.support.command import Result, livebode, write_parquet
 from tests.support.errors import refused
 from tests.support.monitored import recorded, small_baseline
@@ -189,9 +189,9 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
     for text, code, facts in (
         ("{", "not-a-baseline", {}),
         ("[]", "not-a-baseline", {}),
-        ('{"format": "livebode baseline", "version": 99}', "newer-version", {"found": 99, "readable": 4}),
-        ('{"format": "livebode baseline", "version": 3}', "version", {"version": 3}),
-        ('{"format": "livebode baseline", "version": 4}', "damaged", {"key": "lines"}),
+        ('{"format": "livebode baseline", "version": 99}', "newer-version", {"found": 99, "readable": 5}),
+        ('{"format": "livebode baseline", "version": 4}', "version", {"version": 4}),
+        ('{"format": "livebode baseline", "version": 5}', "damaged", {"key": "crc32"}),
     ):
         path.write_text(text, encoding="utf-8")
         with refused(BaselineError, code, path=str(path), **facts):
@@ -237,7 +237,8 @@ def test_a_damaged_part_is_named(tmp_path: Path, at: str, value: object, words: 
     part.pop(name)
     if value is not None:
         part[name] = value
-    path.write_text(json.dumps(data), encoding="utf-8")
+    del data["crc32"]  # which would name the change alone
+    path.write_bytes(with_checksum(data))
     with pytest.raises(BaselineError) as found:
         Baseline.load(path)
     assert (found.value.code, found.value.key) == ("baseline.damaged", at)

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.analysis.loop_report import loop_of_run
+from livebode.analysis import loop_of_run
 from livebode.fitting import mean_response
 from livebode.margins import margins
 from livebode.records import RunRecord

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.interface.example_recordings import write_examples
+from livebode.interface import write_examples
 from tests.support.command import livebode, signals, write_csv
 
 

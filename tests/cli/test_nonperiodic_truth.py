@@ -11,8 +11,7 @@ import pytest
 from scipy.signal import chirp, lfilter
 
 from livebode.core import Channel
-from livebode.sources.live import Batch
-from livebode.sources.live.ndjson import encode_line
+from livebode.sources.live import Batch, encode_line
 from tests.support.command import RATE_HZ, livebode, write_parquet
 from tests.support.live_runs import started, table
 from tests.support.peers.peer import PATIENCE_S

@@ -55,7 +55,7 @@ def test_the_summary_counts_and_names_what_was_done(log: Path, tmp_path: Path) -
     summary = json.loads(result.out)
     stored = json.loads((tmp_path / "run" / "run.json").read_text())
     assert {k: v for k, v in summary.items() if k != "directory"} == {
-        k: v for k, v in stored.items() if k not in ("format", "version", "files", "crc32")
+        k: v for k, v in stored.items() if k not in ("format", "version", "files", "size_bytes", "crc32")
     }
     assert stored["counts"]["samples"] == 2000
     assert stored["counts"]["responses"] == 2000 // stored["found"]["hop"]

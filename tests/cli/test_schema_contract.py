@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from livebode.configuration.schema import axis_schema
+from livebode.configuration import axis_schema
 from livebode.experiments.experiment_schema import experiment_schema
 from tests.support.command import livebode
 

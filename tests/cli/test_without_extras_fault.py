@@ -12,8 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.tables import Table
-from livebode.tables.parquet_writer import write_parquet
+from livebode.tables import Table, write_parquet
 from tests.support.loop_runs import AXIS, record
 
 CHIRP = "--excitation w --input u --output velocity --lines 20:140:10 --window 400"

@@ -14,13 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from livebode.configuration import ConfigurationFile
-from livebode.configuration.axes import axes_of
-from livebode.configuration.axis import Axis
-from livebode.configuration.fit_settings import chosen_model, fitter_of
+from livebode.configuration import Axis, ConfigurationFile, axes_of, chosen_model, fitter_of
 from livebode.configuration.toml_file import FILE_BYTES_MAX
 from livebode.core import ConfigError, LivebodeError, PlantKinds
-from livebode.preparation.plan import live_follower
+from livebode.preparation import live_follower
 from tests.support.errors import refused
 
 CASES = int(os.environ.get("LIVEBODE_CONFIGURATION_FUZZ", "2000"))
@@ -186,6 +183,9 @@ def test_odd_configurations_give_axes_or_a_sentence(tmp_path: Path) -> None:
     [
         (b"a = " + b"{a=" * 50_000 + b"1" + b"}" * 50_000, "nested-too-deeply", {}),
         (b"[" + b"a." * 50_000 + b"a]\n", "nested-too-deeply", {}),
+        (b"a" + b".a" * 200_000 + b" = 1\n", "nested-too-deeply", {}),
+        (b'"a, b"' + b' . "c = d"' * 50_000 + b" = 1\n", "nested-too-deeply", {}),
+        (b"a = {" + b"b." * 200_000 + b"c = 1}\n", "nested-too-deeply", {}),
         (b"a = " + b"9" * 10_000, "not-toml", {}),
         (b"#" * (FILE_BYTES_MAX + 1), "file-too-long", {"limit_bytes": FILE_BYTES_MAX}),
         (b"\xff\xfe", "not-text", {}),
@@ -198,7 +198,7 @@ def test_odd_configurations_give_axes_or_a_sentence(tmp_path: Path) -> None:
         (b"[lines]\n" + b"\n".join(b"k%d = 1" % k for k in range(50_000)), "key-unknown", {"key": "lines.k0"}),
         (b"\n".join(b"[axes.a%d]" % k for k in range(5000)), "axes-invalid", {"count": 5000, "limit": 256}),
     ],
-    ids=range(12),
+    ids=range(15),
 )  # fmt: skip
 def test_hostile_configurations_are_refused_with_their_code(
     tmp_path: Path, data: bytes, code: str, facts: dict

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from pydantic import BaseModel, create_model
 
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.records.summary_shape import _AnySummary
-from livebode.sources.live.settings import SourceSettings
+from livebode.sources.live import SourceSettings
 
 THREADS, TIMES = 8, 20
 SOURCE = {"url": "tcp://127.0.0.1:1", "nodes": {"y": "ns=2;s=y"}}

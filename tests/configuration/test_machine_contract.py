@@ -9,13 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode.configuration.axes import axes_of
-from livebode.configuration.axis import Axis
-from livebode.configuration.machine_section import MachineSection
-from livebode.configuration.recipe import recipe_id
-from livebode.configuration.recorded import recorded_report
-from livebode.core import ConfigError, RecordError
-from livebode.core.machine_levels import LEVELS
+from livebode.configuration import Axis, MachineSection, axes_of, recipe_id, recorded_report
+from livebode.core import LEVELS, ConfigError, RecordError
 from livebode.dashboard.run_entry import RunEntry, entry
 from tests.support.errors import refused
 from tests.support.many_runs import source_run

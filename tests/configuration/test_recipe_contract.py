@@ -8,10 +8,7 @@ from typing import Any
 import pytest
 import tomli_w
 
-from livebode.configuration.axes import axes_of
-from livebode.configuration.axis import Axis
-from livebode.configuration.recipe import recipe_id
-from livebode.configuration.schema import axis_schema
+from livebode.configuration import Axis, axes_of, axis_schema, recipe_id
 from livebode.core import LivebodeError, RecordingError
 from tests.support.errors import refused
 from tests.support.schemas import tables, values_of, with_value

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from livebode.configuration.axis import Axis
-from livebode.configuration.report_section import ReportSection, read_template
+from livebode.configuration import Axis, ReportSection, read_template
 from livebode.core import ConfigError
 from livebode.reporting.logo import BYTES_MAX, read_logo
 

@@ -12,12 +12,10 @@ from typing import Any
 import pytest
 import tomli_w
 
-from livebode.configuration.axes import axes_of
-from livebode.configuration.schema import axis_schema
+from livebode.configuration import axes_of, axis_schema
 from livebode.core import ConfigError, LivebodeError
+from livebode.plugins import named
 from livebode.sources.live import SourceSettings, make_source
-from livebode.sources.live.address import DEVICES
-from livebode.sources.live.settings import TAKEN
 from tests.support.schemas import tables, validator, values_of, with_value
 
 ROOT = Path(__file__).parents[2]
@@ -74,9 +72,9 @@ def test_a_value_is_valid_where_livebode_accepts_it(table: tuple[str, ...]) -> N
     assert not accepted(unknown)
 
 
-@pytest.mark.parametrize("kind", TAKEN)
+@pytest.mark.parametrize("kind", named("sources"))
 def test_a_source_has_the_keys_of_its_kind(kind: str) -> None:
-    url = {"stdin": "stdin:", **DEVICES}.get(kind, f"{kind}://192.168.0.5:5000")
+    url = named("sources")[kind].device or f"{kind}://192.168.0.5:5000"
     for name, key in TABLES[("source",)]["properties"].items():
         if name not in ("log", "url", "follow", "replay"):
             candidates = (key.get("default"), "x", 2, 5000, ["x"], {"x": "x"}, *key.get("enum", []))

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from livebode.arrow import from_numpy, text, to_numpy
+from livebode.tables import from_numpy, text, to_numpy
 from tests.support.command import signals, write_parquet
 
 NUMBERS = hnp.integer_dtypes(endianness="=") | hnp.unsigned_integer_dtypes(endianness="=") | hnp.floating_dtypes(

@@ -10,8 +10,7 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.core.distributions import f_exceeded, f_quantile, log_sum_exceeded, sum_exceeded, t_quantile
-from livebode.core.fast_length import fast_length
+from livebode.core import f_exceeded, f_quantile, fast_length, log_sum_exceeded, sum_exceeded, t_quantile
 
 halves = st.integers(1, 3000)
 denominators = st.floats(0.5, 1e6)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from livebode.core.ending import ENDING, calls_at_end
+from livebode.core import ENDING, calls_at_end
 
 
 @pytest.fixture

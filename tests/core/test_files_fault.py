@@ -16,9 +16,16 @@ from typing import Any
 
 import pytest
 
-from livebode.core import LivebodeError, OutputError, RecordError
-from livebode.core.files import whole_directory, whole_file, whole_files, write_whole
-from livebode.core.writing import writing
+from livebode.core import (
+    LivebodeError,
+    OutputError,
+    RecordError,
+    whole_directory,
+    whole_file,
+    whole_files,
+    write_whole,
+    writing,
+)
 from tests.support.errors import refused
 
 OLD, NEW = b"old" * 100, b"new" * 100_000

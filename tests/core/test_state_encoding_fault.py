@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.core import Stage, StateError, StatefulBase
-from livebode.core.state import decode, encode
+from livebode.core import Stage, StateError, StatefulBase, decode, encode
 from tests.support.errors import refused
 
 STAGE = Stage("small", 1)

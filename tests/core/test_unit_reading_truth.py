@@ -38,10 +38,12 @@ BY_HAND = [
     ("acceleration", 1.0, "rad/s²; rad/s^2; rad/s2; rad/s/s; rad s^-2; rad/(s s); rad/(s*s); m/s²; m/s2; 1/s²; s⁻²"),
     ("acceleration", 1e-3, "mm/s²"),
     ("acceleration", pi / 180, "°/s²; deg/s^2"),
+    ("acceleration", 9.80665, "g; gn; G"),
+    ("acceleration", 9.80665e-3, "mg"),
 ]  # fmt: skip
 OTHER = (
     "", "1", "counts", "inc", "counts/s", "%", "V", "bar", "Hz", "s", "kg", "kg m²", "J", "W", "N/m", "N m/rad",
-    "N m s/rad", "A s", "rad/s³", "m²", "g", "2 m", "1e-3 m", "m/", "(m", "m)", ")m(", "()", "/", "^2",
+    "N m s/rad", "A s", "rad/s³", "m²", "2 m", "1e-3 m", "m/", "(m", "m)", ")m(", "()", "/", "^2",
     "m^99999999999999", "m^10/m^9", "rad per s", "N m N m", "°C", "m" * 1000,
 )  # fmt: skip
 

@@ -16,8 +16,7 @@ import pytest
 import websockets
 from websockets.sync.client import connect
 
-from livebode.configuration.axis import Axis
-from livebode.configuration.serve_section import ServeSection
+from livebode.configuration import Axis, ServeSection
 from livebode.core import ConfigError, Event, LivebodeError, ServerError
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.access import Access
@@ -49,7 +48,7 @@ def test_nothing_is_shown_without_a_token(watched: Watched) -> None:
         "/api/saved?axis=0",
     ):
         status, _, body = ask(watched, path)
-        assert (status, json.loads(body)) == (401, {"error": "log in first"})
+        assert (status, json.loads(body)["error"]) == (401, "log in first")
     for path in (*ACTIONS, "/api/saved"):
         assert ask(watched, path, "POST", {"axis": 0, "event": "x"}, Origin=origin(watched))[0] == 401
     with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
@@ -151,7 +150,8 @@ def test_every_answer_has_the_security_headers(watched: Watched) -> None:
 
 
 def test_code_of_the_page_never_makes_html_of_data() -> None:
-    for file in (Path(__file__).parents[2] / "src/livebode/dashboard/static").glob("*.js"):
+    root = Path(__file__).parents[2]
+    for file in (*root.glob("src/**/static/*.js"), *root.glob("wings/*/src/**/static/*.js")):
         assert not re.search(
             r"innerHTML|outerHTML|insertAdjacent|document\.write|eval\(|new Function", file.read_text()
         )
@@ -192,10 +192,34 @@ def test_login_sessions_expire_and_their_number_is_limited() -> None:
     assert access.role(f"livebode={first}", "", "::1") is None
     for _ in range(100):
         last = access.login(TOKEN, "::1")
-    assert len(access._sessions) <= 64
+    assert sum(map(len, access._sessions.values())) <= 64
     assert access.role(f"a=b; livebode={last}", "", "::1") == "operator"
     for rubbish in ("livebode=", "livebode", ";;=;", "livebode=" + "é" * 500, "\0"):
         assert access.role(rubbish, "", "::1") is None
+
+
+def test_log_ins_end_only_sessions_of_their_role_and_first_their_own() -> None:
+    now = [0.0]
+    access = Access(Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER), lambda _: None, clock=lambda: now[0])
+    people = {
+        address: access.login(token, address)
+        for token in (TOKEN, VIEWER)
+        for address in (f"192.0.2.{len(token)}", f"2001:db8:{len(token)}::1")
+    }
+    program = [access.login(token, "198.51.100.1") for _ in range(100) for token in (TOKEN, VIEWER)]
+    for address, session in people.items():
+        assert access.role(f"livebode={session}", "", address) in ("operator", "viewer")
+    assert access.role(f"livebode={program[0]}", "", "198.51.100.1") is None
+    assert access.role(f"livebode={program[-2]}", "", "198.51.100.1") == "operator"
+    assert access.role(f"livebode={program[-1]}", "", "198.51.100.1") == "viewer"
+    access.logout(f"livebode={program[-1]}")
+    assert access.role(f"livebode={program[-1]}", "", "198.51.100.1") is None
+    now[0] = 13 * 3600.0  # what is over makes room
+    mine = access.login(TOKEN, "::1")
+    assert len(access._sessions["operator"]) == 1
+    for _ in range(62):
+        access.login(TOKEN, "::1")
+    assert access.role(f"livebode={mine}", "", "::1") == "operator"
 
 
 def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -223,9 +247,9 @@ SERVE = {"token": TOKEN, "short": "short", "viewer": VIEWER, "spaces": "with spa
         ({"address": "0.0.0.0", "token_env": "token"}, "open-without-tls", "serve.address"),
         ({"address": "::", "viewer_token_env": "viewer"}, "open-without-tls", "serve.address"),
         ({"address": "plant"}, "value-invalid", "serve.address"),
-        ({"token_env": "short"}, "token-weak", "serve.token"),
-        ({"token_env": "spaces"}, "token-weak", "serve.token"),
-        ({"token_env": "token", "viewer_token_env": "token"}, "tokens-equal", "serve.viewer_token"),
+        ({"token_env": "short"}, "token-weak", "serve.token_env"),
+        ({"token_env": "spaces"}, "token-weak", "serve.token_env"),
+        ({"token_env": "token", "viewer_token_env": "token"}, "tokens-equal", "serve.viewer_token_env"),
         ({"certificate_file": "/no/such"}, "key-missing", "serve.certificate_file"),
         ({"certificate_file": "/no/such", "key_file": "/no/such"}, "file-unreadable", "serve.certificate_file"),
         ({"certificate_file": __file__, "key_file": __file__}, "file-unusable", "serve.certificate_file"),

@@ -12,16 +12,14 @@ from typing import Any
 
 import pytest
 
-from livebode.analysis.overview import Overview
+from livebode.analysis import Overview
 from livebode.core import Event
-from livebode.dashboard import Dashboard, Hub, Serving
-from livebode.dashboard.alarm import AlarmShelf
+from livebode.dashboard import AlarmShelf, Dashboard, Hub, Serving
 from livebode.dashboard.alarm_actions import shelving, unshelving
 from livebode.dashboard.notices import event_id
 from livebode.dashboard.state import State
 from livebode.dashboard.verdict import AxisVerdict, verdict
-from livebode.runtime import RunControl
-from livebode.runtime.documents import RunEnded, RunStarted
+from livebode.runtime import RunControl, RunEnded, RunStarted
 from tests.support.browser import until
 from tests.support.dashboards import LINES, Watched, begin
 
@@ -161,6 +159,9 @@ def test_the_verdict_names_what_matters_most(tmp_path: Path) -> None:
     assert (after().tone, after().word) == ("open", "no-baseline")
     state._summary = dict(state._summary) | {"configuration": {"monitoring": {"baseline": "healthy.npz"}}}
     assert (after().tone, after().word) == ("ok", "healthy")
+    found = after(Event("idle", 1, 0.1, "at standstill", {"what": ["stiffness"], "reason": "slow", "since_s": 0.05}))
+    assert (found.tone, found.word, found.since_s) == ("open", "not-monitored", 0.05)
+    assert after(Event("monitored-again", 1, 0.1, "again", {"what": ["stiffness"]})).word == "healthy"
     found = after(Event("gap", 1, 0.1, "a gap"), Event("loss", 1, 0.1, "a loss"))
     assert (found.tone, found.word, found.count) == ("check", "alarms", 2)
     found = after(Event("change", 2, 0.9, "softer", {"what": "stiffness", "amount_percent": -2.0, "since_s": 0.4}))

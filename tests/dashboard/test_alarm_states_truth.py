@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Event, LivebodeError
-from livebode.dashboard.alarm import CHATTER_S, CHATTER_TIMES, AlarmShelf
+from livebode.dashboard import NAME_MAX, TEXT_MAX, AlarmShelf, alarm_request
+from livebode.dashboard.alarm import CHATTER_S, CHATTER_TIMES
 from livebode.dashboard.alarm_actions import acknowledgement, shelving, unshelving
 from livebode.dashboard.alarm_history import ROWS_MAX
-from livebode.dashboard.alarm_requests import NAME_MAX, TEXT_MAX, alarm_request
 from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id
-from livebode.monitoring.alarm_kinds import ALARMS, RETURNS, SOURCE
+from livebode.monitoring import ALARMS, RETURNS, SOURCE
 from livebode.records.segments.json_lines import from_line, to_line
-from livebode.runtime.readiness import ENDED, SUPPRESSED
+from livebode.runtime import ENDED, SUPPRESSED
 
 CAUSES = {"change": "change: stiffness", "gap": "gap", "roles-doubtful": "roles-doubtful"}
 SHELF_S = 40.0

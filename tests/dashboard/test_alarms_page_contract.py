@@ -192,7 +192,7 @@ TILES = """(count) => {
   const words = ['healthy', 'no-baseline', 'alarms', 'change'], tones = ['ok', 'open', 'check', 'alarm'];
   page.verdicts = Array.from({ length: count }, (_, i) => ({
     name: `axis ${i + 1}`, live: true, tone: tones[i % 4], word: words[i % 4], count: 1, facts: { what: 'machine' },
-    message: '', cause: '', since_s: 1, since_unix_s: null, seconds: null,
+    message: '', words: '', cause: '', since_s: 1, since_unix_s: null, seconds: null,
   }));
   wall.draw();
   const pen = document.createElement('canvas').getContext('2d');

@@ -13,12 +13,10 @@ import pyarrow as pa
 import pytest
 from playwright.sync_api import Browser
 
-from livebode.configuration.loop_section import LoopSection
-from livebode.dashboard import Dashboard, Serving
-from livebode.dashboard.overlays import grid_hz
+from livebode.configuration import LoopSection
+from livebode.dashboard import Dashboard, Serving, grid_hz
 from livebode.fitting import EvaluationGrid, model_named
-from livebode.records import RunRecord
-from livebode.records.saved_curves import read_saved
+from livebode.records import RunRecord, read_saved
 from tests.support.browser import Tab
 from tests.support.dashboards import FIT, LINES, LOOP, RATE_HZ, Watched
 

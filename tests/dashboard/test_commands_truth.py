@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.core.installing import install_command
+from livebode.core import install_command
 from livebode.records import RunRecord
 from tests.support.browser import Tab, chromium, until
 from tests.support.command import livebode, signals, write_parquet

@@ -16,7 +16,7 @@ from playwright.sync_api import Browser
 from livebode.core import Block, Channel, Event, Lines, Parameters
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Tracker
-from livebode.runtime.documents import ClockSet, FitResults, TrackerResults
+from livebode.runtime import ClockSet, FitResults, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.browser import Tab

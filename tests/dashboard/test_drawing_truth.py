@@ -11,13 +11,12 @@ import pyarrow as pa
 import pytest
 from playwright.sync_api import Browser
 
-from livebode.configuration.loop_section import LoopSection
+from livebode.configuration import LoopSection
 from livebode.core import Response
-from livebode.dashboard import Dashboard, Serving
-from livebode.dashboard.overlays import grid_hz
-from livebode.estimation.quantities import convert
+from livebode.dashboard import Dashboard, Serving, grid_hz
+from livebode.estimation import convert
 from livebode.fitting import EvaluationGrid, model_named
-from livebode.monitoring.table import BACK, FORTH
+from livebode.monitoring import BACK, FORTH
 from livebode.records import RunRecord
 from tests.support.baselines import compared
 from tests.support.browser import Tab

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import asyncio
+import asyncio.sslproto
 import contextlib
+import gc
 import json
 import resource
+import select
 import socket
 import ssl
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
+import uvicorn
 import websockets
+from uvicorn.server import ServerState
 from websockets.asyncio.client import connect as connect_async
 from websockets.sync.client import ClientConnection, connect
 
-from livebode.dashboard import Dashboard, Serving, patience
+from livebode.cli.start import OBJECTS_NEW
+from livebode.dashboard import Dashboard, Serving, listener, listening, patience
 from livebode.dashboard.browser_socket import DISPLACED
-from livebode.dashboard.listener import connections_max
+from livebode.dashboard.listener import Listener, connections_max
+from livebode.dashboard.patience import PatientProtocol
 from livebode.dashboard.places import PLACES, ClientPlace, Places
 from livebode.dashboard.server import Faults
 from tests.support.browser import until
@@ -171,6 +179,27 @@ def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
     assert capfd.readouterr().err == ""
 
 
+def test_connections_that_end_in_their_handshake_do_not_wait_for_each_other_in_memory(tmp_path: Path) -> None:
+    """Each is a cycle with 256 KiB of buffers, and the command line searches for cycles after 100,000 new objects."""
+    authority, before = Authority(tmp_path, "authority"), gc.get_threshold()
+    tls, trust = authority.sign("dashboard"), ssl.create_default_context(cafile=str(authority.file))
+    gc.collect()
+    gc.set_threshold(OBJECTS_NEW)
+    try:
+        with Dashboard(Serving("127.0.0.1", 0, tls=tls)) as dashboard:
+            address = "127.0.0.1", int(dashboard.url.rstrip("/").rpartition(":")[2])
+            for _ in range(300):
+                with socket.create_connection(address, PATIENCE_S) as plain:
+                    plain.sendall(b"\x16\x03\x01")
+                # One that completes its handshake comes after it.
+                with trust.wrap_socket(socket.create_connection(address, PATIENCE_S), server_hostname="127.0.0.1"):
+                    pass
+            assert sum(isinstance(found, asyncio.sslproto.SSLProtocol) for found in gc.get_objects()) < 150
+        assert gc.get_threshold()[0] == OBJECTS_NEW
+    finally:
+        gc.set_threshold(*before)
+
+
 def test_a_web_socket_that_its_browser_is_closing_ends_with_the_dashboard(tmp_path: Path) -> None:
     """Under TLS the connection remains until the browser has answered; the thread of the dashboard must not fail."""
     authority = Authority(tmp_path, "authority")
@@ -211,6 +240,59 @@ def test_a_body_that_does_not_come_is_not_waited_for(
 def test_connections_leave_descriptors_for_the_record(monkeypatch: pytest.MonkeyPatch, soft: int, most: int) -> None:
     monkeypatch.setattr(resource, "getrlimit", lambda _: (soft, soft))
     assert connections_max() == most
+
+
+async def _answers(clients: int, *, closed: bool) -> tuple[int, bytes, int]:
+    """So many clients have sent a request before the server looks, and an owner after them.
+
+    How many requests were worked on until the owner had an answer, the answer, and how many connections then remain
+    after the clients have gone.
+    """
+    worked = 0
+
+    async def application(_scope: Any, _receive: Any, send: Any) -> None:
+        nonlocal worked
+        worked += 1
+        await send({"type": "http.response.start", "status": 204, "headers": []})
+        await send({"type": "http.response.body"})
+
+    config = uvicorn.Config(application, lifespan="off", log_config=None)
+    config.load()
+    state = ServerState()
+    with listening(Serving("127.0.0.1", 0)) as server, contextlib.ExitStack() as opened:
+        others = [opened.enter_context(socket.create_connection(server.getsockname())) for _ in range(clients)]
+        for one in others:
+            one.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
+            if closed:
+                one.close()
+        owner = opened.enter_context(socket.create_connection(server.getsockname()))
+        owner.setblocking(False)
+        owner.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
+        found = Listener(server, None, lambda: PatientProtocol(config, state, {}), lambda _: None)
+        accepting = asyncio.create_task(found.run())
+        received = await asyncio.wait_for(asyncio.get_running_loop().sock_recv(owner, 1000), PATIENCE_S)
+        until_then = worked
+        opened.close()
+        while left := sum(connection.open for connection in found._connections):
+            await asyncio.sleep(0.01)
+        accepting.cancel()
+        return until_then, received, left
+
+
+@pytest.mark.skipif(not hasattr(select, "POLLRDHUP"), reason="the system does not tell who has gone")
+def test_requests_of_clients_that_have_gone_are_not_worked_on_before_the_owners() -> None:
+    worked, received, left = asyncio.run(_answers(300, closed=True))
+    assert received.startswith(b"HTTP/1.1 204")
+    assert worked <= 20  # as many as a browser may have sent before it was closed, and the owner's
+    assert left == 0
+
+
+def test_the_newest_of_many_that_wait_are_served_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(listener, "_QUEUE_S", -1.0)
+    worked, received, left = asyncio.run(_answers(300, closed=False))
+    assert received.startswith(b"HTTP/1.1 204")
+    assert worked <= 20
+    assert left == 0
 
 
 def test_internal_errors_of_the_server_are_reported_once_a_minute() -> None:

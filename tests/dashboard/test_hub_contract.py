@@ -12,21 +12,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.analysis.overview import Overview
-from livebode.configuration.loop_section import LoopSection
+from livebode.analysis import Overview
+from livebode.configuration import LoopSection
 from livebode.core import Block, Event, Lines, Responses, ServerError
-from livebode.dashboard import Hub
+from livebode.dashboard import Hub, Past, Quantities
 from livebode.dashboard.alarm_actions import acknowledgement
 from livebode.dashboard.frames import KINDS, frame
 from livebode.dashboard.hub import EVENTS_MAX, ITEMS_MAX, VALUES_MAX
 from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id
-from livebode.dashboard.past import Past
-from livebode.dashboard.quantities import QUANTITIES, Quantities
+from livebode.dashboard.quantities import QUANTITIES
 from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import POINTS_MAX, ModelTrend, TrendRows
-from livebode.runtime import RunControl
-from livebode.runtime.documents import ClockSet, RunEnded, RunStarted, TrackerResults
+from livebode.runtime import ClockSet, RunControl, RunEnded, RunStarted, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.dashboards import LINES, LOOP, Watched
@@ -218,7 +216,7 @@ def test_notices_are_bounded_and_known_again() -> None:
     notices.take(event)
     assert notices.counts["change"] == 1
     before = notices.version
-    notices.take(Event("acknowledged", 9, 2.0, "seen", {"event": event_id(event)}))
+    notices.take(Event("acknowledged", 9, 2.0, "seen", {"event": event_id(event), "count": 1}))
     assert [(n["id"], n["count"], n["seen"]) for n in notices.since(before)] == [(event_id(event), 1, 1)]
     notices.take(Event("acknowledged", 9, 2.0, "seen", {"event": "unknown"}))
 

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.dashboard.past import Past
+from livebode.dashboard import Past
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
-from livebode.records import RunRecord
-from livebode.records.tiers import thinned
+from livebode.records import RunRecord, thinned
 from tests.support.long_runs import PLANT, noisy_responses, record_long
 
 RESPONSES = noisy_responses(1500, seed=5)

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from livebode.analysis.overview import Overview
+from livebode.analysis import Overview
 from livebode.configuration import Axis
 from livebode.core import Block, Lines, MatrixResponses
 from livebode.dashboard import Dashboard, Serving
-from livebode.mimo.excitation import MatrixExcitation
+from livebode.mimo import MatrixExcitation
 from livebode.records import RunRecord
-from livebode.runtime import Destination, RunControl, run
-from livebode.runtime.documents import RunEnded, RunStarted
+from livebode.runtime import Destination, RunControl, RunEnded, RunStarted, run
 from livebode.simulation import GantryLoop
 from tests.support.axe import SIZES, violations, with_axe
 from tests.support.browser import Tab
@@ -152,7 +151,7 @@ def test_a_live_matrix_run_shows_each_entry(browser: Browser, gantry: Path) -> N
     record = RunRecord.open(gantry, matrix=True)
     rows = record.matrix()
     dashboard = Dashboard(Serving("127.0.0.1", 0))
-    hub = dashboard.matrix_hub("gantry", [(o, i) for o in OUTPUTS for i in INPUTS])
+    hub = dashboard.hub("gantry", [(o, i) for o in OUTPUTS for i in INPUTS])
     with dashboard, Tab(browser, dashboard.url, wait=False) as tab:
         hub(RunStarted(gantry, record.summary, RunControl(), Overview()))
         hub(rows[: len(rows) - 1])

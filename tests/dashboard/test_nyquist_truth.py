@@ -10,7 +10,7 @@ import pyarrow as pa
 import pytest
 from playwright.sync_api import Browser
 
-from livebode.configuration.loop_section import LoopSection
+from livebode.configuration import LoopSection
 from livebode.dashboard import Dashboard, Serving
 from livebode.records import RunRecord
 from tests.support.browser import Tab

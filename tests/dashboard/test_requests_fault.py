@@ -11,15 +11,18 @@ import os
 import random
 import socket
 from collections.abc import Iterator
+from contextlib import closing
+from http.client import HTTPConnection
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from livebode.core import LivebodeError
-from livebode.dashboard import Dashboard, Serving, queries
-from livebode.dashboard.alarm_requests import alarm_request
+from livebode.dashboard import Dashboard, Serving, alarm_request, queries
 from tests.support.dashboards import Watched
 from tests.support.peers.peer import PATIENCE_S
 
@@ -222,3 +225,61 @@ def test_messages_leave_the_socket_or_close_it(watched: Watched, capfd: pytest.C
 def test_a_record_that_cannot_be_read_is_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(LivebodeError, match="not the directory of a run"):
         Dashboard(Serving("127.0.0.1", 0)).view(tmp_path)
+
+
+_CALLS: list[tuple[str, dict[str, object]]] = [
+    ("/login", {"token": "TEXT"}),
+    ("/logout", {"TEXT": "TEXT"}),
+    ("/api/acknowledge", {"axis": 0, "event": "TEXT", "by": "TEXT", "comment": "TEXT"}),
+    ("/api/shelve", {"axis": 0, "event": "TEXT", "by": "TEXT", "reason": "TEXT", "minutes": 5}),
+    ("/api/unshelve", {"axis": 0, "event": "3f", "by": "TEXT"}),
+    ("/api/saved", {"axis": 0, "kind": "annotation", "text": "TEXT", "frequency_hz": 62.5}),
+    ("/api/saved", {"axis": 0, "kind": "reference", "text": "TEXT", "time_s": 1.0}),
+    ("/api/saved", {"axis": 0, "kind": "remove", "text": "TEXT"}),
+    ("/api/saved", {"axis": 0, "kind": "TEXT", "text": "TEXT", "TEXT": 1}),
+    ("/api/notes", {"run": "run", "tags": ["TEXT"], "text": "TEXT"}),
+    ("/api/notes", {"run": "TEXT", "tags": [], "text": "TEXT"}),
+    ("/api/delete", {"run": "TEXT", "confirmed": "TEXT"}),
+]
+_TEXTS = st.one_of(
+    st.text(alphabet=st.characters(), max_size=30),
+    st.text(alphabet=st.characters(categories=("Cc", "Cf", "Cs", "Co", "Zl", "Zp")), min_size=1, max_size=8),
+    st.sampled_from(
+        ["\ud800", "a\udfff", "\0", "\x1b[2J", "\u202e", "x" * 3000, "x" * 100_000, "\uffff", "🙂" * 900, ""]
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def all_runs(watched: Watched) -> Iterator[tuple[str, list[str]]]:
+    """The page of all runs, and what the dashboard reports on the terminal."""
+    messages = list[str]()
+    dashboard = Dashboard(Serving("127.0.0.1", 0), messages.append)
+    dashboard.view_all(watched.directory.parent)
+    with dashboard:
+        yield dashboard.url, messages
+
+
+@given(st.sampled_from(_CALLS), _TEXTS, st.booleans())
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_any_text_is_stored_or_refused_in_a_sentence(
+    watched: Watched, all_runs: tuple[str, list[str]], call: tuple[str, dict[str, object]], text: str, escaped: bool
+) -> None:
+    """Escaped or as bytes; what was stored is read back, so that no later request fails by it."""
+    path, body = call
+    url, messages = all_runs if path in ("/api/notes", "/api/delete") else (watched.url, watched.messages)
+    words = json.dumps(body).replace("TEXT", json.dumps(text)[1:-1])
+    data = words if escaped else json.dumps(json.loads(words), ensure_ascii=False)
+    headers = {"Origin": url.rstrip("/"), "Content-Type": "application/json"}
+    with closing(HTTPConnection("127.0.0.1", int(url.rsplit(":", 1)[1].strip("/")), timeout=PATIENCE_S)) as connection:
+        connection.request("POST", path, data.encode("utf-8", "surrogatepass"), headers)
+        answer = connection.getresponse()
+        content = answer.read().decode()
+        assert answer.status in (200, 202, 400, 401, 404, 429), (path, text, content)
+        if answer.status >= 400:
+            assert len(json.loads(content)["error"]) < 500
+        elif path == "/api/saved":
+            connection.request("GET", "/api/saved?axis=0")
+            assert connection.getresponse().read().decode() == content
+    assert not [line for line in messages if "internal error" in line]
+    assert all(letter.isprintable() or letter == "\n" for line in messages for letter in line)

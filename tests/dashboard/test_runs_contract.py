@@ -22,10 +22,8 @@ from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.access import Access
 from livebode.dashboard.opened_runs import OPEN_MAX, OpenedRuns
 from livebode.dashboard.run_catalogue import RunCatalogue
-from livebode.records import RunRecord
-from livebode.records.deletion import delete
-from livebode.records.notes import Notes, read_notes, write_notes
-from livebode.records.segments.lock import Lock
+from livebode.language import for_page
+from livebode.records import Lock, Notes, RunRecord, delete, read_notes, write_notes
 from tests.support.command import livebode
 from tests.support.dashboards import LINES, SAMPLES, Watched
 from tests.support.guarded import TOKEN, VIEWER
@@ -139,7 +137,7 @@ def test_wrong_or_long_notes_are_refused_and_nothing_is_written(
 ) -> None:
     folder, url = changed
     status, _, found = ask(url, "/api/notes", {"run": "day 2", "tags": [], "text": ""} | wrong, TOKEN)
-    assert (status, set(found)) == (400, {"error"})
+    assert (status, set(found)) == (400, {"error", "words"})
     assert not (folder / "day 2" / "notes.json").exists()
 
 
@@ -311,7 +309,7 @@ def test_a_trend_is_the_median_of_the_fits_and_shows_the_known_change(shown: tup
     assert points["no clock"]["two-mass", "Keff"][8] is None
     margin = RunRecord.open(folder / "day 0").summary["loop"]["margins"]["phase_margin"]
     assert points["day 0"]["margins", "phase_margin"][3:5] == [margin["value"], margin["bound_95"]]
-    assert found["day 4"]["alarms"] == [[1.0, BEGUN + 4 * DAY_S + 1.0, "change", ALARM]]
+    assert found["day 4"]["alarms"] == [[1.0, BEGUN + 4 * DAY_S + 1.0, "change", for_page(ALARM)]]
     assert (found["day 0"]["baseline"], found["day 5"]["baseline"]) == ("healthy.json", "other.json")
     many = ask(url, "/api/trend?run=day%200")[2]["quantities"]
     keff = next(q for q in many if q[1] == "Keff")

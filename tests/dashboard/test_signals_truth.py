@@ -22,7 +22,7 @@ from livebode.dashboard.signal_answer import answer
 from livebode.dashboard.signal_points import POINTS_MAX, columns_of, extremes, remark_of
 from livebode.dashboard.signal_spectrum import amplitude_spectrum
 from livebode.dashboard.signal_tap import WATCHED_S, SignalTap, span_samples
-from livebode.runtime.documents import Channels, TrackerResults
+from livebode.runtime import Channels, TrackerResults
 from tests.support.browser import Tab
 from tests.support.dashboards import BAD, LINES, RATE_HZ, Watched, data
 from tests.support.errors import refused

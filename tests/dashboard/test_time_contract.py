@@ -18,10 +18,10 @@ from playwright.sync_api import Browser
 from pypdf import PageObject, PdfReader
 
 from livebode.core import Event, Lines
-from livebode.core.clock import date_and_time
 from livebode.dashboard import Dashboard, Serving
+from livebode.language import Message, Moment
 from livebode.records import RunRecord
-from livebode.runtime.documents import ClockSet
+from livebode.runtime import ClockSet
 from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.browser import Tab
 from tests.support.dashboards import LINES, Watched, begin, whole_run
@@ -421,8 +421,9 @@ def test_a_new_run_ends_the_zoom_of_the_one_before(browser: Browser, tmp_path: P
 
 def test_the_sentence_and_the_recorded_messages_follow_the_chosen_clock(tab: Tab, dashboard: Dashboard) -> None:
     since_s = 9000.0  # half past two for the second time
-    written = date_and_time(AUTUMN[0].timestamp() + since_s)  # by the zone of the server
-    message = f"Since {written} the belt's stiffness is 2.0 ± 0.2 % less than in the baseline."
+    unix_s = AUTUMN[0].timestamp() + since_s
+    change = "the belt's stiffness is 2.0 ± 0.2 % less than in the baseline"
+    message = Message("Since {since} {change}.", since=Moment(since_s, unix_s, 1), change=change)
     facts = {"what": "stiffness", "amount_percent": -2.0, "since_s": since_s, "place_m": None}
     dashboard.hub("autumn")(Event("change", 0, since_s + 60, message, facts))
     show(tab, "axis=autumn")

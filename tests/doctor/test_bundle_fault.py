@@ -13,12 +13,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from livebode.configuration.axis import MAY_BE_SECRET, Axis
+from livebode.configuration import MAY_BE_SECRET, Axis
 from livebode.core import OutputError
-from livebode.doctor import Subject, bundle, write_bundle
-from livebode.doctor.check import Check
+from livebode.doctor import Check, Subject, bundle, write_bundle
 from livebode.doctor.secrets import REMOVED, Secrets
-from livebode.experiments.experiment import Experiment
+from livebode.experiments import Experiment
 from tests.support.command import livebode, signals
 from tests.support.runs import small_run
 from tests.support.small_axis import ONE_LINE
@@ -141,7 +140,7 @@ def test_a_bundle_of_a_run_holds_its_summary_its_newest_events_versions_checks_a
         columns["y"][sample] = float("nan")
     small_run(tmp_path, columns)
     done = livebode(
-        "doctor", tmp_path / "run", "--bundle", tmp_path / "b.zip", "--log-file", tmp_path / "own.log", "--json"
+        "--log-file", tmp_path / "own.log", "doctor", tmp_path / "run", "--bundle", tmp_path / "b.zip", "--json"
     )
     found = contents(tmp_path / "b.zip")
     assert list(found) == json.loads(done.out)["files"]

@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from livebode.core import UsageError
-from livebode.core.installing import install_command
+from livebode.core import UsageError, install_command
 from livebode.doctor import Subject
 from livebode.doctor.disk import check_disk
 from livebode.doctor.extras import check_extras

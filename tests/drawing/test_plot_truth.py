@@ -14,7 +14,7 @@ from matplotlib.colors import same_color
 
 from livebode import Lines, Response, Responses, UsageError, example_responses
 from livebode.core import Quantity
-from livebode.drawing.bode import draw_bode
+from livebode.drawing import draw_bode
 from tests.support.errors import refused
 from tests.support.responses import any_responses, made
 

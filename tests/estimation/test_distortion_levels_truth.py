@@ -9,11 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.core import Block, Event, Lines
-from livebode.core.document import PrintedTable
-from livebode.estimation import Settings, Tracker
+from livebode.core import Block, Event, Lines, PrintedTable
+from livebode.estimation import Settings, SuccessiveTrackers, Tracker
 from livebode.estimation.levels import Level, detection_bins
-from livebode.estimation.successive import SuccessiveTrackers
 from livebode.excitation import multisine, odd_lines
 from livebode.reporting.run_report import run_report
 from tests.support.command import livebode, write_parquet

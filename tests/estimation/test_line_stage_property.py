@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Block, Lines, Loop, Responses
-from livebode.estimation import RippleOrder, Settings, Tracker, line_stage, repeating_twin
+from livebode.estimation import RippleOrder, Settings, Tracker, line_stage
 from livebode.estimation.verdicts import Judge
 from livebode.excitation import multisine
-from livebode.kernel import line_twin
+from tests.twins import lines as line_twin
+from tests.twins import repeating as repeating_twin
 
 WINDOW, RATE_HZ, SAMPLES = 60, 1000.0, 500
 LINES = Lines((4, 8, 13), WINDOW, RATE_HZ, quiet=(5, 6, 7, 9, 10, 11, 12))

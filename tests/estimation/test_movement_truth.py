@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.analysis.averaged import averaged
+from livebode.analysis import averaged
 from livebode.core import Block, Channel, Event, Responses
-from livebode.estimation import Settings, Tracker
-from livebode.estimation.movement import Movement
+from livebode.estimation import Movement, Settings, Tracker
 from livebode.excitation import multisine, odd_lines
 from livebode.records import RunRecord
 from tests.support.found import with_events

@@ -7,12 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from livebode.analysis.loop_check import check_loop
-from livebode.configuration.loop_section import LoopSection
+from livebode.configuration import LoopSection
 from livebode.core import Block, Gain, Lines, Loop, PositionPD, Response
 from livebode.estimation import Settings, Tracker
-from livebode.sources import open_log, sinumerik_spectra
-from livebode.validation import LoopSignals
+from livebode.sources import open_log
+from livebode_control.loop_check.loop_check import check_loop
+from livebode_control.loop_check.loop_equation import LoopSignals
+from livebode_drives.recordings.sinumerik import sinumerik_spectra
 from tests.support.motor_bench import BENCH, bench_responses, motorbench, whole
 from tests.support.real_recordings import recording
 

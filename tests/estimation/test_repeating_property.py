@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Lines
-from livebode.estimation import repeating_twin
 from livebode.estimation.distortion import by_chance
 from livebode.estimation.verdicts import Judge
 from livebode.kernel import (
@@ -31,6 +30,7 @@ from livebode.kernel import (
     RepeatingSettings,
     judge_periods,
 )
+from tests.twins import repeating as repeating_twin
 
 SPECIAL = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, 1e-300, 1e160, -1e5])
 LINES = {

@@ -16,7 +16,7 @@ from livebode.excitation import multisine
 from livebode.monitoring import Baseline, WindowRows, learn_table
 from livebode.monitoring.ripple import Ripple
 from livebode.motion import MotionCorrection
-from livebode.preparation.plan import live_follower
+from livebode.preparation import live_follower
 from livebode.simulation import BeltAxis, Drive, Motion, Sensor, SimulatedAxis, Strokes
 from tests.support.axes import LINES
 from tests.support.errors import refused

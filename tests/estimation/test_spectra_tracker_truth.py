@@ -27,7 +27,8 @@ from livebode.core import (
 )
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
-from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop
+from livebode.simulation import TwoMassLoop
+from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI
 from livebode.sources.live import FrameDecoder, encode_spectra, encode_spectra_layout
 from livebode.sources.live.kernel_drive import KernelDrive
 from tests.support.errors import refused

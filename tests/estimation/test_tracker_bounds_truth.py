@@ -15,7 +15,8 @@ import pytest
 from livebode.core import PID, Block, Cascade, Lines, Loop, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop, TwoMassPlant
+from livebode.simulation import TwoMassLoop, TwoMassPlant
+from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI
 
 RUNS, SIGMA = 400, 0.1
 PERIODS = 10

@@ -8,7 +8,8 @@ import pytest
 from livebode.core import PID, Block, Cascade, Lines, Loop, Response
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop, TwoMassPlant
+from livebode.simulation import TwoMassLoop, TwoMassPlant
+from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
 TRUTH = TwoMassPlant().response(LINES.frequency_hz)

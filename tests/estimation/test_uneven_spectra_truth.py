@@ -10,10 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode import Block, Lines, Responses, Settings, SignalError, Tracker, multisine
-from livebode.estimation.uneven import UnevenSpectra
-from livebode.estimation.uneven_tracker import UnevenTracker
-from livebode.preparation.uneven_spectra import UnevenSource
-from livebode.sources.uneven import open_uneven
+from livebode.estimation import UnevenSpectra, UnevenTracker
+from livebode.preparation import UnevenSource
+from livebode.sources import open_uneven
 from tests.support.errors import refused
 from tests.support.uneven import write_mdf
 

@@ -13,7 +13,8 @@ from scipy.signal import chirp
 
 from livebode.core import Block, LivebodeError, SignalError
 from livebode.estimation import welch
-from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop, TwoMassPlant
+from livebode.simulation import TwoMassLoop, TwoMassPlant
+from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.errors import refused
 
 

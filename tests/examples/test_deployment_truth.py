@@ -16,7 +16,7 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from livebode.configuration.serve_section import ServeSection
+from livebode.configuration import ServeSection
 from livebode.dashboard import Serving
 from tests.support.dashboards import Watched
 from tests.support.guarded import TOKEN, port_of

@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 
 from livebode import Lines, SlidingDFT, multisine
-from livebode.sources.live.frame import FrameDecoder
-from livebode.sources.live.spectra_batch import SpectraBatch
+from livebode.sources.live import FrameDecoder, SpectraBatch
 from tests.support.command import livebode, write_parquet
 from tests.support.live_runs import started, table
 from tests.support.peers.peer import PATIENCE_S, free_port

@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode.core import Lines, SignalError
-from livebode.core.steps import step_of
+from livebode.core import Lines, SignalError, step_of
 from livebode.excitation import multisine, recognise
 from livebode.records import RunRecord
 from tests.support.command import livebode

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines
-from livebode.excitation import multisine, recognise
-from livebode.excitation.significance import find_lines, significant
+from livebode.excitation import find_lines, multisine, recognise
+from livebode.excitation.significance import significant
 from livebode.excitation.snr import snr_db
 
 LINES = Lines(tuple(range(11, 251)), 2500, 2500.0)

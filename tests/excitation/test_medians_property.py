@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from livebode.excitation.medians import medians
+from livebode.excitation import medians
 
 _FLOATS = st.floats(allow_nan=True, allow_infinity=True, width=64)
 

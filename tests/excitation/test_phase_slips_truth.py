@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from livebode.core import Lines
 from livebode.excitation import Slip, find_slips, multisine, recognise
 from livebode.excitation.slips import realigned
-from livebode.preparation.aligned import AlignedLog
-from livebode.records import RunRecord
-from livebode.records.grouped_events import each_event
+from livebode.preparation import AlignedLog
+from livebode.records import RunRecord, each_event
 from livebode.sources import open_log
 from tests.support.command import livebode, write_parquet
 

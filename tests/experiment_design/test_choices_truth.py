@@ -4,11 +4,11 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import DesignError, GridError
-from livebode.estimation.settings import default_hop
+from livebode.estimation import default_hop
 from livebode.experiment_design import ExperimentSpec, MachineLimits, belt_machine, choose
 from livebode.experiment_design.grid import grid
 from livebode.simulation import BeltAxis, Sensor, Strokes
@@ -37,6 +37,7 @@ def test_a_chosen_window_resolves_what_was_asked_is_hardly_longer_and_a_hop_divi
     width=st.floats(10, 1800),
     kind=st.sampled_from(["multisine", "odd", "chirp", "prbs"]),
 )
+@example(0.1, 10.1818, 1454.7, "chirp")  # at 0.291 Hz the window that a hop divides is longer: 5001 lines
 def test_more_lines_than_useful_are_refused_and_the_named_resolution_passes(resolution_hz, low, width, kind):
     def lines(apart_hz):
         spec = ExperimentSpec(band_hz=(low, low + width), resolution_hz=apart_hz, kind=kind)
@@ -109,3 +110,19 @@ def test_a_recording_longer_than_an_hour_reports_the_accuracy_of_one_hour():
     reached = float(re.search(r"an hour is enough for (\S+) %", row.why).group(1)) / 100
     assert choose(ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.05,
                        accuracy=1.05 * reached), MACHINE).recording_s <= 3600  # fmt: skip
+
+
+def test_the_frequency_above_which_the_loop_is_20_db_below_one_is_named_for_tuning():
+    def row(lines):
+        design = choose(ExperimentSpec(lines=lines, window=4000, amplitude_n_m=0.1), MACHINE)
+        return next(choice for choice in design.choices if choice.what == "for tuning")
+
+    wide = row("20:1500:20")
+    assert wide.value == "1500 Hz suffices"
+    reach_hz = float(re.search(r"reach ([\d.]+) Hz", wide.why)[1])
+    assert row("4:20:4").value == f"lines to {reach_hz:.4g} Hz"
+    f = np.geomspace(1.001 * reach_hz, 1990, 500)
+    size = [np.abs(place.plant.response(f) * MACHINE.loop.feedback_at(f)) for place in MACHINE.places]
+    assert np.max(size) < 0.1
+    at = np.array([0.995 * reach_hz])
+    assert np.max([np.abs(p.plant.response(at) * MACHINE.loop.feedback_at(at)) for p in MACHINE.places]) >= 0.1

@@ -17,11 +17,12 @@ from livebode.experiment_design import (
     Waveform,
     belt_machine,
     choose,
+    identifier,
     measured_machine,
     write,
 )
-from livebode.experiment_design.files.c_names import KEYWORDS, identifier
-from livebode.experiments.experiment import Experiment
+from livebode.experiment_design.files.c_names import KEYWORDS
+from livebode.experiments import Experiment
 from livebode.simulation import BeltAxis, Sensor, Strokes
 from tests.support.command import livebode
 from tests.support.errors import refused

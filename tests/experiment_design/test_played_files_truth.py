@@ -9,7 +9,7 @@ import pytest
 
 from livebode.core import ConfigError
 from livebode.experiment_design import ExperimentSpec, MachineLimits, belt_machine, choose, worst, write
-from livebode.experiments.experiment import Experiment
+from livebode.experiments import Experiment
 from livebode.records import RunRecord
 from livebode.simulation import BeltAxis, SimulatedAxis, extremes
 from tests.support.command import livebode, write_parquet

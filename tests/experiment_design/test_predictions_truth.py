@@ -9,6 +9,7 @@ from livebode.excitation import multisine
 from livebode.experiment_design import (
     ExperimentSpec,
     MachineLimits,
+    Waveform,
     accuracy_of,
     belt_machine,
     choose,
@@ -16,7 +17,6 @@ from livebode.experiment_design import (
     peaks,
     worst,
 )
-from livebode.experiment_design.waveform import Waveform
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, extremes
 
 LINES = Lines.parse("20:140:20", 4000, 400)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from livebode.core import DesignError, UsageError
-from livebode.experiment_design import QUANTITIES, ExperimentSpec, MachineLimits, choose, measured_machine
-from livebode.experiment_design.machine import MOTION_KEYS
+from livebode.experiment_design import MOTION_KEYS, QUANTITIES, ExperimentSpec, MachineLimits, choose, measured_machine
 from livebode.simulation import BeltAxis
 from tests.support.errors import refused
 

@@ -3,7 +3,7 @@
 import pytest
 
 from livebode.core import ConfigError
-from livebode.experiments.experiment import Experiment
+from livebode.experiments import Experiment
 from tests.support.errors import refused
 
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from livebode import Run, interface
 from livebode.core import Block
+from livebode.experiments import MatrixExperiment
 from livebode.experiments.experiment_schema import matrix_experiment_schema
-from livebode.experiments.matrix_experiment import MatrixExperiment
 from livebode.experiments.measured_matrix import MeasuredMatrixSection, measured_machine
 from livebode.simulation import GantryLoop
 from livebode.sources import open_log
@@ -175,6 +175,24 @@ def test_a_machine_of_modes_is_designed_for_the_time(tmp_path: Path) -> None:
     again = livebode("design", tmp_path / "experiment.toml", "--out", tmp_path / "out", "--force", "--to", "csv")
     assert again.code == 0
     assert (tmp_path / "out" / "excitation.csv").exists()
+    assert not (tmp_path / "out" / "excitation.npz").exists()
+    _check_that_nothing_else_is_replaced(tmp_path)
+
+
+def _check_that_nothing_else_is_replaced(folder: Path) -> None:
+    """With the list of a design in which somebody has a file, a directory or a link of his own."""
+    mark, mine = folder / "out" / "design.json", folder / "out" / "thesis.csv"
+    listed = json.loads(mark.read_text())["files"]
+    arguments = ("design", folder / "experiment.toml", "--out", folder / "out", "--force", "--to", "csv")
+    (folder / "outside").mkdir()
+    for create in (mine.touch, mine.mkdir, lambda: mine.symlink_to(folder / "outside")):
+        create()
+        for files in ([*listed, mine.name], ["thesis.csv", "axis.toml"], [*listed, "../outside"], "thesis.csv", None):
+            mark.write_text(json.dumps({"files": files}))
+            done = livebode(*arguments)
+            assert (done.code, done.err.count("\n")) == (2, 1)
+            assert mine.exists()
+        mine.rmdir() if mine.is_dir() and not mine.is_symlink() else mine.unlink()
 
 
 @pytest.mark.parametrize(

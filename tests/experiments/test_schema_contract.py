@@ -11,7 +11,8 @@ import pytest
 
 from livebode.core import ConfigError, LivebodeError
 from livebode.experiment_design import MachineLimits
-from livebode.experiments.experiment import BELT, Experiment, made_of
+from livebode.experiments import Experiment
+from livebode.experiments.experiment import BELT, made_of
 from livebode.experiments.experiment_schema import experiment_schema
 from tests.support.schemas import tables, validator, values_of, with_value
 

@@ -13,8 +13,9 @@ import scipy.io
 import xarray as xr
 
 from livebode.core import Lines, Responses, UsageError
-from livebode.export import MODELS, LpvModel
+from livebode.export import LpvModel, writers
 from livebode.fitting import Fitter, TwoMass
+from livebode.plugins import loaded
 from livebode.simulation import BeltAxis
 
 RATE_HZ = 4000.0
@@ -35,7 +36,7 @@ def model() -> LpvModel:
 
 def test_the_frozen_response_of_the_mat_file_is_that_of_the_belt(model: LpvModel, tmp_path: Path) -> None:
     """From 10 to 100 Hz at every place within 5 %; the stiffness within four sigma."""
-    MODELS["mat"](tmp_path / "belt.mat", model)
+    loaded(writers("model")["mat"])(tmp_path / "belt.mat", model)
     found = scipy.io.loadmat(tmp_path / "belt.mat")["livebode"][0, 0]
     f = np.linspace(10.0, 100.0, 40)
     for i, x in enumerate(found["position"][0]):
@@ -51,7 +52,7 @@ def test_the_c_header_interpolates_as_numpy(model: LpvModel, tmp_path: Path) -> 
     gcc = shutil.which("gcc")
     if gcc is None:
         pytest.skip("gcc is not installed")
-    MODELS["c"](tmp_path / "belt.h", model)
+    loaded(writers("model")["c"])(tmp_path / "belt.h", model)
     at = np.linspace(0.3, 1.5, 49)
     (tmp_path / "main.c").write_text(
         '#include <stdio.h>\n#include "belt.h"\nint main(void) {\ndouble p[LIVEBODE_PARAMETERS];\n'
@@ -69,7 +70,7 @@ def test_the_c_header_interpolates_as_numpy(model: LpvModel, tmp_path: Path) -> 
 
 def test_json_and_netcdf_have_value_and_covariance(model: LpvModel, tmp_path: Path) -> None:
     for name in ("json", "netcdf"):
-        MODELS[name](tmp_path / name, model)
+        loaded(writers("model")[name])(tmp_path / name, model)
     plain = json.loads((tmp_path / "json").read_text())
     assert plain["names"] == list(model.names)
     np.testing.assert_allclose(plain["covariance"], model.parameters.covariance)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines, Responses
-from livebode.fitting import mean_response
-from livebode.fitting.drift import FALSE_ALARM, DriftTest
+from livebode.fitting import DriftTest, mean_response
+from livebode.fitting.drift import FALSE_ALARM
 
 LINES = Lines.parse("20:140:10", 4000, 400)
 NOISE = 0.02  # of the response, in a window

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import FitError, UsageError
-from livebode.fitting import EvaluationGrid, Parameter, Rigid, ThreeMass, TwoMass, TwoMassGain, two_masses
+from livebode.fitting import EvaluationGrid, Parameter, Rigid, ThreeMass, Transfer, TwoMass, TwoMassGain, two_masses
 from livebode.fitting.hold import to_continuous, to_discrete
 from livebode.fitting.modal import chain_of
-from livebode.fitting.transfer import Transfer, roots
+from livebode.fitting.transfer import roots
 from livebode.simulation import BeltAxis, Mechanics
 from tests.support.errors import refused
 from tests.support.fitted import Pendulum
@@ -203,3 +203,15 @@ def test_a_users_model_is_sampled_and_derived_like_the_others() -> None:
     assert model.derived(np.array(values))[0] == pytest.approx(np.sqrt(900 / 0.02) / (2 * np.pi))
     with refused(UsageError, "out-of-range", argument="start", parameter="J", value=10.0):
         Parameter("J", "kg m²", start=10.0, low=1.0, high=2.0)
+
+
+@pytest.mark.parametrize("delay_ticks", [0.0, 1.3])
+def test_numerators_that_share_a_denominator_are_sampled_as_each_alone(delay_ticks: float) -> None:
+    a1, a0, z = np.array([3.0, 40.0, 0.5]), np.array([1e4, 400.0, 2e5]), np.exp(2j * np.pi * F_HZ / RATE_HZ)
+    above = [np.tile([0.0, 1.0], (3, 1)), np.tile([1.0, 0.0], (3, 1))]
+    below = [np.ones((3, 1)), a1[:, np.newaxis], a0[:, np.newaxis]]
+    both = Transfer.of(above, below).sampled(z, RATE_HZ, delay_ticks / RATE_HZ)
+    alone = [
+        Transfer.of(n, [np.ones(3), a1, a0]).sampled(z, RATE_HZ, delay_ticks / RATE_HZ) for n in ([1.0], [1.0, 0.0])
+    ]
+    np.testing.assert_allclose(both, np.stack(alone, axis=1), rtol=1e-12)

@@ -17,7 +17,8 @@ from livebode.core import Block, Lines, Response, Responses, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.fitting import mean_response
-from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop, TwoMassPlant
+from livebode.simulation import TwoMassLoop, TwoMassPlant
+from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.errors import refused
 from tests.support.responses import any_responses, cut, made
 

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Event, Lines, Parameters, Responses, SignalError
-from livebode.fitting import EvaluationGrid, Fitter, Rigid, TwoMass, fit_together
-from livebode.fitting.physical import PhysicalModel
+from livebode.fitting import EvaluationGrid, Fitter, PhysicalModel, Rigid, TwoMass, fit_together
 from tests.support.errors import refused
 from tests.support.fitted import LINES, TRUTH, noisy
 

@@ -13,7 +13,7 @@ import pytest
 import livebode
 from livebode import ConfigError, Loop, OutputError, RecordError, Run, UsageError
 from livebode.fitting import mean_response
-from livebode.margins.margins import NAMES
+from livebode.margins._margins import NAMES
 from livebode.records import to_json
 from tests.support.command import livebode as command
 from tests.support.errors import refused

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from livebode.kernel import HoppingDFT, SlidingDFT
@@ -23,6 +23,7 @@ def cases(draw: st.DrawFn) -> dict:
 
 
 @settings(deadline=None, max_examples=100)
+@example({"window": 2, "bins": [1], "hop": 1, "channels": 3, "dtype": "float32"}, [281], "window", 84)
 @given(cases(), st.lists(st.integers(0, 400), max_size=4), st.sampled_from(["window", "fixed"]), st.integers(0, 2**32))
 def test_rows_are_the_transforms_of_their_windows(case, cuts, phase, seed):
     """Against a DFT of the samples in extended precision, in pieces of any length, zeros before the first."""
@@ -39,7 +40,8 @@ def test_rows_are_the_transforms_of_their_windows(case, cuts, phase, seed):
         place = np.arange(window) + (end if phase == "fixed" else 0)
         angle = step * (np.outer(place, bins) % window).astype(np.longdouble)
         part = padded[:, end : end + window]
-        size = np.sqrt(window) * np.linalg.norm(part.astype(float), axis=1)[:, None]
+        # A sum that slides keeps the rounding of samples that have left it.
+        size = window * np.abs(padded[:, : end + window]).max(axis=1)[:, None]
         error = np.hypot(part @ np.cos(angle) - rows[:, row].real, -(part @ np.sin(angle)) - rows[:, row].imag)
         assert (error <= BOUND[case["dtype"]] * size).all()
 

@@ -19,10 +19,10 @@ from livebode.kernel import (
     LineWindows,
     NewestWindows,
     instruction_sets,
-    line_twin,
     process_each,
     process_lines,
 )
+from tests.twins import lines as line_twin
 
 SPECIAL = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, 1e-300, 1e160, -1e5])
 

@@ -10,8 +10,7 @@ import pytest
 
 from livebode import BeltAxis, SlidingDFT
 from livebode.kernel import _native
-from livebode.simulation._axis import Engine
-from livebode.simulation.configuration import engine_settings
+from livebode.simulation import Engine, engine_settings
 
 PLACE_M = 0.8
 LONG = 500_000

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from livebode.kernel import SlidingDFT, instruction_sets
-from livebode.kernel.twin import TwinDFT, twiddles
+from tests.twins.sliding import TwinDFT, twiddles
 
 VARIANTS = ["modulated", "plain", "damped", "hann", "hamming", "blackman"]
 SHAPES = [(1, [0]), (2, [1, 0]), (3, [2, 0]), (10, [1, 2, 3]), (11, [0, 5, 10]), (37, range(37)), (64, range(20))]

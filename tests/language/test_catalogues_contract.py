@@ -10,20 +10,22 @@ from functools import cache
 import pytest
 
 from livebode.dashboard.quantities import QUANTITIES
+from livebode.fitting import model_named
 from livebode.fitting.extended import WORDS as EFFECTS
 from livebode.fitting.extended import Extended
 from livebode.fitting.models import MODELS
 from livebode.fitting.rows import SENTENCES as FITS
 from livebode.language import available
-from livebode.language.recorded import NAMES, SENTENCES
-from livebode.margins.margins import NAMES as MARGINS
-from livebode.margins.margins import WORDS as MARGIN_WORDS
-from livebode.monitoring.alarm_kinds import ALARMS, RETURNS
+from livebode.margins import WORDS as MARGIN_WORDS
+from livebode.margins._margins import NAMES as MARGINS
+from livebode.monitoring import ALARMS, RETURNS
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import WHAT
-from tools.catalogues import FOLDER, PACKAGE, STATIC, catalogues, extracted, json_text, po_text, translated, updated
+from tools import catalogues as tool
+from tools.catalogues import FOLDER, VALUES, catalogues, extracted, json_text, po_text, translated, updated
 
 _PLACE = re.compile(r"\{\w*(?::[^}]*)?\}")
+_OF_MESSAGE = re.compile(r"\{\w+(?::\+?,?(?:\.\d\d?)?[a-z]?)?\}")
 LANGUAGES = sorted(catalogues())
 
 
@@ -64,36 +66,33 @@ def test_the_files_are_those_that_make_catalogues_writes(code: str) -> None:
 
 
 @cache
-def sources() -> tuple[str, ...]:
-    """The text of the package's modules, without that of the recorded sentences."""
-    return tuple(path.read_text("utf-8") for path in PACKAGE.rglob("*.py") if path.name != "recorded.py")
-
-
-@cache
-def texts() -> str:
-    """The same, with texts of several lines joined."""
-    return re.sub(r'"\s*\n\s*f?"', "", "\n".join(sources()))
+def texts() -> tuple[str, ...]:
+    """The text of the modules of the package and its wings."""
+    return tuple(path.read_text("utf-8") for path in tool.sources("*.py"))
 
 
 @cache
 def calls() -> tuple[ast.Call, ...]:
     """The calls of modules that translate or report, also within f-strings."""
-    used = (text for text in sources() if re.search(r"\b(?:trn?|marked|Event|report|_report_to_axes)\(", text))
+    used = (text for text in texts() if re.search(r"\b(?:trn?|Message|Event|report|_report_to_axes)\(", text))
     return tuple(n for text in used for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Call) and n.args)
 
 
 def called() -> Iterator[str]:
-    """First arguments of `tr`, `trn` and `marked`."""
+    """First arguments of `tr`, `trn` and `Message`; that of a message may be a name that is data."""
     for node in calls():
-        if isinstance(node.func, ast.Name) and node.func.id in ("tr", "trn", "marked"):
+        if isinstance(node.func, ast.Name) and node.func.id in ("tr", "trn", "Message"):
             first = node.args[0]
-            assert isinstance(first, ast.Constant), ast.unparse(node)
-            yield first.value
+            if isinstance(first, ast.Constant):
+                yield first.value
+            else:
+                assert node.func.id == "Message", ast.unparse(node)
+                assert not any(keyword.arg for keyword in node.keywords), ast.unparse(node)
 
 
 def test_every_call_is_found_by_the_extraction() -> None:
     python = set(called())
-    script = "\n".join(path.read_text("utf-8") for path in STATIC.glob("*.js") if path.name != "language.js")
+    script = "\n".join(path.read_text("utf-8") for path in tool.sources("static/*.js") if path.name != "language.js")
     assert set(re.findall(r"\btrn?\(\s*(.)", script)) == {'"'}, "an argument of tr is not a literal"
     called_there = set(re.findall(r'\btrn?\(\s*"((?:[^"\\]|\\.)*)"', script))
     assert len(called_there) > 100
@@ -114,28 +113,26 @@ def kinds() -> set[str]:
 
 def test_kinds_parameters_statuses_and_margins_have_names() -> None:
     shown = {*QUANTITIES, *DIRECTIONS, *WHAT.values(), *EFFECTS.values(), *FITS, *MARGIN_WORDS.values(), *kinds()}
-    for model in (make() for make in MODELS.values()):
+    for model in map(model_named, MODELS):
         extended = Extended(
             model, tuple(e for e in EFFECTS if e in ("lag", "residual compliance", "further mode")), 100.0
         )
         shown |= {name.replace("_", " ") for name in (*extended.names, *model.derived_names)} | {model.name}
     shown |= {name.replace("_", " ") for name in MARGINS}
     assert not shown - keys().keys()
-    assert not set(FITS.values()) - set(SENTENCES)
+    assert not set(FITS.values()) - keys().keys()
 
 
-def test_a_template_has_words_of_a_message_that_the_package_writes() -> None:
-    stale = []
-    for template in SENTENCES:
-        parts = [part.split() for part in _PLACE.split(template)]
-        most = min(3, max(1, max(map(len, parts)) - 2))
-        runs = [" ".join(words[i : i + most]) for words in parts for i in range(len(words) - most + 1)]
-        if not any(run.strip(" ,;:.()") in texts() for run in runs):
-            stale.append(template)
-    assert not stale
+def test_the_places_of_a_message_can_be_filled_each_once() -> None:
+    for node in calls():
+        if isinstance(node.func, ast.Name) and node.func.id == "Message" and isinstance(node.args[0], ast.Constant):
+            template = node.args[0].value
+            places = _OF_MESSAGE.findall(template)
+            assert places == _PLACE.findall(template), template
+            assert len(set(places)) == len(places), template
+            assert not {"template", "digits"} & {keyword.arg for keyword in node.keywords}, template
 
 
-def test_a_name_is_one_that_the_package_writes() -> None:
-    every = texts().replace("_", " ") + "\n".join(path.read_text("utf-8") for path in STATIC.glob("*.js"))
-    derived = {name.replace("_", " ") for make in MODELS.values() for name in make().derived_names}
-    assert not [name for name in NAMES if name not in every and name not in derived]
+def test_a_value_is_one_that_the_package_writes() -> None:
+    every = "\n".join(texts()).replace("_", " ")
+    assert not [name for name in VALUES if name not in every]

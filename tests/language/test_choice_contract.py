@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pypdf import PdfReader
 
-from livebode.configuration.serve_section import ServeSection
+from livebode.configuration import ServeSection
 from livebode.language import ENGLISH, available, catalogue
 from tests.support.command import livebode
 from tests.support.reports import measured, write_run

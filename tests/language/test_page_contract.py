@@ -1,33 +1,48 @@
-"""The page: its language, its sentences, and that it recognises what Python recognises."""
+"""The page: its language, its sentences, and that it words what Python words."""
 
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict
 from pathlib import Path
 
 from playwright.sync_api import Browser
 
+from livebode.core import RunClock, moment, moments_by
 from livebode.dashboard import Dashboard, Serving
-from livebode.language import catalogue, in_language, recognised
+from livebode.language import Message, catalogue, for_page, in_language, worded
 from tests.support.browser import Tab
 from tests.support.dashboards import Watched
-from tests.support.languages import filled, pseudo, untranslated
+from tests.support.languages import pseudo, untranslated
+
+_PLACES = re.compile(r"\{(\w+)(:[^{}]*)?\}")
 
 
-def test_the_page_recognises_what_python_recognises(browser: Browser) -> None:
-    sentences = [filled(template) for template, _ in catalogue("de").recorded]
-    sentences += [f"{a}; {b}." for a, b in zip(sentences[::3], sentences[1::3])]
-    sentences += ["the average up to 2026-03-01 07:30:05 CET s", "an unknown thing. 3 samples were lost."]
+def test_the_page_words_what_python_words(browser: Browser) -> None:
+    templates = [text for text, own in catalogue("de").messages.items() if "{" in text and isinstance(own, str)]
+    inner = Message("{missing_samples} samples were lost", missing_samples=12)
+    facts = {name: inner for text in templates for name, spec in _PLACES.findall(text) if not spec}
+    numbers = {name: -1234.5 for text in templates for name, spec in _PLACES.findall(text) if spec}
+    with moments_by(RunClock([(0.0, 1.7e9)])):
+        messages = [
+            *(Message(text, **facts | {n: 12.5 for n, s in _PLACES.findall(text) if s}) for text in templates),
+            *(Message("{amount:.2f} {unit}", amount=number, unit="1.5") for number in numbers.values()),
+            Message("Only larger changes are found: {changes}.", changes=[inner, "a.b", 3]),
+            Message("Monitored again since {at}.", at=moment(12.25)),
+            Message("Monitored again since {at}.", at=moment(float("nan"))),
+            "no response",
+            "a channel",
+        ]
     with Dashboard(Serving("127.0.0.1", 0, language="de")) as dashboard, Tab(browser, dashboard.url, wait=False) as tab:
         found = tab.page.evaluate(
-            "async (all) => all.map((await import('/static/recognition.js')).recognised)",
-            sentences,
+            "async (all) => all.map((await import('/static/worded.js')).worded)",
+            [for_page(message) for message in messages],
         )
         assert tab.page.evaluate("document.documentElement.lang") == "de"
         assert tab.wrong == []
     with in_language("de"):
-        assert found == [recognised(sentence) for sentence in sentences]
+        assert found == [worded(message) for message in messages]
 
 
 def test_the_page_has_no_english_outside_of_its_catalogue(browser: Browser, tmp_path: Path) -> None:

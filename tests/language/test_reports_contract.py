@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from livebode.core import Event
-from livebode.language import in_language
-from livebode.report.html import to_html
-from livebode.reporting.compare_report import Comparison
+from livebode.core import Event, moment
+from livebode.language import Message, in_language
+from livebode.monitoring.sentences import WHAT
+from livebode.report import to_html
+from livebode.reporting import Comparison
 from livebode.reporting.run_report import run_report
 from tests.support.languages import pseudo, untranslated
 from tests.support.reports import measured, strokes, write_run
@@ -31,10 +32,30 @@ CONFIGURATION = {
     "fit": {"model": "rigid"},
 }
 EVENTS = (
-    Event("gap", 900, 0.2, "12 samples are missing before sample 900; use other lines", {}),
-    Event("change", 9000, 2.2, "Since 1.5 s the belt's stiffness is 10.0 ± 0.1 % less than in the baseline.",
-          {"what": "stiffness"}),
-)  # fmt: skip
+    Event(
+        "gap",
+        900,
+        0.2,
+        Message("{missing_samples} samples are missing before sample {at_sample}", missing_samples=12, at_sample=900),
+    ),
+    Event(
+        "change",
+        9000,
+        2.2,
+        Message(
+            "Since {since} {change}.",
+            since=moment(1.5),
+            change=Message(
+                "{part} is {size} % {way} than {reference}",
+                part=WHAT["stiffness"],
+                size=Message("{size:.1f} ± {bound:.1f}", size=10.0, bound=0.1),
+                way=Message("less"),
+                reference=Message("in the baseline"),
+            ),
+        ),
+        {"what": "stiffness"},
+    ),
+)
 DATA = {"bench", "html", "livebode", "unknown", "avx512", "Hann"}
 
 

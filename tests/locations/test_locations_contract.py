@@ -11,7 +11,6 @@ from livebode.core import LocationError
 from livebode.locations import (
     Location,
     Url,
-    delta_options,
     find,
     local_copy,
     location,
@@ -135,18 +134,6 @@ def test_a_secret_in_a_url_is_not_shown(address: str) -> None:
     url = Url(address)
     assert "hidden" not in f"{url} {url!r} {url.name} {[url]}"
     assert (url.name, url.stem, url.suffix) == ("a.csv", "a", ".csv")
-
-
-def test_delta_tables_have_the_options_of_the_same_storage(s3: str) -> None:
-    deltalake = pytest.importorskip("deltalake")
-    import pyarrow as pa
-
-    table, url = pa.table({"run": [1, 2]}), Url(f"s3://{BUCKET}/lake/runs")
-    assert delta_options(url) == {"aws_endpoint_url": s3, "aws_allow_http": "true"}
-    for _ in range(2):
-        deltalake.write_deltalake(str(url), table, mode="append", storage_options=delta_options(url))
-    assert deltalake.DeltaTable(str(url), storage_options=delta_options(url)).to_pyarrow_table().num_rows == 4
-    assert delta_options(Path("lake")) == {}
 
 
 def test_a_path_imports_nothing_of_fsspec(tmp_path: Path) -> None:

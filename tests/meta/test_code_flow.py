@@ -9,9 +9,7 @@ from pkgutil import resolve_name
 
 import pytest
 
-from livebode.runtime import documents
-from livebode.runtime.run_loop import RunLoop
-from livebode.runtime.sample_loop import SampleLoop
+from livebode.runtime import RunLoop, documents
 
 PAGE = (Path(__file__).parents[2] / "docs" / "explanation" / "code-flow.md").read_text("utf-8")
 NAMES = sorted(set(re.findall(r"`(livebode(?:\.\w+)+)`", PAGE)))
@@ -24,12 +22,13 @@ def test_a_name_on_the_page_exists(name: str) -> None:
 
 def test_the_loop_calls_its_steps_in_the_order_of_the_page() -> None:
     call = r"self\.(?:_recorder\.|_stream\.)?(\w+)\("
-    assert re.findall(call, inspect.getsource(SampleLoop._process)) == [
-        "write_samples", "_publish_noticed", "_compute", "_report_events", "announce", "_check_signals", "commit",
+    assert re.findall(call, inspect.getsource(RunLoop._process)) == [
+        "write_samples", "_publish_noticed", "publish_all", "_count", "_estimate", "_report_events", "announce",
+        "_publish_findings", "commit",
     ]  # fmt: skip
-    assert re.findall(call, inspect.getsource(RunLoop._compute)) == [
-        "_ready_parts", "_monitor_samples", "_estimate", "_record_and_publish",
-    ]  # fmt: skip
+    rules = r"self\.estimate\.(\w+)\("
+    assert re.findall(rules, inspect.getsource(RunLoop._process)) == ["monitor", "process", "check"]
+    assert re.findall(rules, inspect.getsource(RunLoop._estimate)) == ["valid", "documents"]
     order = (
         "Number",
         "Split",

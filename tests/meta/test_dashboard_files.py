@@ -9,6 +9,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 HERE = ROOT / "src/livebode/dashboard"
+STATIC = (HERE / "static", *ROOT.glob("wings/*/src/**/static"))
+"""Directories whose files the server has at one address: those of the dashboard, and those of wings."""
 
 
 def test_uplot_is_as_it_was_published() -> None:
@@ -22,15 +24,14 @@ def test_uplot_is_as_it_was_published() -> None:
 
 
 def test_scripts_of_the_page_are_type_checked_and_import_only_local_files() -> None:
-    for file in (HERE / "static").glob("*.js"):
+    for file in (file for folder in STATIC for file in folder.glob("*.js")):
         text = file.read_text(encoding="utf-8")
         assert text.startswith("// @ts-check\n"), file.name
         assert not re.search(r"@ts-(ignore|nocheck)|[{<:|]\s*any\b", text), file.name
         for name in re.findall(r'^import [^;"]*"([^"]+)"', text, re.M):
-            where = (
-                HERE / "_vendor" / name.removeprefix("/static/") if name.startswith("/static/") else file.parent / name
-            )
-            assert where.is_file(), (file.name, name)
+            vendored = name.startswith("/static/")
+            places = [HERE / "_vendor" / name.removeprefix("/static/")] if vendored else [one / name for one in STATIC]
+            assert any(place.is_file() for place in places), (file.name, name)
         assert not re.search(r"https?://(?!www\.w3\.org)", text), file.name
 
 

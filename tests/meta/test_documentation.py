@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY", "STYLE")] + [*ROOT.glob("docs/**/*.md")]
+PAGES = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY", "STYLE")] + [
+    *ROOT.glob("docs/**/*.md"),
+    *ROOT.glob("wings/**/*.md"),
+]
 COLUMNS = 125
 
 

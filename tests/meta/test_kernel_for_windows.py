@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PROJECT = "cmake_minimum_required(VERSION 3.20)\nproject(all C)\n" + "".join(
-    f"add_subdirectory({ROOT / name} {name})\n" for name in ("kernel", "simulation")
+    f"add_subdirectory({ROOT / name} {name})\n" for name in ("kernel", "native", "simulation")
 )
 STRING = """#include <stddef.h>
 void *memcpy(void *, const void *, size_t);
@@ -71,9 +71,13 @@ def test_the_c_compiles_for_windows_with_vectors_and_needs_only_what_windows_has
     printed = run("cmake", "--build", tmp_path / "build", "--parallel", "2")
     assert "warning" not in printed
     libraries = sorted((tmp_path / "build").rglob("*.lib"))
-    assert [library.name for library in libraries] == ["livebode_kernel.lib", "livebode_axis.lib"]
+    assert [library.name for library in libraries] == [
+        "livebode_kernel.lib",
+        "livebode_native.lib",
+        "livebode_axis.lib",
+    ]
     symbols = run(names, *libraries)
-    for found in ("lb_sdft64_kernel_avx512", "lb_lines_avx2", "lb_two_masses_advance_avx512"):
+    for found in ("lb_sdft64_kernel_avx512", "lb_lines_avx2", "lb_matrix_avx2", "lb_two_masses_advance_avx512"):
         assert re.search(rf" [RT] {found}$", symbols, re.M), found
     missing = {name for name in re.findall(r"^ +U (\S+)$", symbols, re.M) if not name.startswith("lb_")}
     functions = set(re.findall(r"double (\w+)\(", MATH))

@@ -50,6 +50,13 @@ def test_the_objects_name_what_the_page_lists_and_nothing_else(built):
     assert ALLOWED[M4F] | NAMED == set(re.findall("__aeabi_[a-z0-9]+", PAGE))
 
 
+def test_the_line_stage_needs_no_library_where_the_processor_has_doubles(tmp_path):
+    need_tools()
+    objects = M7.compile(sorted((KERNEL / "src/lines").glob("*.c")), tmp_path, "-fno-math-errno")
+    named = {line.split()[1] for line in run("arm-none-eabi-nm", "-u", *objects).splitlines() if " U " in line}
+    assert named == {"lb_best_instruction_set", "lb_lines_baseline", "memcpy", "__aeabi_l2d"}
+
+
 def test_no_object_rounds_once_where_others_round_twice(built):
     _, objects = built
     for file in objects:

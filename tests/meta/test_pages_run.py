@@ -17,7 +17,7 @@ import matplotlib
 import matplotlib.pyplot as plt
 import pytest
 
-from livebode.interface.example_recordings import EXAMPLES
+from livebode import plugins
 from tests.support.command import livebode
 from tests.support.pages import PAGES, ROOT, Step, steps_of
 
@@ -106,6 +106,6 @@ def test_what_is_not_run_has_one_of_few_reasons() -> None:
 
 def test_the_commands_that_an_example_prints_are_on_a_page_or_run(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(desk.folder)
-    for example in EXAMPLES.values():
+    for example in plugins.named("examples").values():
         for command in example.commands:
             run(Step(command), desk, {})

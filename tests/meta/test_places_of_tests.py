@@ -14,6 +14,9 @@ TESTS = ROOT / "tests"
 PACKAGES = {path.parent.name for path in (ROOT / "src/livebode").glob("*/__init__.py")}
 KINDS = ("contract", "property", "truth", "reference", "fault")
 PROGRAMS = {"bench", "examples", "studies"}
+WINGS = [str(path.relative_to(ROOT)) for path in sorted(ROOT.glob("wings/*/src"))]
+FOLDERS = sorted(path for path in TESTS.iterdir() if path.name != "meta" and any(path.glob("test_*.py")))
+FOLDERS += sorted({path.parent for path in ROOT.glob("wings/*/tests/**/test_*.py")})
 
 
 def imported(path: Path) -> Iterator[str]:
@@ -29,24 +32,28 @@ def imported(path: Path) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("folder", sorted(path.name for path in TESTS.iterdir() if any(path.glob("test_*.py"))))
-def test_a_test_file_is_named_by_package_subject_and_kind(folder: str) -> None:
-    if folder == "meta":
-        return
-    assert folder in PACKAGES | {"examples", "studies"}
-    for path in (TESTS / folder).iterdir():
+def test_the_tests_of_a_package_have_its_name(folder: str) -> None:
+    assert folder in PACKAGES | {"examples", "meta", "native", "studies"}
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: str(folder.relative_to(ROOT)))
+def test_a_test_file_is_named_by_subject_and_kind(folder: Path) -> None:
+    for path in folder.iterdir():
         assert re.fullmatch(rf"test_[a-z_]+_({'|'.join(KINDS)})\.py|__pycache__|stored", path.name), path
 
 
-def test_what_tests_share_is_in_support_and_not_in_another_test_or_a_program() -> None:
+def test_what_tests_share_is_in_support_or_twins_and_not_in_another_test_or_a_program() -> None:
     own = {"meta": PROGRAMS, "studies": PROGRAMS, "examples": PROGRAMS}
-    for path in TESTS.rglob("*.py"):
+    for path in (*TESTS.rglob("*.py"), *ROOT.glob("wings/*/tests/**/*.py")):
         for name in imported(path):
             root, *rest = name.split(".")
             assert root not in PROGRAMS - own.get(path.parent.name, set()), f"{path} imports {name}"
-            assert root != "tests" or rest[0] == "support", f"{path} imports {name}"
+            assert root != "tests" or rest[0] in ("support", "twins"), f"{path} imports {name}"
 
 
-@pytest.mark.parametrize("folder", ["src", "tools", *sorted(PROGRAMS)])
+@pytest.mark.parametrize("folder", ["src", "tools", *sorted(PROGRAMS), *WINGS])
 def test_nothing_else_imports_the_tests(folder: str) -> None:
+    """A bench compares a twin with what it defines."""
+    shared = "tests.twins." if folder == "bench" else "tests/"
     for path in (ROOT / folder).rglob("*.py"):
-        assert not [name for name in imported(path) if name.split(".")[0] == "tests"], path
+        assert not [n for n in imported(path) if n.split(".")[0] == "tests" and not n.startswith(shared)], path

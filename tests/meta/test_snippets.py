@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 import typer
 
-from livebode.archive.settings import ArchiveSettings
 from livebode.cli.app import app
-from livebode.configuration import Axis
-from livebode.configuration.axes import merged, tables_of
-from livebode.experiments.experiment import Experiment
-from livebode.experiments.matrix_experiment import TABLES, MatrixExperiment
-from livebode.fleet.settings import FleetSettings
+from livebode.configuration import Axis, tables_of
+from livebode.configuration.axes import merged
+from livebode.experiments import Experiment, MatrixExperiment
+from livebode.experiments.matrix_experiment import TABLES
+from livebode_plant.archive.settings import ArchiveSettings
+from livebode_plant.fleet.settings import FleetSettings
 from tests.support.pages import PAGES, ROOT, steps_of
 
 ARCHIVE = {"inputs": ["*.csv"], "recipe": "recipe.toml", "lake": "lake"}

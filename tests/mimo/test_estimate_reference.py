@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from livebode.kernel import MatrixHistory, MatrixRows, MatrixStage, MatrixWindows, process_matrices
-from livebode.mimo.estimate import Estimate, Windows, estimate
+from livebode.mimo.estimate import MatrixEstimate, Windows, estimate
 
 
 def by_kernel(stage: MatrixStage, spectrum: np.ndarray) -> MatrixRows:
@@ -17,7 +17,7 @@ def by_kernel(stage: MatrixStage, spectrum: np.ndarray) -> MatrixRows:
     return found
 
 
-def by_numpy(stage: MatrixStage, spectrum: np.ndarray, count: int) -> Estimate:
+def by_numpy(stage: MatrixStage, spectrum: np.ndarray, count: int) -> MatrixEstimate:
     """Of the newest of `repetitions` repetitions of the experiments, rows of one place."""
     s = stage
     newest = spectrum[:, ::-1].reshape(-1, s.repetitions, s.experiments, s.lines)

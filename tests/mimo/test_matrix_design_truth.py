@@ -11,8 +11,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from livebode.core import Block, DesignError, UsageError
-from livebode.mimo import MatrixResponses, MatrixSettings, MatrixTracker
-from livebode.mimo.design import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
+from livebode.mimo import (
+    MatrixDesign,
+    MatrixLimits,
+    MatrixResponses,
+    MatrixSettings,
+    MatrixSpec,
+    MatrixTracker,
+    MechanismMachine,
+    choose_matrix,
+)
 from livebode.mimo.design.amplitude import best_amplitudes
 from livebode.mimo.design.candidate import RESERVE
 from livebode.simulation import CoreXYLoop, GantryLoop

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from livebode.core import Block, Lines
-from livebode.core.controllers import PID
+from livebode.core import PID, Block, Lines
 from livebode.mimo import (
     MatrixExcitation,
     MatrixLoop,

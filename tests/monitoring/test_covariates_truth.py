@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.analysis.learning import learn
+from livebode.analysis import learn
 from livebode.configuration import Axis
 from livebode.core import BaselineError, Block, Event
 from livebode.monitoring import Baseline, LearnedMachine, MachineMonitor

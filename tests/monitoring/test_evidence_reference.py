@@ -9,15 +9,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import shift
 
+from livebode.monitoring import LearnedMachine
 from livebode.monitoring.evidence import JUDGED
-from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.model_evidence import ModelEvidence
 from livebode.monitoring.naming import ScoredWindows
 from livebode.monitoring.offset import LocalChange, Offset
 from livebode.monitoring.ripple import Ripple, allowed_for
 from livebode.monitoring.stretches import Stretches, WindowStretch
-from livebode.motion.orders import shaft_position
-from livebode.simulation.open_belt import Pair, open_belt
+from livebode.motion import shaft_position
+from livebode.simulation import Pair, open_belt
 from tests.support.axes import LINES
 from tests.support.monitored import NAMES, ideal, recorded
 from tests.support.shared import shared
@@ -77,6 +77,7 @@ def defined(machine: LearnedMachine, stretch: WindowStretch, offset: Offset) -> 
 
     e = spectrum((y - smooth(plain, y))[cut], (*LINES.bins, *LINES.quiet))
     power, e = e.real**2 + e.imag**2, e[:, : len(LINES)]
+    slopes = np.array([smooth(slope, np.zeros(x.size)) for slope in slopes])
     slope, weight = spectrum(slopes[:, cut], LINES.bins), 2 / (machine.noise_power * np.ones((len(cut), 1)))
     score = np.einsum("jwl,wl,wl->wj", slope.conj(), e, weight).real
     information = np.einsum("jwl,kwl,wl->wjk", slope.conj(), slope, weight).real

@@ -36,6 +36,7 @@ def test_a_change_is_found_named_and_sized(fault: object, what: str, percent: fl
     details = events[0].details
     assert abs(details["amount_percent"] - percent) < max(2 * details["bound_percent"], 0.05 * abs(percent))
     assert abs(details["since_s"] - 6.0) < 0.5
+    assert details["since_earliest_s"] <= 6.0 <= details["since_latest_s"]
     assert events[0].time_s < 6.0 + 5.4  # a stroke at this speed
     assert monitor.standing()[0]["what"] == what
 
@@ -155,4 +156,4 @@ def test_two_changes_at_once_are_reported_together() -> None:
     for details in [e.details for e in events[1:]] + monitor.standing():
         assert abs(details["amount_percent"] - truth[details["what"]]) < max(2 * details["bound_percent"], 0.1)
     for details in monitor.standing():
-        assert f"{abs(details['amount_percent']):.1f}" in monitor.together()
+        assert f"{abs(details['amount_percent']):.1f}" in "; ".join(monitor.together())

@@ -80,16 +80,21 @@ def stepped(seed: int) -> WindowRows:
 
 
 def test_an_amount_is_right_while_the_step_is_in_the_rows_own_scatter() -> None:
-    """Thirty steps: 95 % of the bounds cover the truth (24 of 30 is 4 sigma below), dates are right to two windows."""
-    table, covered = learn_table("lines", NAMES, [made(6000, 1)]), 0
+    """Thirty steps: 95 % of the bounds cover the truth (24 of 30 is 4 sigma below), dates are right to two windows.
+
+    So do 95 % of the intervals of the dates.
+    """
+    table, covered, dated = learn_table("lines", NAMES, [made(6000, 1)]), 0, 0
     for seed in range(30):
         watcher = TableMonitor(table, DEFAULT_INTERVAL_S, 0.1)
         event = next(e for e in watcher.process(stepped(100 + seed)) if e.kind == "change")
         change = next(c for c in event.details["changes"] if c["name"] == "60 Hz" and c["of"] == "magnitude")
         covered += abs(change["amount"] + 26.0) <= change["bound"]
         assert abs(event.details["since_s"] - 10.0) <= 0.2
+        dated += event.details["since_earliest_s"] <= 10.0 <= event.details["since_latest_s"]
         assert event.time_s < 13.0
     assert covered >= 24
+    assert dated >= 24
 
 
 def test_a_large_change_is_reported_in_magnitude_and_phase() -> None:

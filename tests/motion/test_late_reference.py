@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import shift
 
-from livebode.motion.replay import late
+from livebode.motion import late
 
 
 @given(

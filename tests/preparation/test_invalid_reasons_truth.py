@@ -8,7 +8,7 @@ import pytest
 from livebode.core import Block, Lines, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.preparation.checks import check_some_valid
+from livebode.preparation import check_some_valid
 
 LINES = Lines.parse("30:130:20", 1000.0, 100)
 

@@ -12,8 +12,7 @@ import pytest
 from livebode.core import Lines
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.preparation.aligned import AlignedLog
-from livebode.preparation.early_spikes import early_spikes
+from livebode.preparation import AlignedLog, early_spikes
 from livebode.preparation.transients import leading_transient
 from livebode.records import RunRecord
 from livebode.sources import open_log

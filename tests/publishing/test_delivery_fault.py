@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from livebode.core import Event
+from livebode.core import Event, PublishError
 from livebode.publishing import outbox
+from tests.support.errors import refused
 from tests.support.forked import server
 from tests.support.receivers import HttpReceiver, PublishedAxis, free_port, until, webhook
 
@@ -162,3 +165,17 @@ def test_a_subscriber_only_appends_while_the_disk_is_stuck(tmp_path: Path) -> No
         assert counts["events_dropped"] == dropped
         taken = outbox.INTAKE_MAX + 900 - dropped  # the first one has the id of number 0
         until(lambda: axis.counts("hook")["events_waiting"] == taken, "the others on disk")
+
+
+def test_the_database_of_another_program_is_refused_and_not_removed(tmp_path: Path) -> None:
+    path = tmp_path / "run.outbox.sqlite"
+    with closing(sqlite3.connect(path)) as mine:
+        mine.execute("CREATE TABLE events (thesis TEXT)")
+        mine.commit()
+    before = path.read_bytes()
+    (tmp_path / "text").write_text("years of work" * 100)
+    (tmp_path / "link").symlink_to(path)
+    for place in (path, tmp_path / "link", tmp_path / "text"):
+        with refused(PublishError, "outbox-foreign", path=str(place)):
+            outbox.Outbox(place, lambda _: None)
+    assert path.read_bytes() == before

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from livebode.configuration.publish_section import PublishSection
-from livebode.publishing.exposure import exposure
+from livebode.configuration import PublishSection
+from livebode.publishing import exposure
 from tests.support.command import livebode
 from tests.support.receivers import PublishedAxis, configured, free_port
 

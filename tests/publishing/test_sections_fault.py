@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from livebode.core import ConfigError
-from livebode.publishing.publisher import sections_of
-from livebode.publishing.sink import open_sink
+from livebode.publishing import open_sink, sections_of
 from tests.support.command import livebode
 from tests.support.errors import refused
 from tests.support.receivers import HttpReceiver, configured

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from livebode.core import RecordingError
-from livebode.records.content import content_sha256, joined_sha256
+from livebode.records import content_sha256, joined_sha256
 from tests.support.errors import refused
 
 

@@ -8,6 +8,7 @@ import os
 import resource
 import subprocess
 import sys
+import threading
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -16,12 +17,11 @@ import pyarrow as pa
 import pytest
 
 from livebode.core import Block, Channel, Event
-from livebode.records import RunRecord
-from livebode.records.sample_table import as_rows, samples_of
-from livebode.records.segments import journal
-from livebode.records.segments.frames import COMMIT, to_frame
-from livebode.records.segments.limits import SegmentLimits
-from livebode.records.segments.store import Store
+from livebode.records import RunRecord, SegmentLimits, Store, as_rows, samples_of, to_frame
+from livebode.records.segments import closing, journal
+from livebode.records.segments.frames import COMMIT
+from livebode.records.segments.shelf import Shelf
+from tests.support.peers.peer import PATIENCE_S
 from tests.support.starved import on_a_limited_file
 
 ROOT = Path(__file__).parents[2]
@@ -93,6 +93,30 @@ def test_the_lost_samples_are_reported_exactly(tmp_path: Path) -> None:
     assert 0 < missing.size < 2800
     assert paused.sample == 600
     assert [e.sample for e in run.events() if e.kind == "mark"] == list(range(0, 4000, 100))
+
+
+def test_no_commit_waits_for_the_conversion_of_the_journal_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    released = threading.Event()
+
+    def slow(shelf: Shelf) -> None:
+        assert released.wait(PATIENCE_S)
+        close_journals(shelf)
+
+    close_journals = Shelf.close_journals
+    monkeypatch.setattr(Shelf, "close_journals", slow)
+    monkeypatch.setattr(closing, "_USUAL_S", 0.0)
+    limits = SegmentLimits(interval_samples=1, segment_samples=300, interval_s=0.0)
+    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+        store.begin(SUMMARY, 0, 0.0, {"state": b""})
+        assert all(_second(store, k, None, 0) for k in range(20))  # would wait here: nothing releases it
+        assert len(list((tmp_path / "run/open").glob("*.journal"))) == 2
+        released.set()
+        store._closing.wait()
+        assert _second(store, 20, None, 0)
+        store.finish(SUMMARY, {}, finished=True)
+    assert sum(table.num_rows for table in map(pa.table, RunRecord.open(tmp_path / "run").tables("samples"))) == 2100
 
 
 def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(

@@ -22,12 +22,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from livebode.core import DamageWarning, LivebodeError, RecordError
-from livebode.records import RunDirectory, RunRecord
-from livebode.records.query import query
+from livebode.records import RunDirectory, RunRecord, query, read_bytes
 from livebode.records.segments.json_lines import to_line
 from livebode.records.summary_file import to_document
-from livebode.report.pictures import save
-from livebode.report.style import style
+from livebode.report import save, style
 from livebode.runtime.segmented import make_way
 from tests.support.command import livebode
 from tests.support.damaged import StopError, commands, make_runs, record_run
@@ -190,6 +188,14 @@ def test_continuing_does_not_wait_at_a_pipe_in_place_of_the_pictures(tmp_path: P
     os.mkfifo(tmp_path / "run" / ".pictures.partial")
     with refused(RecordError, "not-own-file", path=str(tmp_path / "run" / ".pictures.partial")):
         record_run(tmp_path / "run")
+
+
+def test_a_directory_in_place_of_a_file_is_refused_and_not_left_open(tmp_path: Path) -> None:
+    (tmp_path / "tune.json").mkdir()
+    before = os.listdir("/proc/self/fd")
+    with refused(RecordError, "not-own-file", path=str(tmp_path / "tune.json")):
+        read_bytes(tmp_path, "tune.json")
+    assert os.listdir("/proc/self/fd") == before
 
 
 def test_a_picture_replaces_a_link_and_not_what_it_names(tmp_path: Path) -> None:

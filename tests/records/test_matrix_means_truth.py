@@ -12,9 +12,7 @@ from livebode.core import Lines, MatrixResponses, Responses
 from livebode.dashboard.matrix_view import views_of
 from livebode.fitting import SharedWindows, binned_means, combined
 from livebode.mimo import MatrixExcitation
-from livebode.records import RunRecord
-from livebode.records.query import query
-from livebode.records.tiers import thinned
+from livebode.records import RunRecord, query, thinned
 from livebode.runtime import Destination, run
 from tests.support.command import write_parquet
 

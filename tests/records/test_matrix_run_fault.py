@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from livebode.core import DamageWarning, RecordError
-from livebode.records import RunDirectory, RunRecord
+from livebode.records import MATRIX_TABLES, RunDirectory, RunRecord
 from livebode.records.summary_file import to_document
 from tests.support.errors import refused
 from tests.support.gantry_runs import gantry_axis, gantry_block, gantry_log, gantry_run
@@ -97,9 +97,9 @@ def test_matrices_are_equal_after_any_number_of_writes(run: Path, tmp_path: Path
     rng = np.random.default_rng(0)
     for number in range(5):
         cuts = [0, *sorted(rng.integers(0, len(whole), 3).tolist()), len(whole)]
-        with RunDirectory(tmp_path / str(number), matrix=True) as directory:
+        with RunDirectory(tmp_path / str(number), MATRIX_TABLES) as directory:
             for a, b in pairwise(cuts):
-                directory.write_matrices(whole[a:b])
+                directory.write(whole[a:b])
             directory.finish(record.summary, lambda _: None)
         assert RunRecord.open(tmp_path / str(number), matrix=True).matrix().equals(whole)
 

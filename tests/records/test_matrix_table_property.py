@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from livebode.core import Lines, MatrixResponses
-from livebode.records.matrix_table import MatrixShape, covariance_rows, matrices, matrix_rows
+from livebode.records import covariance_rows, matrix_rows
+from livebode.records.matrix_table import MatrixShape, matrices
 from livebode.tables import Table
 
 ROWS = 7

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.records import RunRecord
-from livebode.records.query import query
+from livebode.records import RunRecord, query
 from livebode.records.segments import reading
 from tests.support.failing_disk import cut, disk_that
 from tests.support.long_runs import noisy_responses, record_long

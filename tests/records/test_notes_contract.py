@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from livebode.core import RecordError
-from livebode.records.deletion import DELETED, delete
-from livebode.records.notes import NAME, Notes, read_notes, write_notes
-from livebode.records.removal import remove
+from livebode.records import Notes, delete, read_notes, remove, write_notes
+from livebode.records.deletion import DELETED
+from livebode.records.notes import NAME
 
 TEXTS = st.text(max_size=2000) | st.just("\U0001f600" * 2000) | st.just("\x00" * 2000) | st.just('"' * 2000)
 

@@ -17,11 +17,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import RecordSection
 from livebode.core import Block, Event, RecordError
 from livebode.estimation import Tracker
-from livebode.records import RunDirectory, RunRecord
-from livebode.records.grouped_events import each_event
+from livebode.records import RunDirectory, RunRecord, each_event
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.errors import refused
 from tests.support.recorded import (

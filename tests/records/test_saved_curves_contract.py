@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 
 from livebode.core import Lines, RecordError, Responses
+from livebode.records import SavedCurves, change_saved, read_saved
 from livebode.records.removal import foreign
-from livebode.records.saved_curves import ANNOTATIONS_MAX, SAVED, SavedCurves, change_saved, read_saved
+from livebode.records.saved_curves import ANNOTATIONS_MAX, SAVED
 from tests.support.errors import refused
 from tests.support.responses import any_responses, assert_same, made
 

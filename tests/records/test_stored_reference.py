@@ -11,15 +11,14 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from livebode.core import Block, Lines, RecordError
+from livebode.core import Block, Lines, RecordError, StateError
 from livebode.estimation import Tracker
 from livebode.monitoring import Baseline, Monitor
-from livebode.records import RunRecord
-from livebode.records.segments.frames import FORMAT, to_frame
-from livebode.records.segments.journal import last_commit
+from livebode.records import RUN, RunRecord, last_commit, read_summary, to_frame
+from livebode.records.segments.frames import FORMAT
 from livebode.records.segments.json_lines import to_line
 from livebode.records.segments.recovery import recover
-from livebode.records.summary_file import COPY, RUN, read_summary, to_document
+from livebode.records.summary_file import COPY, to_document
 from livebode.records.versions import VERSIONS, format_of
 from tests.support import stored, stored_matrix
 from tests.support.errors import refused
@@ -50,16 +49,25 @@ def test_an_unfinished_run_is_read_exactly(folder: Path) -> None:
     assert run.damages == []
 
 
-def test_its_state_continues_with_the_responses_of_a_run_without_end() -> None:
+def test_its_state_of_an_older_version_is_refused() -> None:
     commit = last_commit(STORED[-1] / "segments")
     assert commit is not None
     assert (commit.sample, commit.events_bytes, commit.waiting) == (650, 263, ())
+    with refused(StateError, "older-version", name="repeating-errors"):
+        Tracker(stored.SETTINGS).restore(commit.states["tracker"])
+
+
+def test_the_state_of_such_a_run_continues_with_the_responses_of_a_run_without_end(tmp_path: Path) -> None:
+    stored.in_segments(tmp_path / "segments")
+    commit = last_commit(tmp_path / "segments")
+    assert commit is not None
+    assert 0 < commit.sample < stored.ENDS_AT
     tracker = Tracker(stored.SETTINGS)
     tracker.restore(commit.states["tracker"])
-    rest = tracker.process(Block(stored.data()[:, 650:], NAMES, stored.RATE_HZ, start=650))
+    rest = tracker.process(Block(stored.data()[:, commit.sample :], NAMES, stored.RATE_HZ, start=commit.sample))
     whole = Tracker(stored.SETTINGS).process(Block(stored.data(), NAMES, stored.RATE_HZ))
     for name in stored.ARRAYS:
-        np.testing.assert_allclose(getattr(rest, name), getattr(whole[whole.sample >= 650], name), rtol=1e-12)
+        np.testing.assert_allclose(getattr(rest, name), getattr(whole[whole.sample >= commit.sample], name), rtol=1e-12)
 
 
 def test_a_finished_run_is_read_exactly(folder: Path) -> None:

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.records import table_file
-from livebode.records.table_file import ColumnTable, TableFile
+from livebode.records import ColumnTable, table_file
+from livebode.records.table_file import TableFile
 from livebode.tables import Schema, Table
 from tools.parquet_parts import parts_of
 

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from livebode.records import Writer, last_commit
 from livebode.records.segments import disk, writer
-from livebode.records.segments.journal import last_commit
 from livebode.records.segments.phase import Phase
-from livebode.records.segments.writer import Writer
 from tests.support.peers.peer import PATIENCE_S
 from tests.support.recorded import RATE_HZ, check_whole, machine, record_machine
 

@@ -8,11 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from livebode.cli.pictures import tracked_amount
 from livebode.core import Lines, Responses
 from livebode.drawing import quantiles, unwrapped
-from livebode.report import bode_figure, terminal_bode, tracking_figure
+from livebode.preparation import ChannelCheck
+from livebode.report import bode_figure, spread, terminal_bode, tracking_figure, with_holes
 from livebode.report.summary import BOUND_C, PROBABILITY
-from livebode.report.tracking import is_falling, spread, with_holes
+from livebode.report.tracking import is_falling
+from livebode.runtime.run_counts import RunCounts
 
 LINES = Lines.parse("20:140:20", rate_hz=4000, window=400)
 
@@ -189,6 +192,27 @@ def test_the_terminals_text_is_the_same_each_time_and_colour_only_adds_to_it() -
     assert terminal_bode(resonant(), 90, 30, colour=False) == plain
     assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == plain
     assert "\x1b" not in plain
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_counts_beside_each_other_agree(seed: int) -> None:
+    """Responses with a valid and with an invalid line: some have both, and together they are all of them."""
+    run, rng = resonant(), np.random.default_rng(seed)
+    valid = rng.random(run.valid.shape) < rng.random((len(run), 1))
+    valid[: int(rng.integers(3))] = False
+    run = replace(run, valid=valid)
+    counts = RunCounts(ChannelCheck((), ""), 0.0)
+    counts.take(run.valid, 0.0)
+    shown = re.search(r"median of (\d+) responses? with a valid line", terminal_bode(run, colour=False))
+    assert shown is not None
+    with_both = int(np.count_nonzero(valid.any(axis=1) & ~valid.all(axis=1)))
+    assert int(shown[1]) + counts.invalid - with_both == counts.responses
+    summary = {
+        "counts": {"responses": counts.responses, "invalid_responses": counts.invalid, "gaps": 0, "samples": 1},
+        "speed": {"recorded_s": 1.0, "run_s": 1.0},
+        "found": {"frequency_hz": run.lines.frequency_hz, "hop": 1, "rate_hz": 1.0},
+    }
+    assert f"{counts.invalid} of them with an invalid line" in tracked_amount(summary)
 
 
 def test_the_terminal_breaks_the_curve_where_a_line_is_not_valid() -> None:

@@ -12,16 +12,19 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pypdf import PdfReader
 from pypdf.generic import DictionaryObject
 
-from livebode.core.document import Document, Picture, PrintedTable
+from livebode.core import Document, Picture, PrintedTable
 from livebode.fitting import mean_response
 from livebode.records import RunRecord
+from livebode.report import pictures_svg
 from livebode.report.figures import drawn
-from livebode.report.svg import pictures_svg
-from livebode.reporting.compare_report import Comparison
+from livebode.reporting import Comparison
 from livebode.reporting.run_report import run_report
+from livebode.reporting.wording import polar_phrase
 from tests.support.command import livebode
 from tests.support.loop_runs import AXIS, record
 from tests.support.reports import LINES, Page, measured, plant, strokes, write_run
@@ -260,6 +263,16 @@ def _elements(element: DictionaryObject) -> Iterator[DictionaryObject]:
     for one in inner if isinstance(inner, list) else [inner]:
         if isinstance(one.get_object(), DictionaryObject):
             yield from _elements(one.get_object())
+
+
+@given(st.complex_numbers(min_magnitude=1e-6, max_magnitude=1e6), st.floats(0, 1e7) | st.just(np.inf) | st.just(np.nan))
+def test_a_ratio_with_an_open_bound_is_described_by_what_is_known(ratio: complex, bound: float) -> None:
+    words = polar_phrase(ratio, bound)
+    assert "unbounded" not in words
+    assert ("±" in words) == (bound < abs(ratio))
+    if abs(ratio) <= bound < np.inf:
+        most_db = float(words.removeprefix("at most ").split(" dB")[0])
+        assert most_db == pytest.approx(20 * np.log10(abs(ratio) + bound), abs=0.006)
 
 
 def test_the_svg_draws_the_numbers() -> None:

@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from livebode.analysis.difference import Difference
-from livebode.core import Event
-from livebode.core.clock import date_and_time
+from livebode.analysis import Difference
+from livebode.core import Event, date_and_time
 from livebode.fitting import mean_response
-from livebode.report.html import to_html
-from livebode.reporting.compare_report import Comparison
+from livebode.report import to_html
+from livebode.reporting import Comparison
 from livebode.reporting.run_report import run_report
 from tests.support.reports import measured, write_run
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.configuration.axes import axes_of
+from livebode.configuration import axes_of
 from livebode.core import ConfigError, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.records import RunRecord

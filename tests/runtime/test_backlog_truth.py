@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.records import RunRecord
-from livebode.records.grouped_events import each_event
+from livebode.records import RunRecord, each_event
 from livebode.sources.live.inbox import INBOX_S_MAX, Inbox
 from tests.support.live_session import LiveSession, Stuck, hurried
 from tests.support.peers.peer import PATIENCE_S, RATE_HZ, batches, until

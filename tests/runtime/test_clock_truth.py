@@ -13,13 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.configuration import Axis
-from livebode.core import ConfigError, Event, UsageError
-from livebode.core.clock import RunClock, date_and_time, moment, moment_of_start, moments_by
+from livebode.core import ConfigError, Event, RunClock, UsageError, date_and_time, moment, moment_of_start, moments_by
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
-from livebode.records import RunRecord
-from livebode.records.query import query
-from livebode.records.summary_file import RUN, to_document
+from livebode.records import RUN, RunRecord, query
+from livebode.records.summary_file import to_document
 from livebode.runtime import Destination, run
 from livebode.runtime.clock_relation import STEP_S, ClockRelation
 from livebode.sources import open_log

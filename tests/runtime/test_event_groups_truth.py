@@ -12,13 +12,12 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import RecordSection
 from livebode.core import Block, Channel, Event, Lines
 from livebode.dashboard.notices import EventCauses, event_id
 from livebode.estimation import Settings, Tracker
-from livebode.records import RunRecord
-from livebode.records.grouped_events import each_event, event_counts, event_rows
-from livebode.records.query import query
+from livebode.records import RunRecord, each_event, event_counts, query
+from livebode.records.grouped_events import event_rows
 from livebode.reporting.event_summary import EventSummary
 from livebode.runtime import Document
 from livebode.runtime.event_groups import AT_ONCE, CAUSES, EXACT_MAX, QUIET_S, REPORT_S, EventGroups

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from livebode.analysis.averaged import averaged
-from livebode.core import Block, Channel, Event, Lines
-from livebode.core.state import Stage, decode
+from livebode.analysis import averaged
+from livebode.core import Block, Channel, Event, Lines, Stage, decode
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.records import RunRecord
-from livebode.records.segments.journal import Commit, last_commit
-from livebode.records.summary_file import COPY, RUN, to_document
+from livebode.records import RUN, RunRecord, last_commit
+from livebode.records.segments.journal import Commit
+from livebode.records.summary_file import COPY, to_document
 from livebode.runtime.live_checks import LiveChecks
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 from livebode.sources.live import Batch, encode_layout

@@ -14,10 +14,8 @@ import numpy as np
 import pytest
 
 from livebode.core import Channel, Event
-from livebode.runtime import Document
-from livebode.runtime.documents import RunStarted
-from livebode.sources.live import Batch, encode_layout, encode_samples
-from livebode.sources.live.ndjson import encode_line
+from livebode.runtime import Document, RunStarted
+from livebode.sources.live import Batch, encode_layout, encode_line, encode_samples
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.live_runs import started, table
 from tests.support.live_session import LiveSession

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.core import Block, Channel, ConfigError, GridError, Lines, SpectraLayout
 from livebode.estimation import Settings
 from livebode.excitation import multisine

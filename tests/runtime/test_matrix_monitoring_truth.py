@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 
 import livebode
-from livebode.configuration import Axis
-from livebode.configuration.recipe import recipe_id
+from livebode.configuration import Axis, recipe_id
 from livebode.core import BaselineError, ConfigError, Event, Lines, LivebodeError, StateError, UsageError
+from livebode.dashboard import Quantities
 from livebode.dashboard.overlays import overlays_of
-from livebode.dashboard.quantities import Quantities
 from livebode.mimo import MatrixExcitation, MatrixMonitor, mean_matrix
 from livebode.publishing.feed import AxisFeed
-from livebode.runtime import Destination, run
-from livebode.runtime.matrix_pipeline import MatrixPipeline
+from livebode.runtime import Destination, ResponseMatrix, run
 from livebode.simulation import Gantry, GantryLoop
 from tests.support.command import livebode as command
 from tests.support.command import write_parquet
@@ -152,9 +150,9 @@ def test_a_healthy_machine_stays_silent_at_the_stated_rate(folder: Path) -> None
 
 def test_the_cut_of_the_samples_changes_no_event(folder: Path, weak: livebode.Run) -> None:
     configured = axis(folder, "weak", compared(folder))
-    pipeline, found = MatrixPipeline.of(configured, RATE_HZ), list[Event]()
+    estimate, found = ResponseMatrix.of(configured, RATE_HZ), list[Event]()
     for block in livebode.open_log(folder / "weak.parquet").blocks(list(NAMES), block_samples=777):
-        found += pipeline.detection.process(pipeline.tracker.process(block))
+        found += estimate.detection.process(estimate.tracker.process(block))
     assert found == changes(weak)
 
 
@@ -260,19 +258,19 @@ def test_what_does_not_fit_is_refused_at_the_start(
     Path("odd.toml").write_text("mass = 1\n")
     configured = axis(folder, "weak", **({"monitoring": {"baseline": Path("healthy")}} | sections))
     with pytest.raises(kind, match=message):
-        MatrixPipeline.of(configured, RATE_HZ)
+        ResponseMatrix.of(configured, RATE_HZ)
 
 
 def test_another_configuration_continues_the_alarms_of_the_same_baseline(folder: Path, weak: livebode.Run) -> None:
     """A live axis whose [report] was edited: what was reported is not reported again."""
     configured = axis(folder, "weak", compared(folder))
     before, after, other = (
-        MatrixPipeline.of(one, RATE_HZ)
+        ResponseMatrix.of(one, RATE_HZ)
         for one in (configured, configured, axis(folder, "weak", compared(folder, false_alarm_interval_days=1.0)))
     )
     before.detection.process(weak.matrix)
-    for pipeline in (after, other):
-        assert pipeline.take_over(before)
+    for estimate in (after, other):
+        assert estimate.take_over(before)
     assert after.detection.summary() == before.detection.summary()
     assert other.detection.summary()["changes"] == 0
 

@@ -11,8 +11,7 @@ import pytest
 from livebode.configuration import Axis
 from livebode.core import ConfigError, Event, MatrixResponses
 from livebode.records import RunRecord
-from livebode.runtime import Destination, run
-from livebode.runtime.readiness import ENDED, SUPPRESSED
+from livebode.runtime import ENDED, SUPPRESSED, Destination, run
 from livebode.simulation import GantryLoop
 from tests.support.command import write_parquet
 from tests.support.errors import refused
@@ -23,7 +22,7 @@ OFF = (2 * CYCLE + 1000, 2 * CYCLE + SETTLE * WINDOW + 300)
 """The drive is off until a window has begun: all windows of this experiment have its transient."""
 STATUS_WORD = {"ready_mask": 0x6F, "ready_value": 0x27}
 AVERAGE = SECTIONS["tracking"] | {"average": True}
-ADJUSTED = (3 * CYCLE, 6 * CYCLE - 300)
+ADJUSTED = (3 * CYCLE - 600, 6 * CYCLE - 300)
 """Somebody works at the machine for a whole matrix that is compared with the baseline."""
 
 
@@ -31,13 +30,14 @@ ADJUSTED = (3 * CYCLE, 6 * CYCLE - 300)
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Recordings whose second speed is wrong until shortly after the drive was off, and the run `healthy`."""
     folder = tmp_path_factory.mktemp("ready")
-    block = gantry_block(repetitions=9)
+    block = gantry_block(repetitions=36)  # a baseline of fewer shows large changes only
     columns = {"t [s]": np.arange(len(block)) / RATE_HZ} | {name: block[name].copy() for name in NAMES}
     gantry_run(folder, "healthy", columns)
+    columns = {name: values[: 9 * CYCLE] for name, values in columns.items()}
     for name, (begin, end), factor in (("log", OFF, 3), ("adjusted", ADJUSTED, 1.1)):
-        status = np.full(len(block), 0x1637)
+        status = np.full(9 * CYCLE, 0x1637)
         status[begin:end] = 0x1633
-        wrong = block["velocity2"].copy()
+        wrong = columns["velocity2"].copy()
         wrong[begin - 200 : end + 200] *= factor
         write_parquet(folder / f"{name}.parquet", columns | {"status": status, "velocity2": wrong})
     return folder

@@ -9,16 +9,13 @@ import numpy as np
 import pytest
 
 import livebode
-from livebode.configuration import Axis
-from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration import Axis, recorded_configuration
 from livebode.core import Block, Channel, ConfigError, RecordError, SignalError
 from livebode.mimo import MatrixSettings, MatrixTracker
 from livebode.records import RunRecord
-from livebode.runtime import Destination, Document, run
-from livebode.runtime.documents import TrackerResults
+from livebode.runtime import Destination, Document, TrackerResults, run
 from livebode.simulation import GantryLoop
-from livebode.sources.live import Batch
-from livebode.sources.live.ndjson import encode_line
+from livebode.sources.live import Batch, encode_line
 from tests.support.command import write_parquet
 from tests.support.errors import refused
 from tests.support.gantry_runs import (

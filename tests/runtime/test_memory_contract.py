@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import RecordSection
 from livebode.core import Block, Channel, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.runtime.event_groups import REPEATS_MAX

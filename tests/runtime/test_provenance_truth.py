@@ -14,14 +14,11 @@ import numpy as np
 import pytest
 
 from livebode import Run
-from livebode.configuration import Axis
-from livebode.configuration.recipe import recipe_id
-from livebode.core import RecordError
-from livebode.core.state import ENCODING
-from livebode.records import RunRecord
-from livebode.records.summary_file import COPY, RUN, to_document
+from livebode.configuration import Axis, recipe_id
+from livebode.core import ENCODING, RecordError
+from livebode.records import RUN, RunRecord
+from livebode.records.summary_file import COPY, to_document
 from livebode.runtime import Destination, run
-from livebode.runtime.output_only import run_output_only
 from livebode.version import __version__
 from tests.support.command import signals, write_csv, write_parquet
 from tests.support.errors import refused
@@ -133,7 +130,7 @@ def test_an_output_only_run_is_dated_and_named(tmp_path: Path) -> None:
     path = write_parquet(tmp_path / "log.parquet", {"t": UTC_S + np.arange(y.size) / RINGING_HZ, "y": y})
     data = {"source": {"log": str(path)}, "signals": {"output": "y"}, "output_only": {}}
     axis = Axis.of(data | {"machine": {"line": "2"}}, "test")
-    run_output_only(axis, tmp_path / "run", lambda _: None)
+    run(axis, Destination(tmp_path / "run", lambda *_: None))
     summary = RunRecord.open(tmp_path / "run", output_only=True).summary
     assert (summary["machine"], summary["recipe"]) == ({"line": "2"}, recipe_id(axis))
     assert summary["content"]["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()

@@ -14,14 +14,12 @@ import pytest
 
 from livebode import example_axis
 from livebode.analysis.fits import fit_run
-from livebode.configuration import Axis
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.loop_section import LoopSection, PIDSection
+from livebode.configuration import Axis, FitSection, LoopSection, PIDSection
 from livebode.core import Block, Channel, ConfigError, Event, PlantKinds, RecordingError, SourceError, SpectraLayout
 from livebode.estimation import Settings, Tracker
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
-from livebode.records import RunRecord
-from livebode.records.summary_file import RUN, to_document
+from livebode.records import RUN, RunRecord
+from livebode.records.summary_file import to_document
 from livebode.runtime import Destination, run
 from livebode.sources import open_log
 from livebode.sources.live import SourceSettings, SpectraBatch, open_source

@@ -15,18 +15,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode import Responses, learn
-from livebode.analysis.averaged import mean_of
-from livebode.configuration import Axis
-from livebode.configuration.ready import ReadyCondition
+from livebode.analysis import mean_of
+from livebode.configuration import Axis, ReadyCondition
 from livebode.core import Block, Channel, ConfigError, Event, Lines, SpectraLayout
-from livebode.monitoring.alarm_kinds import ALARMS
+from livebode.monitoring import ALARMS
 from livebode.preparation.spectra_plan import check_spectra
 from livebode.records import RunRecord
 from livebode.reporting.report_data import read
 from livebode.reporting.verdict import verdict
-from livebode.runtime import Destination, run
-from livebode.runtime.documents import TrackerResults
-from livebode.runtime.readiness import ENDED, SUPPRESSED, Readiness
+from livebode.runtime import ENDED, SUPPRESSED, Destination, TrackerResults, run
+from livebode.runtime.readiness import Readiness
 from livebode.simulation import TensionLoss
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from tests.support.adjusted import (

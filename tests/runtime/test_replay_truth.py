@@ -15,21 +15,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.analysis.learning import learn
-from livebode.configuration.axis import Axis
-from livebode.core import BaselineError, Channel, RecordError, Responses
-from livebode.core.clock import RunClock
+from livebode.analysis import learn
+from livebode.configuration import Axis
+from livebode.core import BaselineError, Channel, RecordError, Responses, RunClock
 from livebode.estimation import Settings, Tracker
 from livebode.records import RunRecord
 from livebode.records.summary_file import to_document
-from livebode.runtime import Document, RunControl, run
-from livebode.runtime.destination import Destination
-from livebode.runtime.documents import TrackerResults
-from livebode.runtime.recorded_run import RecordedRun
-from livebode.sources.live import Batch, SourceSettings
-from livebode.sources.live.address import Address
-from livebode.sources.live.ndjson import encode_line
-from livebode.sources.live.replayable import ReplaySource, SenderSample
+from livebode.runtime import Destination, Document, RecordedRun, RunControl, TrackerResults, run
+from livebode.sources.live import Address, Batch, ReplaySource, SenderSample, SourceSettings, encode_line
 from tests.support.command import LINES, RATE_HZ, livebode, signals
 from tests.support.errors import refused
 from tests.support.live_runs import table

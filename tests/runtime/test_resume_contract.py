@@ -9,15 +9,11 @@ import pyarrow as pa
 import pytest
 
 from livebode import MotionCorrection, Tracker
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.record_section import RecordSection
-from livebode.estimation.stream_estimator import Follower
+from livebode.configuration import FitSection, RecordSection
+from livebode.estimation import Follower
 from livebode.monitoring import Baseline, Monitor
 from livebode.records import RunRecord
-from livebode.runtime import Document, Outcome
-from livebode.runtime.change_detection import ChangeDetection
-from livebode.runtime.documents import TrackerResults
-from livebode.runtime.fits import Fits
+from livebode.runtime import ChangeDetection, Document, Fits, Outcome, TrackerResults
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 from tests.support.axes import MULTISINE
 from tests.support.monitored import machine

@@ -46,7 +46,7 @@ def test_an_edit_that_brings_a_secret_is_not_repeated(tmp_path: Path, monkeypatc
         login = 'username = "plc"\npassword_env = "PLC_PASSWORD"'
         text = f'[source]\nurl = "mqtt://127.0.0.1:{broker.port}/t"\n{login}{ONE_LINE_DIRECT}'
         sender = publisher(broker.port)
-        with Running(tmp_path, text, "--log-level", "debug") as running:
+        with Running(tmp_path, text, log_level="debug") as running:
             until(lambda: broker.logged("Sending SUBACK"), "a subscription")
             sender.publish("t", encode_layout(CHANNELS, RATE_HZ), qos=1).wait_for_publish(10)
             for batch in batches(60):

@@ -11,10 +11,8 @@ import pytest
 from livebode.configuration import Axis
 from livebode.core import ConfigError, LivebodeError, RecordingError
 from livebode.records import RunRecord
-from livebode.runtime import Destination, StoppedError, run
-from livebode.runtime.documents import TrackerResults
-from livebode.runtime.run_control import RunControl
-from livebode.simulation.two_mass_loop import TwoMassPlant
+from livebode.runtime import Destination, RunControl, StoppedError, TrackerResults, run
+from livebode.simulation import TwoMassPlant
 from tests.support.command import livebode
 from tests.support.errors import refused
 from tests.support.uneven import LINES, stamped, write_csv, write_mdf, write_ulog

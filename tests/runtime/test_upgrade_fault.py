@@ -14,12 +14,11 @@ import pytest
 
 from livebode.configuration import Axis
 from livebode.core import RecordError, StateError
-from livebode.records import RunRecord
-from livebode.records.segments.frames import COMMIT, frames, to_frame
-from livebode.records.segments.journal import Commit, last_commit
-from livebode.records.summary_file import COPY, RUN, from_document, to_document
-from livebode.runtime import Destination, run
-from livebode.runtime.documents import Document, TrackerResults
+from livebode.records import RUN, RunRecord, frames, last_commit, to_frame
+from livebode.records.segments.frames import COMMIT
+from livebode.records.segments.journal import Commit
+from livebode.records.summary_file import COPY, from_document, to_document
+from livebode.runtime import Destination, Document, TrackerResults, run
 from livebode.version import __version__
 from tests.support.command import signals, write_parquet
 from tests.support.errors import refused
@@ -124,7 +123,7 @@ def by(name: str) -> Callable[[dict[str, Any]], None]:
         (
             {"versions": -1}, "older-version",
             f"the state of 'tracker' has version 0, written by livebode 9.8.7; this is livebode {__version__}, which "
-            "reads from version 1 on; finish the run with livebode 9.8.7, or start a new run",
+            "reads version 1; finish the run with livebode 9.8.7, or start a new run",
         ),
         (
             {"versions": 1, "livebode": None}, "newer-version",

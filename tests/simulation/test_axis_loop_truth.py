@@ -12,6 +12,7 @@ from livebode.simulation import (
     BeltAxis,
     BeltResponse,
     Drive,
+    Engine,
     Friction,
     Mechanics,
     Sensor,
@@ -20,10 +21,9 @@ from livebode.simulation import (
     Truth,
     TwoMassLoop,
     TwoMassPlant,
+    engine_settings,
     linear,
 )
-from livebode.simulation._axis import Engine
-from livebode.simulation.configuration import engine_settings
 from tests.support.axes import LINES, MULTISINE, RATE_HZ
 
 SETTLED_S = 20.0

@@ -12,8 +12,8 @@ import pytest
 from numpy._core._multiarray_umath import __cpu_features__
 from numpy.typing import NDArray
 
-from livebode.motion.replay import late
-from livebode.simulation.open_belt import Pair, open_belt
+from livebode.motion import late
+from livebode.simulation import Pair, open_belt
 
 Floats = NDArray[np.float64]
 

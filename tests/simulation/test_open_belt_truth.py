@@ -7,12 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from livebode.core import SimulationError
-from livebode.simulation._axis import Engine
-from livebode.simulation.configuration import BeltAxis, engine_settings
-from livebode.simulation.mechanics import Mechanics
-from livebode.simulation.motion import Standstill
-from livebode.simulation.open_belt import Pair, open_belt
-from livebode.simulation.settings import Drive
+from livebode.simulation import BeltAxis, Drive, Engine, Mechanics, Pair, Standstill, engine_settings, open_belt
 from tests.support.errors import refused
 
 RATE_HZ, RADIUS_M = 4000.0, 0.019

@@ -23,10 +23,11 @@ from livebode.simulation import (
     SimulatedAxis,
     SoftSpot,
     TensionLoss,
+    engine_settings,
 )
-from livebode.simulation.configuration import engine_settings
-from livebode.simulation.twin import Controller, Now, Plant
+from livebode.simulation.controller import Controller, Now
 from tests.support.axes import MULTISINE, compiled, fast_stroke
+from tests.twins.plant import Plant
 
 ROOT = Path(__file__).parents[2]
 

@@ -1,4 +1,4 @@
-"""What every live source must hold, each against a real peer. A new kind needs a line in MODULES and a peer here."""
+"""What every live source must hold, each against a real peer. A new kind needs a line in a table and a peer here."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from livebode.core import SourceError
+from livebode.plugins import named
 from livebode.sources.live import KINDS, LiveBlock, LiveSource
-from livebode.sources.live.opening import MODULES
 from tests.support.errors import refused
 from tests.support.peers.broker import Mqtt311Peer, MqttPeer
 from tests.support.peers.can_bus import CanPeer
@@ -79,9 +79,9 @@ def is_truth(blocks: list[LiveBlock]) -> None:
 
 
 def test_every_kind_has_a_peer():
-    # These do not send what they are told to: test_klipper_truth.py, test_daq_truth.py, test_hal_truth.py.
+    # These do not send what they are told to: test_klipper_truth.py, test_daq_truth.py, test_hal_truth.py of the wing.
     own = {"klipper", "daqref", "daq.nd", "hal"}
-    assert {name.split("-")[0] for name in PEERS} | {"mqtts"} | own == MODULES.keys()
+    assert {name.split("-")[0] for name in PEERS} | {"mqtts"} | own == named("sources").keys()
 
 
 def test_the_same_samples_come_back_bit_for_bit(peer):

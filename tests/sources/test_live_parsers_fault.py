@@ -18,22 +18,26 @@ import pytest
 from livebode.core import Channel, ConfigError, LivebodeError, SourceError, Spectra, SpectraLayout
 from livebode.estimation import Settings, SpectraTracker
 from livebode.sources.live import (
+    FRAME_BYTES_MAX,
+    LINE_BYTES_MAX,
     Batch,
     FrameDecoder,
+    FrameSplitter,
+    LineDecoder,
+    LineSplitter,
     Sequencer,
+    SourceEvents,
     SourceSettings,
     SpectraBatch,
+    check_keys,
     encode_layout,
+    encode_line,
     encode_samples,
     encode_spectra,
     encode_spectra_layout,
+    parse_address,
 )
-from livebode.sources.live.address import parse_address
-from livebode.sources.live.framing import FRAME_BYTES_MAX, HEADER, FrameSplitter
-from livebode.sources.live.lines import LineSplitter
-from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder, encode_line
-from livebode.sources.live.settings import check_keys
-from livebode.sources.live.source_events import SourceEvents
+from livebode.sources.live.framing import HEADER
 from livebode.sources.live.spectra_frame import read_spectra_text, spectra_text
 from tests.support.damaged_bytes import damaged, one_sentence
 from tests.support.errors import refused

@@ -1,4 +1,4 @@
-"""What every reader must hold. A new format needs a line in FORMATS and a writer in
+"""What every reader must hold. A new format needs a line in a table and a writer in
 tests/support/recordings.py; all of this then covers it."""
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from livebode.core import RecordingError
-from livebode.sources.formats import FORMATS
+from livebode.sources.formats import all_formats
 from tests.support.errors import refused
 from tests.support.recordings import CLOCKS, OWN_RATE, RATE_HZ, WRITERS, names, open_log, signals, with_time, write
 
@@ -27,7 +27,7 @@ def read(module: str, path: Path, **options: object) -> dict[str, np.ndarray]:
 
 
 def test_every_format_has_a_writer():
-    assert {format_.module for format_ in FORMATS} == WRITERS.keys()
+    assert {format_.reader.partition(":")[0].rpartition(".")[2] for format_ in all_formats()} == WRITERS.keys()
 
 
 @pytest.mark.parametrize("module", MODULES)

@@ -16,9 +16,8 @@ import pyarrow.parquet as pq
 import pytest
 import scipy.io
 
-from livebode.core import ExtraError, RecordingError, UsageError
-from livebode.core.installing import install_command
-from livebode.sources import sinumerik_spectra
+from livebode.core import ExtraError, RecordingError, UsageError, install_command
+from livebode_drives.recordings.sinumerik import sinumerik_spectra
 from tests.support.bad_recordings import drain, refusal, text
 from tests.support.errors import refused
 from tests.support.recordings import open_log, signals, write

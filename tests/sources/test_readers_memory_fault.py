@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from livebode.core import RecordingError
-from livebode.sources.safexml import parse
+from livebode_drives.recordings.safexml import parse
 from tests.support.bad_recordings import drain, survives, text
 from tests.support.errors import refused
 from tests.support.recordings import WRITERS, open_log, signals, write

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import duckdb
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import RecordingError
-from livebode.preparation.inspection import inspect
+from livebode.preparation import inspect
 from livebode.sources import Log, open_log
 from tests.support.errors import refused
 
@@ -35,6 +34,8 @@ def samples(log: Log, name: str) -> list[float]:
 
 def sniffed(path: Path) -> tuple[str, list[str], list[str]]:
     """Delimiter, names and types of the columns as DuckDB detects them."""
+    import duckdb
+
     row = duckdb.sql(f"select Delimiter, Columns from sniff_csv('{path}')").fetchall()[0]
     return row[0], [column["name"].strip() for column in row[1]], [column["type"] for column in row[1]]
 

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import RecordingError
-from livebode.preparation.inspection import inspect
+from livebode.preparation import inspect
 from livebode.sources import Log, open_log
 from tests.support.errors import refused
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.sources import open_log, sinumerik_spectra
+from livebode.sources import open_log
+from livebode_drives.recordings.sinumerik import sinumerik_spectra
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"the real recordings are not in {DATA}")

@@ -8,10 +8,10 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from livebode.kernel import NO_MOMENT
+from livebode.sources import Dialect
 from livebode.sources.cells import CellKind
-from livebode.sources.dialect import Dialect
 from livebode.sources.rows import RowError, RowReader
+from livebode.tables import NO_MOMENT
 
 CELLS = st.one_of(
     st.floats().map(repr),

@@ -11,10 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Channel, SpectraLayout
-from livebode.sources.live import Batch, LiveBlock, Position, Sequencer, SpectraBatch
-from livebode.sources.live.computer_clock import ClockReading
-from livebode.sources.live.source_events import SourceEvents
-from livebode.sources.live.spectra_batch import AnyBatch, LiveSpectra
+from livebode.sources.live import (
+    AnyBatch,
+    Batch,
+    ClockReading,
+    LiveBlock,
+    LiveSpectra,
+    Position,
+    Sequencer,
+    SourceEvents,
+    SpectraBatch,
+)
 from tests.support.stateful import bits
 
 RATE_HZ, HOP, WINDOW = 1000.0, 20, 60

@@ -10,10 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Channel, SpectraLayout
-from livebode.sources.live import Batch, LiveBlock, Sequencer, SpectraBatch
-from livebode.sources.live.joined import joined
-from livebode.sources.live.source_events import SourceEvents
-from livebode.sources.live.spectra_batch import AnyBatch, LiveSpectra
+from livebode.sources.live import (
+    AnyBatch,
+    Batch,
+    LiveBlock,
+    LiveSpectra,
+    Sequencer,
+    SourceEvents,
+    SpectraBatch,
+    join_blocks,
+)
 from tests.support.displaced import displaced
 
 CHANNELS = (Channel("w", "N m"), Channel("y"))
@@ -59,7 +65,7 @@ def test_batches_that_wait_give_the_blocks_of_one_by_one(spectra, stamped, lengt
     events = SourceEvents(), SourceEvents()
     single, together = (Sequencer(one, reorder=bound) for one in events)
     for a, b in pairwise([0, *sorted(cuts), len(order)]):
-        one_by_one = joined([block for batch in order[a:b] for block in single.push(batch)])
+        one_by_one = join_blocks([block for batch in order[a:b] for block in single.push(batch)])
         assert plain(together.push_together(order[a:b])) == plain(one_by_one)
         assert together.snapshot() == single.snapshot()
     assert plain(together.finish()) == plain(single.finish())

@@ -10,10 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Channel, SpectraLayout
-from livebode.sources.live import Batch, Sequencer, SpectraBatch
+from livebode.sources.live import Batch, LiveSpectra, Sequencer, SourceEvents, SpectraBatch
 from livebode.sources.live.sequencer import JUMP_S
-from livebode.sources.live.source_events import SourceEvents
-from livebode.sources.live.spectra_batch import LiveSpectra
 from tests.support.displaced import displaced
 
 WINDOW, RATE_HZ = 60, 4000.0

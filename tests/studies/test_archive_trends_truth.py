@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from livebode.simulation.machine_year import MachineYear
+from livebode_plant.trending.machine_year import MachineYear
 from studies.archive_trends import Tally, false_share
 
 MACHINES = 120

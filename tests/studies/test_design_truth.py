@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from livebode.experiment_design import belt_machine, peaks, worst
-from livebode.experiment_design.waveform import Waveform
+from livebode.experiment_design import Waveform, belt_machine, peaks, worst
 from livebode.simulation import extremes
 from studies.design import MOVING, STANDSTILL
 

@@ -1,4 +1,4 @@
-"""A small campaign of faults against a fleet with Dask's workers: nothing is missing, doubled or different."""
+"""A small campaign of faults against a fleet of processes: nothing is missing, doubled or different."""
 
 from __future__ import annotations
 

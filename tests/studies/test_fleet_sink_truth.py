@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from bench.fleet_sink import BEGIN_S, messages, tracked
-from livebode.fleet.settings import SinkSection
-from livebode.fleet.sink_tables import SinkTables
-from livebode.lake import Lake
+from livebode_plant.fleet.settings import SinkSection
+from livebode_plant.fleet.sink_tables import SinkTables
+from livebode_plant.lake import Lake
 
 SECONDS = 150.0
 
@@ -26,7 +26,7 @@ def test_responses_are_deleted_after_their_time_and_their_means_remain(tmp_path:
     means, fitted = lake.read("fleet_responses_minute"), lake.read("fleet_parameters_minute")
     assert sorted(means["responses"].to_pylist()) == [84, 84, 120, 120]
     assert sorted(fitted["fits"].to_pylist()) == [84] * 4 + [120] * 4
-    files = len(list((tmp_path / "fleet_responses").glob("*.parquet")))
+    files = len(list((tmp_path / "tables" / "fleet_responses").glob("*.parquet")))
     older = SinkTables(settings.model_copy(update={"full_rate_days": 7.0}))
     assert older.resume(BEGIN_S) == 1  # the hour is open
     older.process(everything)
@@ -35,4 +35,4 @@ def test_responses_are_deleted_after_their_time_and_their_means_remain(tmp_path:
     again = lake.read("fleet_responses_minute")  # in another order, since the files of the day were joined
     assert sorted(map(str, again.to_pylist())) == sorted(map(str, means.to_pylist()))
     assert lake.read("fleet_runs").num_rows == 2
-    assert len(list((tmp_path / "fleet_responses").glob("*.parquet"))) >= files  # for those who read them still
+    assert len(list((tmp_path / "tables" / "fleet_responses").glob("*.parquet"))) >= files  # for readers

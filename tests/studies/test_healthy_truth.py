@@ -20,6 +20,8 @@ def test_cogging_and_a_delay_are_learned_and_raise_no_alarm() -> None:
     learned = learn_machine([lambda: blocks], LINES, input="u", output="velocity", schedule="x", radius_m=RADIUS_M)
     assert learned.ripple.cycles_per_m == pytest.approx([COGGING_PER_M], abs=0.4)
     assert learned.ripple.amplitude_n_m == pytest.approx([0.05 / np.sqrt(2)], rel=0.2)
+    assert learned.ripple.peak_n_m == pytest.approx([0.05], rel=0.08)
     assert learned.delay_s * RATE_HZ == pytest.approx(1.5, abs=0.02)
     assert healthy_run(machine_with, learned, 20_000) == []
-    assert trial(machine_with, learned, 40_001) == "stiffness"
+    # Detected in 95 %: fewer than five of six by chance in 3 %.
+    assert [trial(machine_with, learned, seed) for seed in range(40_001, 40_007)].count("stiffness") >= 5

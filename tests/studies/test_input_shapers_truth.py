@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, SimulatedAxis, Strokes
-from livebode.tuning.input_shaper import InputShaper, ModeRange, chosen, ei, optimised, shapers, zv, zvd
-from livebode.tuning.shaper_text import c_header, klipper_text, structured_text
+from livebode_control.tuning.input_shaper import InputShaper, ModeRange, chosen, ei, optimised, shapers, zv, zvd
+from livebode_control.tuning.shaper_text import c_header, klipper_text, structured_text
 
 RATE_HZ = 4000.0
 

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.analysis.matrices import read_gantry
+from livebode.analysis import read_gantry
 from livebode.core import FitError, GridError, Lines, MatrixResponses, UsageError
-from livebode.fitting.common_poles import outputs_of
-from livebode.fitting.separable import solve
+from livebode.fitting import outputs_of, solve
 from livebode.mimo import (
     MatrixModes,
     MatrixMonitor,

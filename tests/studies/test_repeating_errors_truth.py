@@ -13,6 +13,7 @@ from livebode.core import Block, Channel, Event, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
 from livebode.fitting import mean_response
+from studies import hum
 from studies.repeating import CASES, Case, measure
 from tests.support.found import with_events
 
@@ -35,6 +36,14 @@ def test_distortion_is_in_the_bounds_of_windows_averages_and_means(name: str) ->
 @pytest.mark.parametrize("name", ["hum on a line, with harmonics", "hum on a line, seen before the excitation"])
 def test_a_line_with_hum_is_not_valid_and_the_reason_is_recorded(name: str) -> None:
     assert measure(case(name), runs=2).reasons == {"hum": [50.0]}
+
+
+def test_hum_in_silence_on_an_axis_with_an_encoder_and_friction_leaves_seldom_a_wrong_line_valid() -> None:
+    """A short form of `python -m studies.hum`, where one line of 120 is wrong and valid."""
+    found = hum.measure(hum.CASES[3], 2000.0, runs=8, seed=3)
+    assert found.wrong >= 10
+    assert found.wrong_valid <= 1
+    assert found.needless == 0
 
 
 def test_noise_alone_is_no_distortion() -> None:

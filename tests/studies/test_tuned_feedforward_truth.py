@@ -9,7 +9,7 @@ import pytest
 
 from livebode.core import Lines, Responses, SignalError
 from livebode.fitting import EvaluationGrid, TwoMass
-from livebode.tuning.feedforward import rigid_inertia
+from livebode_control.tuning.feedforward import rigid_inertia
 from studies.tune_feedforward import compared
 
 TRUE_KG_M2 = 0.0028 + 6.7 * 0.019**2

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from livebode import PID, Cascade
 from livebode.core import Lines, Loop, Responses, TuneError
-from livebode.tuning import LoopSpecification, disk_margin, tune
-from livebode.tuning.code_text import c_header, structured_text
-from livebode.tuning.plant_band import PlantBand
-from livebode.tuning.problem import TuningProblem
-from livebode.tuning.structure import FeedbackStructure
+from livebode_control.tuning import LoopSpecification, disk_margin, tune
+from livebode_control.tuning.code_text import c_header, structured_text
+from livebode_control.tuning.plant_band import PlantBand
+from livebode_control.tuning.problem import TuningProblem
+from livebode_control.tuning.structure import FeedbackStructure
 from studies.tune import LIMITS, keeps, machines, measured, promises, proposed, stability, true_margins
 
 VELOCITY = PID(gain=0.2, integral_time_s=0.1, derivative_time_s=1e-3, derivative_filter_s=1e-3, rate_hz=4000)

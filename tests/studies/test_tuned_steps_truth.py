@@ -8,8 +8,8 @@ import numpy as np
 
 from livebode.core import PID
 from livebode.simulation import BeltAxis
-from livebode.tuning.plant_band import PlantBand
-from livebode.tuning.predicted_steps import predicted_steps
+from livebode_control.tuning.plant_band import PlantBand
+from livebode_control.tuning.predicted_steps import predicted_steps
 from studies.tune import LINES as COARSE
 from studies.tune import machines
 from studies.tune_filter_steps import compared as filtered

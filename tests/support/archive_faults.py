@@ -70,9 +70,9 @@ def run_with_kills(archive: Path, lake: Path, kills: Sequence[str], rng: np.rand
 
 def _wrote(process: subprocess.Popen[str], lake: Path, more: int) -> bool:
     """Wait for more results, or the end; whether one of them came."""
-    wanted = len(list((lake / "responses").glob("*.parquet"))) + more
+    wanted = len(list((lake / "tables" / "responses").glob("*.parquet"))) + more
     limit_s = time.monotonic() + PATIENCE_S
-    while process.poll() is None and len(list((lake / "responses").glob("*.parquet"))) < wanted:
+    while process.poll() is None and len(list((lake / "tables" / "responses").glob("*.parquet"))) < wanted:
         if time.monotonic() > limit_s:
             return False
         time.sleep(_LOOK_S)

@@ -15,14 +15,14 @@ import pyarrow.parquet as pq
 from deltalake import DeltaTable
 from distributed import LocalCluster
 
-from livebode.archive.committing import Committer
-from livebode.archive.coordinator import Coordinator, Progress
-from livebode.archive.job import Job
-from livebode.archive.recordings import ArchivedRecording, RecordingPlace, find_places, known_contents, untracked
-from livebode.archive.results import Hashed, each_result
-from livebode.archive.settings import ArchiveSettings
-from livebode.archive.tasks import handle
-from livebode.lake import TABLES, Lake
+from livebode_plant.archive.committing import Committer
+from livebode_plant.archive.coordinator import Coordinator, Progress
+from livebode_plant.archive.job import Job
+from livebode_plant.archive.recordings import ArchivedRecording, RecordingPlace, find_places, known_contents, untracked
+from livebode_plant.archive.results import Hashed, each_result
+from livebode_plant.archive.settings import ArchiveSettings
+from livebode_plant.archive.tasks import handle
+from livebode_plant.lake import TABLES, Lake
 
 _RATE_HZ, _WINDOW, _LINES = 4000, 400, np.array([20.0, 40.0, 60.0, 100.0])
 RECIPE = """
@@ -138,8 +138,8 @@ def stored(lake: Lake) -> Stored:
 
 
 def _uris(lake: Lake, name: str) -> Iterator[str]:
-    if DeltaTable.is_deltatable(f"{lake.url}/{name}"):
-        yield from DeltaTable(f"{lake.url}/{name}").file_uris()
+    if DeltaTable.is_deltatable(f"{lake.url}/tables/{name}"):
+        yield from DeltaTable(f"{lake.url}/tables/{name}").file_uris()
 
 
 def _sha256(path: Path) -> str:

@@ -9,11 +9,12 @@ import resource
 import selectors
 import socket
 import ssl
+import struct
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from http.client import HTTPConnection, HTTPException, HTTPSConnection
 from pathlib import Path
 from typing import Self
@@ -62,7 +63,7 @@ class Attacked:
             )
         found = until(lambda: re.search(r"dashboard is at https?://127.0.0.1:(\d+)/", self.log.read_text()), "the page")
         self.port = int(found.group(1))
-        until(lambda: len(self.closings()) > 0, "the first segment")
+        until(self.closed, "the first segment")
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -96,11 +97,11 @@ class Attacked:
         finally:
             connection.close()
 
-    def closings(self) -> list[str]:
-        """The segments that are closed."""
+    def closed(self) -> str:
+        """The newest segment that is closed; the manifest is written again from time to time, and is shorter then."""
         path = self.folder / "run" / "manifest.jsonl"
         lines = path.read_text().splitlines() if path.exists() else []
-        return [line for line in lines if line.startswith('{"closed"')]
+        return next((line for line in reversed(lines) if line.startswith('{"closed"')), "")
 
     def open_descriptors(self) -> int:
         return len(list(Path(f"/proc/{self._process.pid}/fd").iterdir()))
@@ -146,11 +147,11 @@ def watched_during(attacked: Attacked, attack: Callable[[Attacked, threading.Eve
 
 def _look_at_the_record(attacked: Attacked, over: threading.Event, noticed: Noticed) -> None:
     """The longest time that no segment was closed, beyond the usual."""
-    count, since = len(attacked.closings()), time.monotonic()
+    newest, since = attacked.closed(), time.monotonic()
     while not over.wait(0.02):
-        now, found = time.monotonic(), len(attacked.closings())
-        if found != count:
-            count, since = found, now
+        now, closed = time.monotonic(), attacked.closed()
+        if closed != newest:
+            newest, since = closed, now
         noticed.record_s = max(noticed.record_s, now - since)
         noticed.descriptors = max(noticed.descriptors, attacked.open_descriptors())
         noticed.memory_mb = max(noticed.memory_mb, attacked.memory_mb())
@@ -185,6 +186,25 @@ def flood(attacked: Attacked, over: threading.Event) -> None:
     while not over.is_set():
         with contextlib.suppress(OSError):
             socket.create_connection(("127.0.0.1", attacked.port), timeout=5).close()
+
+
+def short(count: int, paths: Sequence[str], *, reset: bool = False) -> Callable[[Attacked, threading.Event], None]:
+    """Floods of so many connections that send one request and close, again and again with a pause of a second."""
+
+    def attack(attacked: Attacked, over: threading.Event) -> None:
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
+        while not over.is_set():
+            for number in range(count):
+                data = f"GET {paths[number % len(paths)]} {_HEAD}\r\n".replace("{origin}", attacked.origin)
+                with contextlib.suppress(OSError), socket.socket() as one:
+                    if reset:
+                        one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                    one.settimeout(0.5)
+                    one.connect(("127.0.0.1", attacked.port))
+                    one.sendall(data.replace("{host}", attacked.origin.partition("//")[2]).encode())
+            over.wait(1.0)
+
+    return attack
 
 
 def _open(attacked: Attacked, selector: selectors.BaseSelector, data: bytes, deaf: bool) -> None:
@@ -232,3 +252,7 @@ def attacks(count: int) -> Iterator[tuple[str, Callable[[Attacked, threading.Eve
     yield "idle after an answer", held(count, "GET /login {head}\r\n")
     yield "answers never read", held(count // 4, "GET /static/uplot/uPlot.esm.js {head}\r\n" * 8, deaf=True)
     yield "opened and closed", flood
+    yield "short log-in pages", short(2 * count, ["/login"])
+    yield "short catalogues", short(2 * count, [f"/catalogue?language={code}" for code in ("de", "en", "zh_CN", "x")])
+    yield "short exports", short(2 * count, [f"/api/export?axis=0&from=0&to={to}" for to in range(1, 20)])
+    yield "short responses", short(2 * count, [f"/api/moment?axis=0&from={at}&to={at}" for at in range(20)], reset=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -41,3 +42,9 @@ def compared(run: Path, copy: Path) -> ScheduleTable:
     del summary["crc32"]
     (copy / "run.json").write_bytes(to_document(summary))
     return table
+
+
+def with_checksum(data: object) -> bytes:
+    """A file of a baseline with the checksum of what it contains."""
+    text = json.dumps(data, indent=1)
+    return f'{text[:-2]},\n "crc32": "{zlib.crc32(text.encode()):08x}"\n}}\n'.encode()

@@ -11,19 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.overview import Overview
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.record_section import RecordSection
+from livebode.analysis import Overview
+from livebode.configuration import FitSection, LoopSection, RecordSection
 from livebode.core import Block, Channel, Lines, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.records import RunRecord
-from livebode.runtime import RunControl
-from livebode.runtime.documents import RunStarted
-from livebode.runtime.fits import Fits
-from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
+from livebode.runtime import Fits, RunControl, RunStarted
+from livebode.simulation import TwoMassLoop
+from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.browser import until
 from tests.support.peers.peer import PATIENCE_S
 from tests.support.responses import made

@@ -7,7 +7,7 @@ from pathlib import Path
 from unittest import mock
 
 from livebode.monitoring import Baseline
-from livebode.runtime.demo import demo_baseline
+from livebode.runtime import demo_baseline
 from tests.support.command import livebode
 from tests.support.shared import folder, shared
 
@@ -25,9 +25,9 @@ def already_learned(directory: Path) -> str:
     path = directory / "learned.pickle"
     path.write_bytes(pickle.dumps(learned()))
     return (
-        "import pickle, livebode.runtime.demo as demo\n"
+        "import pickle, livebode.runtime\n"
         f"with open({str(path)!r}, 'rb') as file: baselines = {{{SEED}: pickle.load(file)}}\n"
-        "demo.demo_baseline = baselines.__getitem__"
+        "livebode.runtime.demo_baseline = baselines.__getitem__"
     )
 
 
@@ -35,7 +35,7 @@ def already_learned(directory: Path) -> str:
 def shown() -> tuple[Path, str]:
     """The run of `livebode demo --fast`, and what it printed."""
     run, baselines = folder() / "demo", {SEED: learned()}
-    with mock.patch("livebode.runtime.demo.demo_baseline", baselines.__getitem__):
+    with mock.patch("livebode.runtime.demo_baseline", baselines.__getitem__):
         done = livebode("demo", "--fast", "--out", run)
     assert done.code == 0, done.err
     return run, done.out

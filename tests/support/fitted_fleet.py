@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 import livebode
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.core import Channel
-from livebode.fleet.log import FleetLog
-from livebode.fleet.message import message_id, write_message
-from livebode.fleet.settings import LogSection, machine_key
-from livebode.fleet.subjects import EDGE
 from livebode.sources.live import Batch
+from livebode_plant.fleet.log import FleetLog
+from livebode_plant.fleet.message import message_id, write_message
+from livebode_plant.fleet.settings import LogSection, machine_key
+from livebode_plant.fleet.subjects import EDGE
 
 RATE_HZ, SAMPLES = 4000.0, 400
 CHANGED = 4

@@ -10,12 +10,13 @@ from contextlib import contextmanager
 import numpy as np
 
 from livebode.dashboard import Dashboard, Serving
-from livebode.dashboard.fleet_alarms import FleetAct
-from livebode.dashboard.fleet_board import LOOKS
-from livebode.dashboard.fleet_demo import DemoFleet
-from livebode.dashboard.fleet_feed import Hear
-from livebode.dashboard.fleet_view import FleetView
-from livebode.fleet.status_message import ACTIVE, BEHIND, NOT_READY, SILENT, STATES, encode_names, encode_status
+from livebode_plant.fleet.status_message import ACTIVE, BEHIND, NOT_READY, SILENT, STATES, encode_names, encode_status
+from livebode_plant.page.fleet_alarms import FleetAct
+from livebode_plant.page.fleet_board import LOOKS
+from livebode_plant.page.fleet_demo import DemoFleet
+from livebode_plant.page.fleet_feed import Hear
+from livebode_plant.page.fleet_site import FleetSite
+from livebode_plant.page.fleet_view import FleetView
 
 
 class DrivenFeed:
@@ -80,6 +81,6 @@ def fleet_page(
     """Address and feed of a page that is served."""
     feed = DrivenFeed(DemoFleet(axes), after_s)
     dashboard = Dashboard(Serving("127.0.0.1", 0))
-    dashboard.view_fleet(FleetView(feed, plan, lake=lake))
+    dashboard.show(FleetSite(FleetView(feed, plan, lake=lake)))
     with dashboard:
         yield dashboard.url, feed

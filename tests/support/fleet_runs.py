@@ -11,19 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.core import Channel
-from livebode.fleet.check import CheckResult, check_results
-from livebode.fleet.log import ClaimLostError, FleetLog
-from livebode.fleet.message import message_id, write_message
-from livebode.fleet.partition import PartitionOwner
-from livebode.fleet.reader import stored_messages
-from livebode.fleet.result_message import ResultMessage
-from livebode.fleet.settings import LogSection, machine_key
-from livebode.fleet.status import status_of
-from livebode.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS
-from livebode.fleet.worker import own_partitions
 from livebode.sources.live import Batch
+from livebode_plant.fleet.check import CheckResult, check_results
+from livebode_plant.fleet.log import ClaimLostError, FleetLog
+from livebode_plant.fleet.message import message_id, write_message
+from livebode_plant.fleet.partition import PartitionOwner
+from livebode_plant.fleet.reader import stored_messages
+from livebode_plant.fleet.result_message import ResultMessage
+from livebode_plant.fleet.settings import LogSection, machine_key
+from livebode_plant.fleet.status import status_of
+from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS
+from livebode_plant.fleet.worker import own_partitions
 from tests.support.forked import server
 
 RATE_HZ = 1000.0

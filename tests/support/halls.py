@@ -10,8 +10,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from livebode.lake import TABLES, Lake
-from livebode.simulation.machine_year import MachineYear
+from livebode_plant.lake import TABLES, Lake
+from livebode_plant.trending.machine_year import MachineYear
 
 
 def hall(path: Path, machines: Mapping[str, MachineYear], **columns: Any) -> Lake:

@@ -8,13 +8,6 @@ from typing import Any
 
 from livebode.language import Catalogue, catalogue
 
-_PLACE = re.compile(r"\{(\w+)\}")
-
-
-def filled(template: str, value: Any = "12.5") -> str:
-    return _PLACE.sub(lambda _: value, template)
-
-
 _WORD = re.compile(r"[A-Za-z]{4,}")
 
 
@@ -26,8 +19,7 @@ def pseudo() -> Catalogue:
         return f"⟦{english}⟧" if isinstance(translation, str) else [f"⟦{english}⟧"] * len(translation)
 
     messages = {english: bracketed(english, own) for english, own in german.messages.items()}
-    recorded = tuple((english, f"⟦{english}⟧") for english, _ in german.recorded)
-    return Catalogue(**asdict(german) | {"code": "eo", "messages": messages, "recorded": recorded})
+    return Catalogue(**asdict(german) | {"code": "eo", "messages": messages})
 
 
 def untranslated(text: str, data: set[str]) -> set[str]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import socket
+import struct
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -12,21 +15,27 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
+import can
 import numpy as np
 import pyarrow as pa
 from pyads import constants
 from pyads.testserver import PLCVariable
 from pyarrow import parquet
 
-from livebode.sources.live import Batch, encode_layout, encode_samples
-from livebode.sources.live.ndjson import encode_line
-from livebode.sources.live.ring import HEADER, MAGIC, VERSION
+from livebode.records import RunRecord
+from livebode.sources.live import Batch, encode_layout, encode_line, encode_samples
+from livebode_drives.live.klipper import WAIT_S
+from livebode_drives.live.ring import HEADER, MAGIC, VERSION
 from tests.support.command import RATE_HZ
 from tests.support.peers.broker import TOPIC, Mosquitto, publisher, stop
+from tests.support.peers.can_bus import COUNTED
+from tests.support.peers.hal import RATE_HZ as HAL_RATE_HZ
+from tests.support.peers.hal import SETTINGS, Hal, only_hal
+from tests.support.peers.klipper import Printer
 from tests.support.peers.machine import CHANNELS, data
 from tests.support.peers.opcua import OpcUaPeer
 from tests.support.peers.peer import CHANNELS as OPC_UA_CHANNELS
-from tests.support.peers.peer import STAMP_S, free_port
+from tests.support.peers.peer import STAMP_S, free_port, until
 from tests.support.peers.plain import TcpPeer
 from tests.support.peers.plc import NET_ID, Memory, Server
 from tests.support.peers.serial_line import SerialJsonPeer
@@ -54,7 +63,12 @@ class Feed:
     keeps = False
     """Whether what is sent while nobody records waits for the next process, so that every loss is a kill's."""
     number = "n"
-    """The channel that holds the number of the sample."""
+    """The channel that holds the number of the sample; "sample" if none does."""
+    rate_hz = RATE_HZ
+    most_s = 1.0
+    """The most that a kill may cost."""
+    exact = True
+    """Whether the sender's numbers give the length of any pause of livebode."""
     source: dict[str, Any]
     first = 70_000
     samples = BATCH
@@ -91,6 +105,9 @@ class Feed:
 
     def close(self) -> None:
         """Nothing more is sent."""
+
+    def check(self, run: Path) -> None:
+        """What the numbers of the samples do not show."""
 
 
 class UdpFeed(Feed):
@@ -144,14 +161,21 @@ class MqttFeed(Feed):
 
     keeps = True
 
+    def __init__(self, folder: Path, *broker: str) -> None:
+        super().__init__(folder)
+        self._settings = ("allow_anonymous true", "max_queued_messages 0", *broker)
+
     def open(self) -> None:
-        self._broker = Mosquitto(self.folder, ("allow_anonymous true", "max_queued_messages 0")).__enter__()
+        self._broker = Mosquitto(self.folder, self._settings).__enter__()
         url = f"mqtt://127.0.0.1:{self._broker.port}/{TOPIC}"
         self.source = {"url": url, "client_id": "livebode"}
         self._publisher = publisher(self._broker.port)
 
     def send(self, batch: Batch) -> None:
         self._publisher.publish(TOPIC, encode_line(batch), qos=1)
+
+    def wait_subscribed(self) -> None:
+        until(lambda: self._broker.logged(Mosquitto.subscribed), "a subscription")
 
     def close(self) -> None:
         stop(self._publisher)
@@ -277,6 +301,120 @@ class OpcUaFeed(Feed):
         self._peer.__exit__()
 
 
+class KlipperFeed(Feed):
+    """Its acceleration in y is the print time in samples. Samples wait for the moves of their time."""
+
+    rest: ClassVar[dict[str, Any]] = {
+        "signals": {"input": "accel_x", "output": "accel_y"},
+        "tracking": {"hop": 20, "estimator": "direct"},
+    }
+    number = "accel_y"
+    most_s = 1.0 + WAIT_S
+
+    def open(self) -> None:
+        self._printer = Printer(self.folder, 1003.7, numbered_hz=RATE_HZ).__enter__()
+        self.source = self._printer.settings | {"rate_hz": float(RATE_HZ)}
+
+    def _run(self) -> None:
+        began_s, printer = time.monotonic() - self._printer.time_s, self._printer
+        while not self._done.wait(0.01):
+            while printer.time_s < time.monotonic() - began_s:
+                with contextlib.suppress(KeyError):  # somebody connects at this moment
+                    printer.measure()
+                    printer.move()
+                self.sent = round(printer.time_s * RATE_HZ)
+
+    def close(self) -> None:
+        self._printer.__exit__()
+
+
+class HalFeed(Feed):
+    """LinuxCNC itself, whose sampler holds 4 s; its channel n counts the periods of the thread."""
+
+    rest: ClassVar[dict[str, Any]] = {
+        "signals": {"input": "n", "output": "w"},
+        "lines": {"frequencies": "200,400,800", "window": 100},
+        "tracking": {"hop": 20, "estimator": "direct"},
+    }
+    rate_hz = HAL_RATE_HZ
+
+    def open(self) -> None:
+        self._entered = contextlib.ExitStack()
+        self._entered.enter_context(only_hal())
+        self._hal = self._entered.enter_context(Hal())
+        self.source = SETTINGS | {"channels": ["w [N m]", "n"]}
+
+    def _run(self) -> None:
+        while not self._done.wait(0.02):
+            self.sent = self._hal.periods()
+
+    def close(self) -> None:
+        self._entered.close()
+
+
+class CanFeed(Feed):
+    """Frames of a bus over the network. After a pause of livebode the counter may have wrapped, so it is a restart."""
+
+    rest: ClassVar[dict[str, Any]] = {
+        "signals": {"input": "w", "output": "y"},
+        "tracking": {"hop": 20, "estimator": "direct"},
+    }
+    number = "w"
+    exact = False
+
+    def open(self) -> None:
+        dbc = self.folder / "drive.dbc"
+        dbc.write_text(COUNTED)
+        group = "239.{}.{}.{}".format(*np.random.default_rng().integers(1, 255, 3))
+        self.source = {
+            "url": f"can:udp_multicast/{group}", "dbc": dbc, "rate_hz": float(RATE_HZ), "channels": ["w", "y"],
+            "counter": "w", "can_fd": True,
+        }  # fmt: skip
+        self._bus = can.Bus(interface="udp_multicast", channel=group, fd=True)
+
+    def send(self, batch: Batch) -> None:
+        for number, y in zip(batch.data[3], batch.data[2]):
+            data = struct.pack("<Q", int(number)) + struct.pack("<d", y)
+            self._bus.send(can.Message(arbitration_id=291, data=data, is_extended_id=False, is_fd=True))
+
+    def close(self) -> None:
+        self._bus.shutdown()
+
+
+class DaqFeed(Feed):
+    """openDAQ's reference device behind a server: a sine, whose samples are numbered by the ticks of its clock."""
+
+    rest: ClassVar[dict[str, Any]] = {
+        "signals": {"input": "AI0", "output": "AI1"},
+        "tracking": {"hop": 20, "estimator": "direct"},
+    }
+    number = "sample"
+
+    def open(self) -> None:
+        port = free_port()
+        command = [sys.executable, "-m", "tests.support.peers.daq_server", str(port)]
+        self._server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self._server.stdout is not None
+        assert self._server.stdout.readline() == b"serving\n"
+        self.source = {"url": f"daq.nd://127.0.0.1:{port}", "channels": ["AI0", "AI1"]}
+
+    def _run(self) -> None:
+        """The device sends by itself; what a kill costs is not known here."""
+
+    def close(self) -> None:
+        self._server.kill()
+        self._server.communicate()
+
+    def check(self, run: Path) -> None:
+        """Each sample belongs to the one sine of the device, of ten periods in a second."""
+        tables = list(map(pa.table, RunRecord.open(run).tables("samples")))
+        number, values = (np.concatenate([table[name].to_numpy() for table in tables]) for name in ("sample", "AI0"))
+        turn = 2 * np.pi * 10.0 * number / RATE_HZ
+        columns = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        found = np.linalg.lstsq(columns, values, rcond=None)[0]
+        assert np.max(np.abs(columns @ found - values)) < 1e-6
+
+
 def rows(batch: Batch) -> str:
     time_s = np.arange(batch.first_sample, batch.stop) / RATE_HZ
     return "".join(
@@ -306,6 +444,10 @@ FEEDS: dict[str, Callable[[Path], Feed]] = {
     "directory": DirectoryFeed,
     "ads": RingFeed,
     "opc.tcp": OpcUaFeed,
+    "klipper": KlipperFeed,
+    "hal": HalFeed,
+    "can": CanFeed,
+    "opendaq": DaqFeed,
 }
-WHOLE = {"file", "counted-file", "directory", "ads"}
+WHOLE = {"file", "counted-file", "directory", "ads", "mqtt"}
 """Kinds of which nothing may be lost at all."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
@@ -12,8 +13,7 @@ from livebode.cli.notices import NoticePrinter
 from livebode.configuration import Axis
 from livebode.core import Event
 from livebode.records import RunRecord
-from livebode.runtime import Destination, Document, RunControl, Subscriber, run
-from livebode.runtime.documents import TrackerResults
+from livebode.runtime import Destination, Document, RunControl, Subscriber, TrackerResults, run
 from livebode.sources.live import Batch, SourceSettings
 from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer
 
@@ -31,7 +31,7 @@ def hurried(count: int, first: int) -> list[Batch]:
 
 
 class Stuck:
-    """Holds up the thread that tracks, as a disk does that does not answer."""
+    """Holds up the thread that tracks, as a slow computer does; or another function, as a slow disk does."""
 
     def __init__(self) -> None:
         self.held, self.released = threading.Event(), threading.Event()
@@ -40,6 +40,16 @@ class Stuck:
         if isinstance(document, TrackerResults):
             self.held.set()
             self.released.wait()
+
+    def before(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The function, which does nothing before it is released."""
+
+        def held(*arguments: Any) -> Any:
+            self.held.set()
+            self.released.wait()
+            return function(*arguments)
+
+        return held
 
 
 class LiveSession:

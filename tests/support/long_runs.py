@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Lines, Responses
-from livebode.records import RESPONSES, as_batch
-from livebode.records.segments.limits import SegmentLimits
-from livebode.records.segments.store import Store
-from livebode.records.tiers import Thinning
+from livebode.records import RESPONSES, SegmentLimits, Store, Thinning, as_batch
 
 RATE_HZ, WINDOW, HOP = 40.0, 40, 10
 LINES = Lines((3, 5, 8), WINDOW, RATE_HZ, ())

@@ -8,7 +8,8 @@ import numpy as np
 
 from livebode.core import Lines
 from livebode.excitation import multisine
-from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
+from livebode.simulation import TwoMassLoop
+from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.command import write_parquet
 
 LINES = Lines.parse("20:140:10", RATE_HZ, 400)

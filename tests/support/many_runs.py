@@ -10,6 +10,9 @@ from urllib.parse import quote, urlsplit
 
 import numpy as np
 
+from livebode.core import moment
+from livebode.language import Message
+from livebode.monitoring.sentences import WHAT
 from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.dashboards import FIT, LOOP, SAMPLES, data
 from tests.support.peers.peer import PATIENCE_S
@@ -19,10 +22,22 @@ from tools.run_copies import copy_run
 
 BEGUN, DAY_S = 1_760_000_000.0, 86400.0
 SOFTER = 0.9
-ALARM = "Since 1.0 s the belt's stiffness is 10.0 ± 0.3 % less than in the baseline."
-HEALTHY = "No change against the baseline (3.0 s of the run judged)."
-MONITORED = {"baseline": "healthy.json", "judged_s": 3.0, "changes": 0, "standing": [], "message": HEALTHY}
-CHANGED = MONITORED | {"baseline": "other.json", "changes": 1, "standing": [{"what": "stiffness"}], "message": ALARM}
+ALARM = Message(
+    "Since {since} {change}.",
+    since=moment(1.0),
+    change=Message(
+        "{part} is {size} % {way} than {reference}",
+        part=WHAT["stiffness"],
+        size=Message("{size:.1f} ± {bound:.1f}", size=10.0, bound=0.3),
+        way=Message("less"),
+        reference=Message("in the baseline"),
+    ),
+)
+HEALTHY = Message("No change against the baseline ({judged_s:.1f} s of the run judged).", judged_s=3.0)
+MONITORED = {"baseline": "healthy.json", "judged_s": 3.0, "changes": 0, "standing": []}
+CHANGED = MONITORED | {"baseline": "other.json", "changes": 1, "standing": [{"what": "stiffness"}]}
+MONITORED |= {"message": HEALTHY, "words": HEALTHY.plain()}
+CHANGED |= {"message": ALARM, "words": ALARM.plain()}
 
 
 @shared

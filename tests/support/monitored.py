@@ -19,10 +19,10 @@ from livebode.monitoring import (
     learn_table,
 )
 from livebode.monitoring.accuracy import ChangeAccuracy
+from livebode.monitoring.amplitude import InputAmplitude
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
-from livebode.motion import MovingModel, PositionCurve
-from livebode.motion.model import basis
+from livebode.motion import MovingModel, PositionCurve, basis
 from livebode.simulation import (
     BeltAxis,
     Friction,
@@ -63,11 +63,12 @@ def axis(motion: Motion, seed: int, **options: Any) -> BeltAxis:
     if isinstance(motion, StrokeSequence):
         options.setdefault("seconds", float(motion.edges_s(RATE_HZ)[-1]) + 2 * LINES.window / RATE_HZ)
     given: dict[str, Any] = {
+        "excitation_n_m": MULTISINE,
         "friction": Friction(load_coulomb_n=15.0),
         "sensor": Sensor(noise_rad_per_s=0.1, encoder_counts_per_turn=1 << 20),
         "seconds": 10.0,
     }
-    return BeltAxis(motion=motion, excitation_n_m=MULTISINE, seed=seed, **(given | options))
+    return BeltAxis(motion=motion, seed=seed, **(given | options))
 
 
 def blocks(machine: BeltAxis) -> Iterator[Block]:
@@ -143,6 +144,9 @@ def ideal() -> LearnedMachine:
         0.1,
         0.4,
         np.full(28, 10),
+        np.array([1e6, 5e5, 1e3, 5e5]),
+        InputAmplitude(*np.ones((3, len(LINES)))),
+        0.5,
     )
 
 
@@ -158,7 +162,8 @@ def small_baseline() -> Baseline:
     curve, known = PositionCurve(0.2, 1.6, np.zeros(12)), ChangeAccuracy(np.ones(4), np.zeros(4), np.full(4, 0.01))
     machine = LearnedMachine(
         MovingModel(0.003, 7.0, 1.0, curve, curve), np.ones(len(lines)), np.ones(len(lines.quiet)), known, known,
-        0.1, 0.4, np.full(28, 9),
+        0.1, 0.4, np.full(28, 9), np.full(4, 1e5), InputAmplitude(*np.ones((3, len(lines)))),
+        0.5,
         covariates=Covariates(
             ("temperature",), np.array([20.0]), np.array([15.0]), np.array([25.0]),
             np.array([[-0.002], [0.0], [0.0], [0.0]]), np.zeros((4, 1, 1)),

@@ -1,4 +1,4 @@
-"""`python -m tests.support.oma_answers > tests/output_only/stored/pyoma2.json`: the answers of pyOMA2 on seeded data.
+"""`python -m tests.support.oma_answers > wings/modes/tests/stored/pyoma2.json`: the answers of pyOMA2 on seeded data.
 
 Needs `pip install pyOMA_2==1.4.3 scipy`, in an environment of its own: it needs a newer pandas than livebode's tests.
 """

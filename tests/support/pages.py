@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
+PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md")), *sorted(ROOT.glob("wings/**/*.md"))]
 _STEP = re.compile(
     r"(?:^<!-- not run: (?P<reason>[^\n]*?) -->\n\n?)?"
     r"(?:^```(?P<language>[^\n]*)\n(?P<code>.*?)^```$|(?P<shell>(?:^    [^\n]+\n)+))",

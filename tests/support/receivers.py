@@ -12,10 +12,9 @@ from typing import Any, Self
 import livebode
 from livebode.configuration import Axis
 from livebode.core import Event
+from livebode.publishing import Publisher
 from livebode.publishing.feed import AxisFeed
-from livebode.publishing.publisher import Publisher
-from livebode.runtime import RunControl
-from livebode.runtime.documents import ClockSet, FitResults, RunStarted
+from livebode.runtime import ClockSet, FitResults, RunControl, RunStarted
 from tests.support.peers.peer import free_port, until
 
 MEASURED = {"source": {"log": "log.parquet"}, "signals": {"output": "y"}}

@@ -9,13 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import RecordSection
 from livebode.core import Block, Channel, Event, Responses
 from livebode.estimation import Settings, Tracker
-from livebode.records import RunRecord
-from livebode.records.grouped_events import each_event
-from livebode.runtime import Document, Outcome
-from livebode.runtime.documents import TrackerResults
+from livebode.records import RunRecord, each_event
+from livebode.runtime import Document, Outcome, TrackerResults
 from tests.support.command import LINES, RATE_HZ, signals
 from tests.support.found import with_events
 from tests.support.runs import record

@@ -8,16 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from livebode.configuration import Axis
-from livebode.configuration.record_section import RecordSection
-from livebode.estimation.stream_estimator import Follower
-from livebode.records import RunRecord
-from livebode.records.summary_file import RUN, to_document
-from livebode.runtime import Destination, Outcome, RunLoop, Subscriber, run
-from livebode.runtime.change_detection import ChangeDetection
-from livebode.runtime.fits import Fits
-from livebode.runtime.pipeline import Pipeline
-from livebode.runtime.run_loop import Source
+from livebode.configuration import Axis, RecordSection
+from livebode.estimation import Follower
+from livebode.records import RUN, RunRecord
+from livebode.records.summary_file import to_document
+from livebode.runtime import ChangeDetection, Destination, Fits, Outcome, RunLoop, SingleResponse, Subscriber, run
+from livebode.runtime.estimate import Source
 from tests.support.command import write_parquet
 from tools.parquet_parts import parts_of
 
@@ -51,6 +47,6 @@ def record(
 ) -> Outcome:
     """A run of these parts, which no configuration describes."""
     to = Destination(directory, lambda *_: None, subscribers=tuple(subscribers))
-    pipeline = Pipeline(follower, fits, detection)
+    estimate = SingleResponse(follower, fits, detection)
     about = {"configuration": {}} if about is None else dict(about)
-    return RunLoop(source, pipeline, to, about=about, segments=segments, again=again).run()
+    return RunLoop(source, estimate, to, about=about, segments=segments, again=again).run()

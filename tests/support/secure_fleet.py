@@ -11,13 +11,13 @@ from typing import Literal
 
 import trustme
 
-from livebode.configuration.axis import Axis
-from livebode.fleet.credentials import write_credentials
-from livebode.fleet.log import FleetLog
-from livebode.fleet.server import LogServer, free_port
-from livebode.fleet.server_access import ServerAccess
-from livebode.fleet.settings import LogSection, ServerSection, UsersSection
-from livebode.fleet.subjects import axis_path
+from livebode.configuration import Axis
+from livebode_plant.fleet.credentials import write_credentials
+from livebode_plant.fleet.log import FleetLog
+from livebode_plant.fleet.server import LogServer, free_port
+from livebode_plant.fleet.server_access import ServerAccess
+from livebode_plant.fleet.settings import LogSection, ServerSection, UsersSection
+from livebode_plant.fleet.subjects import axis_path
 from tests.support.fleet_runs import PARTITIONS, fleet_axes
 
 LEAF = "ulm.leaf"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 from pathlib import Path
 
-from livebode.fleet.log import FleetLog
-from livebode.fleet.settings import LogSection, SinkSection
-from livebode.fleet.sink import Sink
-from livebode.fleet.sink_tables import SinkTotals
+from livebode_plant.fleet.log import FleetLog
+from livebode_plant.fleet.settings import LogSection, SinkSection
+from livebode_plant.fleet.sink import Sink
+from livebode_plant.fleet.sink_tables import SinkTotals
 
 
 def sink_once(log: LogSection, lake: Path, commit_s: float = 60.0) -> SinkTotals:

@@ -16,9 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import livebode
-from livebode.core import StateError, Stateful, StatefulBase
-from livebode.core.state import Stage, decode, encode
+from livebode.core import Stage, StateError, Stateful, StatefulBase, decode, encode
 
 HEAD_BYTES = 20
 FLIPS = 24
@@ -214,8 +212,10 @@ def stages_in(root: object, place: tuple[object, ...] = ()) -> Iterator[tuple[tu
 
 
 def every_class() -> set[type]:
-    """Every class of the package with `snapshot` and `restore` that has a stage, or that others do not derive from."""
-    names = [module.name for module in pkgutil.walk_packages(livebode.__path__, "livebode.")]
+    """Every class of package and wings with `snapshot` and `restore` that has a stage or no derived class."""
+    roots = [one.name for one in pkgutil.iter_modules() if one.name.startswith("livebode")]
+    paths = {f"{root}.": importlib.import_module(root).__path__ for root in roots}
+    names = [one.name for prefix, path in paths.items() for one in pkgutil.walk_packages(path, prefix)]
     for name in names:
         importlib.import_module(name)
     found = {

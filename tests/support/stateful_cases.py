@@ -10,17 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.ready import ReadyCondition
+from livebode.configuration import FitSection, ReadyCondition
 from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
-from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, SpectraTracker, Tracker
-from livebode.estimation.successive import SuccessiveTrackers
-from livebode.estimation.uneven_tracker import UnevenTracker
+from livebode.estimation import (
+    NonPeriodicTracker,
+    RippleOrder,
+    Settings,
+    SpectraTracker,
+    SuccessiveTrackers,
+    Tracker,
+    UnevenTracker,
+)
 from livebode.excitation import multisine
-from livebode.fitting import EvaluationGrid, Fitter, TwoMass
-from livebode.fitting.drift import DriftTest
-from livebode.fleet.axis_stream import AxisStream
-from livebode.fleet.message import write_message
+from livebode.fitting import DriftTest, EvaluationGrid, Fitter, TwoMass
 from livebode.mimo import (
     MatrixExcitation,
     MatrixMonitor,
@@ -29,21 +31,28 @@ from livebode.mimo import (
     MatrixTracker,
     example_matrix_responses,
 )
-from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_table, places, signals_of
+from livebode.monitoring import (
+    Baseline,
+    Monitor,
+    NonOverlappingWindows,
+    TorqueMonitor,
+    learn_table,
+    places,
+    signals_of,
+)
 from livebode.motion import MotionCorrection
-from livebode.preparation.checks import ChannelCheck
-from livebode.runtime.change_detection import ChangeDetection
+from livebode.preparation import ChannelCheck
+from livebode.runtime import ChangeDetection, Fits
 from livebode.runtime.continuing import StreamPosition
-from livebode.runtime.fits import Fits
 from livebode.runtime.matrix_columns import MatrixColumns
 from livebode.runtime.matrix_detection import MatrixDetection
 from livebode.runtime.readiness import Readiness
 from livebode.runtime.run_counts import RunCounts
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
-from livebode.sources.live import Batch, LiveBlock, Sequencer
+from livebode.sources.live import Batch, LiveBlock, Origin, Sequencer, SourceEvents
 from livebode.sources.live.kernel_drive import KernelDrive
-from livebode.sources.live.position import Origin
-from livebode.sources.live.source_events import SourceEvents
+from livebode_plant.fleet.axis_stream import AxisStream
+from livebode_plant.fleet.message import write_message
 from tests.support.axes import LINES as AXIS_LINES
 from tests.support.fitted import LINES as FITTED
 from tests.support.fitted import TRUTH, noisy
@@ -51,6 +60,8 @@ from tests.support.fleet_runs import batch as numbered_message
 from tests.support.fleet_runs import fleet_axes
 from tests.support.monitored import ideal, recorded
 from tests.support.stateful import Case
+from tests.support.strokes import learned_torque
+from tests.support.strokes import strokes as rigid_strokes
 
 BELT = TwoMass(radius_m=0.019)
 RATE_HZ, WINDOW = 1000.0, 50
@@ -326,6 +337,15 @@ def monitor_by_tables() -> Case:
     return Case(lambda: Monitor(learned, MONITORED), steps, [lambda: Monitor(baseline(True), MONITORED)])
 
 
+def torque_monitor() -> Case:
+    learned, whole = learned_torque(), rigid_strokes(1000, from_s=30.0, friction=1.5)
+    return Case(
+        lambda: TorqueMonitor(learned, ("u", "y"), whole.rate_hz, 86400.0),
+        [lambda stage, part=part: stage.process(part) for part in cut(whole, 4001, 43000, 61000)],
+        [lambda: TorqueMonitor(learned, ("u", "y"), whole.rate_hz, 9 * 86400.0)],
+    )
+
+
 def change_detection() -> Case:
     learned = baseline(by_model=False)
     steps = [lambda stage, part=part: stage.take_responses(part, None) for part in changing()]
@@ -341,7 +361,7 @@ def run_counts() -> Case:
     def step(part: Block, kind: str) -> Callable[[RunCounts], object]:
         def run(stage: RunCounts) -> object:
             stage.check.take(part)
-            stage.take(responses(), 0.25)
+            stage.take(responses().valid, 0.25)
             stage.stop, stage.left_out_samples = part.stop, part.start
             event = Event(kind, part.stop, part.stop / RATE_HZ, f"{kind} at {part.stop}", {"count": 1})
             return [stage.groups.take(event) for _ in range(30)], stage.counts({"samples": part.stop})
@@ -429,6 +449,6 @@ CASES = {
         tracker, direct_tracker, successive_trackers, matrix_tracker, matrix_columns, matrix_monitor, matrix_detection,
         local_polynomial, welch_average, spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
-        run_counts, readiness, sequencer, axis_stream, stream_position,
+        torque_monitor, run_counts, readiness, sequencer, axis_stream, stream_position,
     )
 }  # fmt: skip

@@ -11,12 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.configuration import Axis
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import Axis, RecordSection
 from livebode.core import Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.records.segments.journal import last_commit
+from livebode.records import last_commit
 from livebode.runtime import Destination, run
 from tests.support.command import write_parquet
 from tests.support.recorded import NAMES, Machine

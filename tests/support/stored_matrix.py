@@ -11,7 +11,7 @@ import numpy as np
 
 from livebode.core import Block, Event, Lines, MatrixResponses
 from livebode.mimo import MatrixExcitation, MatrixSettings, MatrixTracker
-from livebode.records import RunDirectory
+from livebode.records import MATRIX_TABLES, RunDirectory
 from tests.support.stored import digest
 
 LINES = Lines.parse("40,100", 400.0, 20)
@@ -43,8 +43,8 @@ def write(folder: Path) -> None:
         "kinds_of_entries": [[_KIND] * 2] * 2,
     }  # fmt: skip
     responses = matrices()
-    with RunDirectory(folder / "piece", matrix=True) as directory:
-        directory.write_matrices(responses)
+    with RunDirectory(folder / "piece", MATRIX_TABLES) as directory:
+        directory.write(responses)
         directory.write_event(Event("non-finite", 130, 0.325, "a sample is not finite"))
         directory.finish({"matrix": True, "found": found, "configuration": {}}, lambda _: None)
     (folder / "expected.json").write_text(json.dumps(content(responses), indent=1) + "\n")

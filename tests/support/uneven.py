@@ -9,7 +9,8 @@ import asammdf
 import numpy as np
 
 from livebode import Lines, multisine
-from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
+from livebode.simulation import TwoMassLoop
+from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.ulog_file import ulog_file
 
 LINES = Lines.parse("20:110:10", RATE_HZ, 400)

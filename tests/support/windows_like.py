@@ -65,7 +65,7 @@ def use() -> None:
     from livebode import Run
     from livebode.cli.app import app
     from livebode.core import RecordError
-    from livebode.records.segments.lock import Lock
+    from livebode.records import Lock
 
     roles = "--excitation w --input u --output velocity"
     for command in (

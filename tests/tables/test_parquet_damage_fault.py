@@ -11,8 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.tables import Table
-from livebode.tables.parquet_file import ParquetFile
+from livebode.tables import ParquetFile, Table
 from livebode.tables.thrift_compact import BINARY, I32, I64, LIST, STRUCT, binary, integer, list_of, struct_of
 from tests.support.damaged_bytes import damaged
 

@@ -6,7 +6,6 @@ import io
 import sys
 from typing import Any
 
-import duckdb
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -14,8 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.tables import Table
-from livebode.tables.parquet_file import ParquetFile
+from livebode.tables import ParquetFile, Table
 
 KINDS = [
     pa.float64(), pa.float32(), pa.int64(), pa.int32(), pa.int16(), pa.uint8(), pa.uint64(), pa.bool_(), pa.string(),
@@ -97,6 +95,14 @@ def test_files_of_pyarrow_are_read_as_it_reads_them(table, layout, places, group
     compare(sink.getvalue(), places, groups, rows)
 
 
+def test_categories_may_be_more_than_the_rows_of_a_group():
+    words = pa.array([f"µ{n}" for n in range(5)])
+    table = pa.table({"a": pa.DictionaryArray.from_arrays(pa.array(np.resize(np.arange(5), 33)), words)})
+    sink = io.BytesIO()
+    pq.write_table(table, sink, compression="lz4", row_group_size=30)
+    compare(sink.getvalue(), [0], [0, 1], 33)
+
+
 @settings(max_examples=40, deadline=None)
 @given(st.integers(1, 20), st.lists(st.tuples(st.integers(0, 1 << 20), st.integers(1, 60)), min_size=1, max_size=40))
 def test_dictionaries_of_any_size_with_runs_of_any_length_are_read(width, runs):
@@ -110,6 +116,8 @@ def test_dictionaries_of_any_size_with_runs_of_any_length_are_read(width, runs):
 
 
 def test_a_file_of_duckdb_is_read_as_pyarrow_reads_it(tmp_path):
+    import duckdb
+
     path = tmp_path / "a.parquet"
     select = "range AS sample, range / 4000.0 AS time_s, range % 7 = 0 AS valid, 'w' || range % 3 AS s"
     duckdb.sql(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-import duckdb
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -13,10 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.tables import Field, Schema, Table, Text
-from livebode.tables.parquet_file import ParquetFile
+from livebode.tables import Field, ParquetFile, ParquetWriter, Schema, Table, Text
 from livebode.tables.parquet_format import FORMS
-from livebode.tables.parquet_writer import ParquetWriter
 from livebode.tables.thrift_compact import decode
 
 SCHEMA = Schema(
@@ -59,6 +56,8 @@ def test_text_has_a_dictionary_and_numbers_have_none() -> None:
 
 
 def test_duckdb_reads_a_part_by_its_statistics(tmp_path: Path) -> None:
+    import duckdb
+
     (tmp_path / "a.parquet").write_bytes(written([50, 70, 1]))
     with duckdb.connect() as database:
         found = database.execute(
@@ -104,6 +103,8 @@ def test_every_kind_of_column_is_read_by_pyarrow_and_by_livebode(table: Table, r
 
 
 def test_a_long_column_has_several_pages(tmp_path: Path) -> None:
+    import duckdb
+
     number = np.arange(300_000)
     table = Table.of(
         {"all": np.sin(number), "few": number // 1000, "true": number % 7 > 0, "s": Text.of("ab", number % 2)}

@@ -13,9 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from livebode.tables import Table, Text
-from livebode.tables.record_batch import from_message, to_message
-from livebode.tables.schema_message import schema_from_message, schema_to_message
+from livebode.tables import Table, Text, from_message, schema_from_message, schema_to_message, to_message
 
 KINDS = ["float64", "int64", "bool", "float32", "uint8", "int16", "string"]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 
-import duckdb
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -46,6 +45,8 @@ def test_numbers_are_not_copied_for_pyarrow() -> None:
 
 
 def test_duckdb_reads_it() -> None:
+    import duckdb
+
     with duckdb.connect() as database:
         database.register("example", example())
         rows = database.execute("select model, count(*) from example group by model order by model").fetchall()

@@ -82,7 +82,13 @@ def sdist_fault(root: Path, sdist: Path) -> str:
     """What is wrong with an sdist: sources that the build needs, licences or metadata."""
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
-        needed = ["CMakeLists.txt", "kernel/CMakeLists.txt", "pyproject.toml", *licence_files(root)]
+        needed = [
+            "CMakeLists.txt",
+            "kernel/CMakeLists.txt",
+            "native/CMakeLists.txt",
+            "pyproject.toml",
+            *licence_files(root),
+        ]
         missing = [name for name in needed if name not in names]
         if missing:
             return f"the sdist lacks {', '.join(missing)}"

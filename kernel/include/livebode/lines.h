@@ -2,7 +2,7 @@
  *
  * Numerator and denominator of an estimate are the output's spectrum and another, each times conj(reference). Windows
  * one period apart are a series: a period has `places`, each with its own moments. All arrays belong to the caller;
- * arrays of spectra are pairs of re and im. The NumPy equivalent, with the same bits, is livebode.kernel.line_twin;
+ * arrays of spectra are pairs of re and im. The NumPy equivalent, with the same bits, is tests/twins/lines.py;
  * where a result is not a number, its sign and payload are not specified.
  */
 #ifndef LIVEBODE_LINES_H

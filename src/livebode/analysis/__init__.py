@@ -1,1 +1,5 @@
 """Finished runs: averages, fits, loop report, comparison, validation, and the baseline learned from them."""
+
+from livebode.on_first_use import on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

@@ -14,18 +14,16 @@ from math import inf, isfinite, log, nan, sqrt
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.analysis.loop_report import LoopReport
+from livebode.analysis._loop_report import LoopReport
 from livebode.analysis.parameter_track import Track
-from livebode.configuration.report_section import MAGNITUDES, MARGIN_UNITS, LimitSection
-from livebode.core import Loop, Response
-from livebode.core.distributions import normal_quantile
-from livebode.estimation.quantities import convert
+from livebode.arrays import Floats
+from livebode.configuration import MAGNITUDES, MARGIN_UNITS, LimitSection
+from livebode.core import Loop, Response, normal_quantile
+from livebode.estimation import convert
 from livebode.fitting import Fit
-from livebode.language import marked
+from livebode.language import Message
 
-Floats = NDArray[np.float64]
 Result = Literal["pass", "fail", "undecided"]
 
 _RISK = 0.05
@@ -35,11 +33,11 @@ _UNITS = {
 _FROM_MARGIN = {"max_sensitivity": "peak_sensitivity"}
 _FACTOR_MAX = 1000.0  # more data than this is not a plan
 
-NO_FIT = marked("no model was fitted")
-NO_LOOP = marked("the loop is not described, or its margins are not known")
-NOT_IN_MODEL = marked("the fitted model does not have it")
-SEVERAL = marked("the fitted model has several")
-NO_LINE = marked("no line with a known bound is within the band")
+NO_FIT = Message(Message("no model was fitted"))
+NO_LOOP = Message(Message("the loop is not described, or its margins are not known"))
+NOT_IN_MODEL = Message(Message("the fitted model does not have it"))
+SEVERAL = Message(Message("the fitted model has several"))
+NO_LINE = Message(Message("no line with a known bound is within the band"))
 
 
 @dataclass(frozen=True)

@@ -8,21 +8,19 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.analysis.averaged import Averaged, averaged
-from livebode.configuration.recorded import recorded_configuration
-from livebode.configuration.tracking_section import TrackingSection
-from livebode.core import PER_LINE, GridError, Lines, Response, Responses, widened
+from livebode.analysis._averaged import Averaged, averaged
+from livebode.arrays import Floats
+from livebode.configuration import TrackingSection, recorded_configuration
+from livebode.core import PER_LINE, GridError, Lines, Response, Responses, same_frequencies, same_rate, widened
 from livebode.fitting import RunningMean
+from livebode.language import Message
 from livebode.records import RunRecord
-
-Floats = NDArray[np.float64]
 
 ALPHA = 0.05
 """Probability that two runs of an unchanged machine differ at any line."""
 _PLACES = 12
 _ALONG = 1.645 / 2**0.5  # sigma of a complex value covers both parts; one part is below this with 95 %
 _WINDOWS_MIN = 3.0  # non-overlapping windows at a place; fewer give no usable scatter
-_SAME_HZ = 1e-6
 _SPEEDS_APART = 0.2
 
 
@@ -167,7 +165,9 @@ def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0, t
             means = [_by_place(run, span) for run in (before, after)]
     elif any(a.moved for a in both):
         warnings.append(
-            "Only one of the runs has a changing schedule: differences may be due to the position, not the machine."
+            Message(
+                "Only one of the runs has a changing schedule: differences may be due to the position, not the machine."
+            )
         )
     shared = sorted(means[0].keys() & means[1].keys()) if means else []
     if not shared:
@@ -205,7 +205,8 @@ def _common(before: Lines, after: Lines) -> tuple[Lines, tuple[NDArray[np.intp],
     """The common lines on the grid of the first run, and their indices in both runs."""
     f, g = before.frequency_hz, after.frequency_hz
     nearest = np.abs(f[:, np.newaxis] - g).argmin(axis=1)
-    first = np.flatnonzero(np.abs(g[nearest] / f - 1) < _SAME_HZ)
+    spacing_hz = min(before.resolution_hz, after.resolution_hz)
+    first = np.flatnonzero(same_frequencies(f, g[nearest], spacing_hz))
     if not first.size:
         raise GridError(
             "no-common-line",
@@ -220,23 +221,36 @@ def _common(before: Lines, after: Lines) -> tuple[Lines, tuple[NDArray[np.intp],
 
 def _about(before: RunRecord, after: RunRecord, common: int) -> list[str]:
     """Warnings about settings that make the responses of an unchanged machine differ."""
-    words = []
+    words: list[str] = []
     if common < max(len(before.lines), len(after.lines)):
         words.append(
-            f"The runs have {common} of {len(before.lines)} and {len(after.lines)} lines in common; these are compared."
+            Message(
+                "The runs have {common} of {before} and {after} lines in common; these are compared.",
+                common=common,
+                before=len(before.lines),
+                after=len(after.lines),
+            )
         )
     one, other = (recorded_configuration(run.summary).get("tracking", {}) for run in (before, after))
-    for key, what in (("estimator", "estimators"), ("hann", "windows"), ("differenced", "differencing")):
+    for key, what in (
+        ("estimator", Message("estimators")), ("hann", Message("windows")), ("differenced", Message("differencing"))
+    ):  # fmt: skip
         usual = getattr(TrackingSection(), key)
         if (a := one.get(key, usual)) != (b := other.get(key, usual)):
-            words.append(f"Different {what} ({a} and {b}) may cause differences.")
-    if before.lines.rate_hz != after.lines.rate_hz:
+            words.append(
+                Message("Different {what} ({before} and {after}) may cause differences.", what=what, before=a, after=b)
+            )
+    if not same_rate(before.lines.rate_hz, after.lines.rate_hz):
         words.append(
-            f"The rates differ ({before.lines.rate_hz:g} and {after.lines.rate_hz:g} Hz), so the delay of the hold, "
-            "which every response contains, differs too."
+            Message(
+                "The rates differ ({before_hz:g} and {after_hz:g} Hz), so the delay of the hold, which every "
+                "response contains, differs too.",
+                before_hz=before.lines.rate_hz,
+                after_hz=after.lines.rate_hz,
+            )
         )
     if ("motion" in before.found) != ("motion" in after.found):
-        words.append("Only one of the runs is corrected for the axis's motion.")
+        words.append(Message("Only one of the runs is corrected for the axis's motion."))
     return words
 
 
@@ -245,18 +259,32 @@ def _averages(run: RunRecord) -> bool:
 
 
 def _overlap(both: tuple[Averaged, Averaged], span: tuple[float, float]) -> list[str]:
-    words = " and ".join(f"{a.spans[0]:.4g} … {a.spans[1]:.4g}" for a in both)
+    spans = Message.conjunction(Message("{low:.4g} … {high:.4g}", low=a.spans[0], high=a.spans[1]) for a in both)
     if span[1] <= span[0]:
-        return [f"The runs have no place in common ({words} of the schedule): differences may be due to the position."]
-    remarks = []
+        return [
+            Message(
+                "The runs have no place in common ({spans} of the schedule): differences may be due to the position.",
+                spans=spans,
+            )
+        ]
+    remarks = list[str]()
     if span[1] - span[0] < 0.9 * max(a.spans[1] - a.spans[0] for a in both):
-        remarks.append(f"The runs cover different ranges ({words} of the schedule); only the common part is compared.")
+        remarks.append(
+            Message(
+                "The runs cover different ranges ({spans} of the schedule); only the common part is compared.",
+                spans=spans,
+            )
+        )
     speeds = [_speeds(a.overview) for a in both]
     fast = [float(np.median(s)) if s.size else 0.0 for s in speeds]
     if max(fast) > (1 + _SPEEDS_APART) * min(fast):
         remarks.append(
-            f"The runs have different speeds (median {fast[0]:.3g} and {fast[1]:.3g} per second), and a response in "
-            "motion depends on the speed: differences may be due to it."
+            Message(
+                "The runs have different speeds (median {before:.3g} and {after:.3g} per second), and a response in "
+                "motion depends on the speed: differences may be due to it.",
+                before=fast[0],
+                after=fast[1],
+            )
         )
     return remarks
 

@@ -8,17 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.averaged import Averaged, averaged
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.fit_settings import chosen_model, fit_settings
+from livebode.analysis._averaged import Averaged, averaged
+from livebode.configuration import FitSection, chosen_model, fit_settings
 from livebode.core import read_unit, split_plant_unit
-from livebode.fitting import Fit, fit
-from livebode.fitting.chains import Chain
-from livebode.fitting.unknown_gain import TwoMassGain
+from livebode.fitting import Chain, Fit, TwoMassGain, fit
+from livebode.language import Message
 from livebode.records import RunRecord
-from livebode.sources.expressions import negated
+from livebode.sources import negated
 
-_WRONG = 0.3  # of |G|: the model error from which a finished run's fit is refused
+MISFIT_MAX = 0.3  # of |G|: the model error from which a finished run's fit is refused
 
 
 def fit_run(directory: Path, section: FitSection, entry: str | None = None) -> tuple[Fit, str]:
@@ -35,23 +33,32 @@ def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
     """The same for the average of a run."""
     words = of.words
     if not of.response.unit:
-        words += "; the run has no units: N m, and rad/s or rad are assumed"
+        words = Message("{mean}; the run has no units: N m, and rad/s or rad are assumed", mean=words)
     return _best(of, section), words
 
 
-def _best(of: Averaged, section: FitSection) -> Fit:
-    """The fit; the one with the smaller misfit, where the quantity of the output is not known."""
+def better_output(of: Averaged, section: FitSection) -> str:
+    """Whether the output is a velocity or a position, by the smaller misfit."""
+    return _taken(_better(of, section))
+
+
+def _better(of: Averaged, section: FitSection) -> Fit:
     sections = [section]
     if section.output == "auto" and of.kinds.output is None:
         sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]
     found = [fit(of.response, chosen_model(one, of.kinds), **fit_settings(one)) for one in sections]
-    best = min(found, key=lambda one: one.epsilon if one.status == "ok" else np.inf)
-    if best.status != "ok" or best.epsilon < _WRONG:
+    return min(found, key=lambda one: one.epsilon if one.status == "ok" else np.inf)
+
+
+def _best(of: Averaged, section: FitSection) -> Fit:
+    """The fit; the one with the smaller misfit, where the quantity of the output is not known."""
+    best = _better(of, section)
+    if best.status != "ok" or best.epsilon < MISFIT_MAX:
         return best
     taken = _taken(best)
     return best.refused(
         f"as a {taken} the output differs from the {best.model.name} model by {100 * best.epsilon:.0f} % of |G| (limit "
-        f"{100 * _WRONG:.0f} %), so its parameters have no meaning: set fit.output, or fit another model"
+        f"{100 * MISFIT_MAX:.0f} %), so its parameters have no meaning: set fit.output, or fit another model"
     )
 
 

@@ -5,29 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from datetime import UTC, datetime
+from math import pi
 from os import PathLike
 from typing import Any, Protocol
 
-from livebode.configuration.axis import Axis
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.fit_settings import fitter_of
-from livebode.configuration.recorded import recorded_configuration
-from livebode.configuration.recording import open_recording
+from livebode.configuration import Axis, FitSection, OrdersSection, fitter_of, open_recording, recorded_configuration
 from livebode.core import BaselineError, Block, Lines, LivebodeError, PlantKinds, Responses
 from livebode.locations import Location, Url, local_copy, resolved
 from livebode.monitoring import (
     Baseline,
     LearnedMachine,
+    LearnedTorque,
     NonOverlappingWindows,
     ScheduleTable,
     WindowRows,
     learn_machine,
     learn_table,
+    learn_torque,
     places,
 )
-from livebode.records import RunRecord
-from livebode.records.matrix_run import matrix_unsupported
-from livebode.records.stored_precision import in_stored_precision
+from livebode.motion import Shaft
+from livebode.records import RunRecord, in_stored_precision, matrix_unsupported
 
 _ROLES = ("output", "input", "excitation", "schedule")
 # The belt's parameters referred to the motor shaft; changes are reported in percent.
@@ -140,6 +138,7 @@ def learn_from(
         report("learning the fitted parameters over the schedule")
         tables.append(_parameters(runs, axes[0].fit))
     machine, remark = _machine(runs, axes, report)
+    torque, torque_remark = _torque(runs, axes, report)
     if machine is None and (covariates := axes[0].monitoring.covariates):
         raise BaselineError(
             "covariates-without-machine",
@@ -156,9 +155,11 @@ def learn_from(
         axes[0].tracking.quantity,
         tuple(tables),
         machine,
+        torque,
         axes[0].motion is not None,
-        tuple(run.place for run in runs),
-        remark,
+        runs=tuple(run.place for run in runs),
+        remark=remark,
+        torque_remark=torque_remark,
         learned=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
@@ -223,7 +224,7 @@ def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
 
 def _check_same(first: HealthyRun, mine: Axis, run: HealthyRun, axis: Axis) -> None:
     for name, one, other in (
-        ("lines", first.lines, run.lines),
+        ("lines", True, first.lines.alike(run.lines) and first.lines.quiet == run.lines.quiet),
         ("hop", first.found["hop"], run.found["hop"]),
         ("signals", mine.signals, axis.signals),
         ("tracking options", mine.tracking, axis.tracking),
@@ -288,10 +289,11 @@ def _machine(
     if any(len(axis.source.logs) != 1 for axis in axes):
         return None, "a model is learned from recordings, but not all of these runs are from one"
     report("learning a model of the moving machine from the recordings")
+    names = [signals.input, signals.output, signals.schedule, *covariates]
     try:
         return (
             learn_machine(
-                [_samples(run, axis) for run, axis in zip(runs, axes)],
+                [_samples(run, axis, names) for run, axis in zip(runs, axes)],
                 runs[0].lines,
                 input=signals.input,
                 output=signals.output,
@@ -305,9 +307,42 @@ def _machine(
         return None, str(error)
 
 
-def _samples(run: HealthyRun, axis: Axis) -> Callable[[], Iterator[Block]]:
-    names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule, *axis.monitoring.covariates]
+def _torque(
+    runs: Sequence[HealthyRun], axes: Sequence[Axis], report: Callable[[str], None]
+) -> tuple[LearnedTorque | None, str]:
+    """Friction and orders, or the reason why there are none."""
+    signals, kinds = axes[0].signals, runs[0].kinds
+    if signals.input is None or not reads_recordings(axes[0]):
+        return None, "friction and orders need the torque and a scheduling position"
+    if kinds.output not in ("position", "velocity"):
+        return None, "friction and orders need the unit or the kind of the output"
+    if any(len(axis.source.logs) != 1 for axis in axes):
+        return None, "friction and orders are learned from recordings, but not all of these runs are from one"
+    report("learning friction and orders from the recordings")
+    try:
+        return (
+            learn_torque(
+                [_samples(run, axis, (signals.input, signals.output)) for run, axis in zip(runs, axes)],
+                input=signals.input,
+                output=signals.output,
+                kind=kinds.output,
+                lines_hz=runs[0].lines.frequency_hz,
+                turn=axes[0].orders.turn or 2 * pi / kinds.output_factor,
+                shafts=_shafts(axes[0], kinds),
+            ),
+            "",
+        )
+    except LivebodeError as error:
+        return None, str(error)
 
+
+def _shafts(axis: Axis, kinds: PlantKinds) -> list[Shaft]:
+    """Those of [orders]; without that section, the motor if its angle is in radians, turns or degrees."""
+    section = axis.orders
+    return section.all_shafts() if section != OrdersSection() or kinds.input == "torque" else []
+
+
+def _samples(run: HealthyRun, axis: Axis, names: Sequence[str]) -> Callable[[], Iterator[Block]]:
     ready = axis.ready
 
     def blocks() -> Iterator[Block]:

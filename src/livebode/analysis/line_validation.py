@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
-from livebode.analysis.averaged import averaged
+from livebode.analysis._averaged import averaged
 from livebode.analysis.fits import fit_averaged
 from livebode.analysis.poles import fit_poles
-from livebode.configuration.fit_section import FitSection
+from livebode.configuration import FitSection
 from livebode.core import FitError, GridError
-from livebode.fitting import POLE_MODELS, CommonPoles, Fit
-from livebode.fitting.pole_search import Kind
+from livebode.fitting import POLE_MODELS, CommonPoles, Fit, Kind
+from livebode.language import Message
 from livebode.records import RunRecord
 from livebode.validation import LineValidation, fitted_model, validate_at_lines
 
@@ -57,7 +57,11 @@ def validate_run_at_lines(
             fits.append((fit_averaged(average, section)[0], reason))
     with_reasons = [(fit, reason or drifting.get(_name(fit), "")) for fit, reason in fits if fit.status == "ok"]
     judged = [validate_at_lines(fitted_model(fit), response, reason=why) for fit, why in with_reasons if why]
-    refused = [f"{_name(fit)} was not fitted: {fit.sentence}" for fit, _ in fits if fit.status != "ok"]
+    refused: list[str] = [
+        Message("{model} was not fitted: {why}", model=_name(fit), why=fit.sentence)
+        for fit, _ in fits
+        if fit.status != "ok"
+    ]
     if not judged:
         raise FitError("not-fitted", "; ".join(refused), "fit another model", models=[_name(fit) for fit, _ in fits])
     return judged, refused

@@ -6,10 +6,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.toml_file import read_table, shortened
+from livebode.configuration import FitSection, read_table, shortened
 from livebode.core import UsageError, counted, nearest_name
-from livebode.fitting.pole_search import Kind
+from livebode.fitting import Kind
 from livebode.mimo import MatrixModes, fit_matrix, mean_matrix
 from livebode.records import RunRecord
 from livebode.simulation import Gantry

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.parameters import OK
+from livebode.arrays import Floats
+from livebode.core import OK
 from livebode.records import RunRecord
-
-Floats = NDArray[np.float64]
 
 MARGINS = "margins"
 _COLUMNS = ("sample", "time_s", "model", "name", "value", "sigma", "unit", "status")

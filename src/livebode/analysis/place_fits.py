@@ -6,20 +6,22 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.analysis._averaged import averaged
+from livebode.analysis.fits import MISFIT_MAX, better_output
 from livebode.analysis.places import by_place
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.fit_settings import fitter_of
-from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Parameters, Responses, TuneError
+from livebode.analysis.poles import fit_poles
+from livebode.configuration import FitSection, fitter_of, recorded_configuration
+from livebode.core import Parameters, Responses, TuneError, UsageError
 from livebode.export import LpvModel
 from livebode.fitting import PhysicalModel
 from livebode.records import RunRecord
 
 
-def fits_by_place(directory: Path) -> tuple[PhysicalModel, Parameters]:
-    """The model of the run's [fit] section, and its parameters, a row for each place; one row without a schedule.
+def fits_by_place(directory: Path, model: str | None = None) -> tuple[PhysicalModel, Parameters]:
+    """A model, by default of the run's [fit] section, and its parameters, a row for each place; one without a schedule.
 
-    Each place has the mean of its responses, whose bounds contain what changes within the place.
+    Each place has the mean of its responses, whose bounds contain what changes within the place. Where neither unit nor
+    key shows whether the output is a velocity or a position, it is what fits the average of the run better.
 
     Raises
     ------
@@ -29,25 +31,49 @@ def fits_by_place(directory: Path) -> tuple[PhysicalModel, Parameters]:
         If the section has no physical model.
     """
     run = RunRecord.open(directory)
-    section = FitSection.model_validate(recorded_configuration(run.summary).get("fit", {}))
+    section = _section(run, model)
+    if section.output == "auto" and run.kinds.output is None:
+        section = section.model_copy(update={"output": better_output(averaged(run), section)})
     fitter = fitter_of(section, run.kinds)
     responses = by_place(Responses.join(list(run.steady_batches())))
     found = fitter.process(responses)
-    if not found.ok.any():
+    use = found.ok & (found.epsilon < MISFIT_MAX)
+    if not use.any():
+        why = f"it differs by {100 * found.epsilon[0]:.0f} % of |G|" if found.ok[0] else found.status[0]
         raise TuneError(
             "no-mode",
-            f"the {found.model} model fits at no place: {found.status[0]}",
-            "choose another model in [fit], or measure longer",
+            f"the {found.model} model fits at no place: {why}",
+            "choose the model 'modal', as in livebode fit",
+            argument="model",
         )
-    rows = found[np.flatnonzero(found.ok)]
+    rows = found[np.flatnonzero(use)]
     order = np.argsort(np.nan_to_num(rows.schedule), kind="stable")
     return fitter.model, rows[order]
 
 
-def modes_by_place(directory: Path) -> Parameters:
-    """Frequency in Hz, damping ratio and quality factor of each mode at each place, as for `fits_by_place`."""
-    model, found = fits_by_place(directory)
-    return found.derived(model.derived_names, model.derived_units, model.derived)
+def modes_by_place(directory: Path, model: str | None = None) -> Parameters:
+    """Frequency in Hz, damping ratio and quality factor of each mode at each place, as for `fits_by_place`.
+
+    Of the model "modal" they are those of the average of the run, as `livebode fit` gives them.
+    """
+    run = RunRecord.open(directory)
+    section = _section(run, model)
+    if section.model == "modal":
+        found, _ = fit_poles([run], "modal", section)
+        return found.parameters
+    if section.model == "rational":
+        raise UsageError(
+            "not-one-of", "the model 'rational' has poles, not modes", "choose the model 'modal'", argument="model",
+            value="rational",
+        )  # fmt: skip
+    physical, rows = fits_by_place(directory, model)
+    names, units = rows.names + physical.derived_names, rows.units + physical.derived_units  # some are parameters
+    return rows.derived(names, units, lambda of: np.concatenate([of, physical.derived(of)], axis=-1))
+
+
+def _section(run: RunRecord, model: str | None) -> FitSection:
+    own = recorded_configuration(run.summary).get("fit", {})
+    return FitSection.model_validate(own | ({} if model is None else {"model": model}))
 
 
 def lpv_model(directory: Path) -> LpvModel:

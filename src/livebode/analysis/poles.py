@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from livebode.analysis.averaged import averaged
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.recorded import recorded_configuration
+from livebode.analysis._averaged import averaged
+from livebode.configuration import FitSection, recorded_configuration
 from livebode.core import UsageError
-from livebode.fitting.common_poles import CommonPoles, fit_common_poles
-from livebode.fitting.pole_search import Kind
+from livebode.fitting import CommonPoles, Kind, fit_common_poles
 from livebode.records import RunRecord
 
 _SHARED = {"log": "source", "input": "signals", "excitation": "signals"}

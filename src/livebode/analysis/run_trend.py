@@ -9,15 +9,12 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from livebode.analysis.parameter_track import MARGINS
-from livebode.core import Event
-from livebode.core.parameters import OK
+from livebode.arrays import Floats
+from livebode.core import OK, Event
 from livebode.records import RunRecord
 from livebode.tables import Table
-
-Floats = NDArray[np.float64]
 
 ALARMS = ("change", "change-corrected", "baseline-unknown")
 """Kinds of the events that are alarms of the monitoring."""

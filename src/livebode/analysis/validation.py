@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from livebode.analysis.fits import fit_run
-from livebode.configuration.axis import Axis
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.ready import ReadyCondition
-from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration import Axis, FitSection, ReadyCondition, recorded_configuration
 from livebode.core import Block, FitError, RecordError, SignalError, UsageError
+from livebode.language import Message
 from livebode.locations import Location, resolved
 from livebode.records import RunRecord
 from livebode.sources import Log, open_log
@@ -69,7 +67,13 @@ def validate_run(
     given = axis.source
     opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=[signals.output])
     if signals.excitation and "excitation" not in named and not opened.has(signals.excitation):
-        notes.append(f"{log.name} has no channel {signals.excitation!r}: judged without the excitation w")
+        notes.append(
+            Message(
+                "{recording} has no channel {channel}: judged without the excitation w",
+                recording=log.name,
+                channel=repr(signals.excitation),
+            )
+        )
         signals = signals.over({"excitation": None})
     names = [name for name in (signals.input, signals.output, signals.excitation) if name]
     ready = axis.ready
@@ -97,7 +101,11 @@ def validate_run(
     roles = {"input": signals.input, "output": signals.output, "excitation": signals.excitation}
     fits = [fit_run(directory, section)[0] for section in sections]
     judged = [validate(fit, block, loop=loop, lags=lags, **roles) for fit in fits if fit.status == "ok"]  # type: ignore[arg-type]
-    refused = [f"{fit.model.name} was not fitted: {fit.sentence}" for fit in fits if fit.status != "ok"]
+    refused = [
+        Message("{model} was not fitted: {why}", model=fit.model.name, why=fit.sentence)
+        for fit in fits
+        if fit.status != "ok"
+    ]
     if not judged:
         raise FitError("not-fitted", "; ".join(refused), "fit another model", models=[fit.model.name for fit in fits])
     return judged, notes + refused
@@ -106,7 +114,12 @@ def validate_run(
 def _freshness(own: Sequence[Location], log: Location) -> list[str]:
     if resolved(log) not in map(resolved, own):
         return []
-    return [f"{log.name} is the recording of the run: this is not independent data, because the model was fitted to it"]
+    return [
+        Message(
+            "{recording} is the recording of the run: this is not independent data, because the model was fitted to it",
+            recording=log.name,
+        )
+    ]
 
 
 def clean_stretch(opened: Log, names: list[str], ready: ReadyCondition | None = None) -> tuple[Block, int]:

@@ -1,12 +1,13 @@
 """The command line.
 
 Commands: measure (run, demo), look at recordings and runs (inspect, query), evaluate runs (fit, margins, validate,
-learn), export, check the installation (doctor). Exit codes: 0 success, 1 internal error, 2 usage error, 3 no model
-fits, 4 a limit is not met (report --check), 130 and above stopped by a signal.
+learn), export, check the installation (doctor). Exit codes: 0 success, 1 internal error, 2 wrong as it is, 3 no model
+fits, 4 a limit is not met (report --check), 75 what may pass, 130 and above stopped by a signal.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -20,18 +21,19 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from livebode.cli.command_help import error_page, help_page
-from livebode.cli.commands import GROUPS, SUMMARIES, command, subcommand
+from livebode.cli.commands import Command
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.first_page import ABOUT, OPTIONS
-from livebode.cli.log_options import File, Level, LogOptions, with_log
+from livebode.cli.log_options import File, Level, LogOptions, logged
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
-from livebode.core import DamageWarning, LivebodeError
-from livebode.core.installing import needing
+from livebode.core import DamageWarning, LivebodeError, needing
+from livebode.plugins import PluginWarning, loaded, named
 from livebode.version import __version__
 
 _HELP = {"help_option_names": ["--help", "-h"]}
 _OPTIONS = {names.split()[0] for names in OPTIONS}
+_BEFORE = ("--log-level", "--log-file")
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
@@ -73,17 +75,20 @@ class _Command(_Light, TyperCommand):
         except typer.Exit:
             raise
         except Exception as error:
+            if (option := getattr(error, "option_name", "")) in _BEFORE:
+                error.message = f"{option} stands before the command: livebode {option} … {info_name} …"  # type: ignore[attr-defined]
             if not json_requested() or not hasattr(error, "format_message"):
                 raise
             raise unparsed(error, info_name) from None
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error names the options that it concerns."""
-        group = ctx.parent.info_name if ctx.parent else ""
-        # Most modules of these packages import PyArrow, which both extras bring.
-        arrow = needing("PyArrow", group, f"the command {group}") if group in GROUPS else nullcontext()
+        group = ctx.parent.command if ctx.parent else None
+        extra = group.extra if isinstance(group, _Group) else ""
+        arrow = needing("PyArrow", extra, f"the command {group.name}") if group and extra else nullcontext()
+        module = self.callback.__module__ if self.callback else __name__
         try:
-            with arrow:
+            with arrow, logged(ctx.info_name, module, ctx.obj):
                 return super().invoke(ctx)
         except LivebodeError as error:
             name_options(error, self.params)
@@ -91,49 +96,48 @@ class _Command(_Light, TyperCommand):
 
 
 class _Commands(Mapping[str, TyperCommand]):
-    """The commands by name, or those of a group; the module of one is loaded when it is used."""
+    """The commands of a table by name; the module of one is loaded when it is used."""
 
-    def __init__(self, group: str | None) -> None:
-        self._group = group
-        self._summaries = GROUPS[group] if group else SUMMARIES
+    def __init__(self, table: Mapping[str, Command]) -> None:
+        self._table = table
 
     def __getitem__(self, name: str) -> Any:
-        if name not in self._summaries:
-            raise KeyError(name)
-        if self._group is None and name in GROUPS:
-            return _Group(name=name, group=name, help=SUMMARIES[name], context_settings=_HELP, no_args_is_help=True)
-        function = subcommand(self._group, name) if self._group else command(name)
+        command = self._table[name]
+        if command.commands:
+            return _Group(command, name=name, help=command.summary, context_settings=_HELP, no_args_is_help=True)
         alone = typer.Typer(add_completion=False)
-        alone.command(name, cls=_Command, context_settings=_HELP)(with_log(with_copies(function)))
+        function = with_copies(loaded(command.function))
+        alone.command(name, cls=_Command, context_settings=_HELP)(function)
         return cast("TyperCommand", typer.main.get_command(alone))
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._summaries)
+        return iter(self._table)
 
     def __len__(self) -> int:
-        return len(self._summaries)
+        return len(self._table)
 
 
 class _Group(_Light, TyperGroup):
     """A group of commands, with help in colour: the program, or a command with subcommands."""
 
-    def __init__(self, group: str | None = None, **options: Any) -> None:
+    def __init__(self, command: Command | None = None, **options: Any) -> None:
         super().__init__(**options)
-        self._summaries = GROUPS[group] if group else SUMMARIES
-        self.commands = _Commands(group)  # type: ignore[assignment]
+        self.extra = command.extra if command else ""
+        self._table: Mapping[str, Command] = command.commands if command else named("commands")
+        self.commands = _Commands(self._table)  # type: ignore[assignment]
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
         """The names in the order of the help."""
-        return list(self._summaries)
+        return list(self._table)
 
     def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:  # noqa: ARG002
         """A command as a list of commands shows it; its options are not needed for that, nor is its module."""
-        found = self._summaries.get(cmd_name)
-        return TyperCommand(name=cmd_name, help=found) if found else None
+        command = self._table.get(cmd_name)
+        return TyperCommand(name=cmd_name, help=command.summary) if command else None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the arguments begin with, to be run or completed."""
-        if f"--{args[0]}" in _OPTIONS and args[0] not in self._summaries:
+        if f"--{args[0]}" in _OPTIONS and args[0] not in self._table:
             ctx.fail(f"No such command {args[0]!r}. Did you mean 'livebode --{args[0]}'?")
         name, listed, rest = super().resolve_command(ctx, args)
         return name, listed and self.commands[listed.name or ""], rest
@@ -206,13 +210,15 @@ def _prepare_process() -> None:
     protect()
     warnings.showwarning = _warn
     warnings.simplefilter("default", DamageWarning)
+    warnings.simplefilter("default", PluginWarning)
 
 
 def _warn(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any, **__: Any) -> None:
-    if issubclass(category, DamageWarning):
+    """Print what is for a person; an overflow in a channel of huge values, for example, is for the log."""
+    if issubclass(category, DamageWarning | PluginWarning):
         print(f"livebode: {message}", file=sys.stderr)
     else:
-        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
+        logging.getLogger(__name__).warning("%s in %s, line %d: %s", category.__name__, filename, lineno, message)
 
 
 def _end(number: int, _frame: object) -> None:

@@ -15,8 +15,7 @@ from livebode.cli.failures import failure_of
 from livebode.cli.notices import NoticePrinter
 from livebode.cli.terminal import console
 from livebode.core import Event, LivebodeError
-from livebode.runtime import Session, StoppedError, Subscriber
-from livebode.runtime.axis_thread import AxisThread
+from livebode.runtime import AxisThread, Session, StoppedError, Subscriber
 
 _COLUMNS = ("axis", "state", "rate", "samples", "responses", "lost", "latency", "behind", "last event")
 _EVENT_LETTERS = 60

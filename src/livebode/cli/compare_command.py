@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from datetime import UTC, datetime
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -29,10 +28,6 @@ from livebode.cli.report_options import (
 )
 from livebode.core import UsageError
 from livebode.locations import location
-
-if TYPE_CHECKING:
-    from livebode.reporting.compare_report import Comparison
-    from livebode.reporting.matrix_comparison import MatrixComparison
 
 
 def compare_command(
@@ -81,11 +76,10 @@ def compare_command(
     limits apply to AFTER.
     """
     from livebode.cli.documents import write_documents
-    from livebode.configuration.recorded import recorded_report
+    from livebode.configuration import recorded_report
     from livebode.language import in_language
     from livebode.records import to_json
-    from livebode.reporting.compare_report import Comparison
-    from livebode.reporting.matrix_comparison import MatrixComparison, both_matrices
+    from livebode.reporting import Comparison, comparison_of
 
     options = {
         "machine": machine, "serial_number": serial_number, "operator": operator, "company": company,
@@ -93,40 +87,23 @@ def compare_command(
     }  # fmt: skip
     if out is None and (template is not None or ask or appendix or language or any(options.values())):
         raise _needs_out()
-    share, pair = _share(ignore_below), both_matrices(before, after) if entry is None else None
-    found: Comparison | MatrixComparison
-    if pair is not None:
-        found, later = MatrixComparison.of(*pair, ignore_below=share, **_described(gantry, cart)), pair[1]
-    elif gantry is not None or cart is not None:
+    kind = Comparison if entry is not None else comparison_of(before, after)
+    if kind is Comparison and (gantry is not None or cart is not None):
         raise _one_response()
-    else:
-        found = Comparison.of(before, after, ignore_below=share, entry=entry)
-        later = found.found.runs[1]
+    more = _described(gantry, cart) if entry is None else {"entry": entry}
+    found = kind.of(before, after, ignore_below=_share(ignore_below), **more)
     files: list[Path] = []
     remark = ""
     if out is not None:
-        first = header(recorded_report(later.summary), template, ask, options)
+        first = header(recorded_report(found.later.summary), template, ask, options)
         with in_language(language or first.language or "en"):
             document = found.document(datetime.now(UTC), header=first, appendix=appendix)
             files, remark = write_documents(document, out, force=force)
     if as_json:
         print(to_json(found.plain()))
         return
-    for line in (*_printed(found), *filter(None, (*files, remark))):
+    for line in (*found.printed, *filter(None, (*files, remark))):
         print(line)
-
-
-def _printed(found: Comparison | MatrixComparison) -> Iterator[str]:
-    """Verdict and tables, and why there are no parameters."""
-    from livebode.reporting.matrix_comparison import MatrixComparison
-
-    if isinstance(found, MatrixComparison):
-        yield from found.sentences
-    else:
-        yield from (finding.text for finding in found.sentences)
-    yield from (f"\n{table}" for table in found.tables)
-    if not isinstance(found, MatrixComparison) and not found.changes.parameters:
-        yield found.changes.parameter_words
 
 
 def _one_response() -> UsageError:
@@ -140,7 +117,7 @@ def _one_response() -> UsageError:
 
 def _described(gantry: Path | None, cart: str | None) -> dict[str, Any]:
     """The gantry, and places of its cart."""
-    from livebode.analysis.matrices import read_gantry
+    from livebode.analysis import read_gantry
 
     if gantry is None:
         if cart is not None:

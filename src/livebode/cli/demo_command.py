@@ -36,12 +36,17 @@ def demo_command(
 
     from livebode.cli.pictures import drawing, show
     from livebode.cli.serving import served
-    from livebode.configuration.serve_section import ServeSection
+    from livebode.configuration import ServeSection
     from livebode.core import Responses
     from livebode.records import to_json
-    from livebode.runtime import Destination
-    from livebode.runtime.demo import LEARNED_S, check_seconds, demo, demo_baseline  # with the simulation
-    from livebode.runtime.documents import TrackerResults
+    from livebode.runtime import (  # with the simulation
+        LEARNED_S,
+        Destination,
+        TrackerResults,
+        check_seconds,
+        demo,
+        demo_baseline,
+    )
 
     check_seconds(seconds)
     console = terminal.console(stderr=True)
@@ -57,7 +62,7 @@ def demo_command(
     # A first user sees the page without asking for it, on any free port, so that the default port stays free.
     shown = serve or (not fast and find_spec("uvicorn") is not None)
     with served(
-        shown, ServeSection() if serve else ServeSection(port=0), port, ["demo"], stays=serve
+        shown, ServeSection() if serve else ServeSection(port=0), port, {"demo": ()}, stays=serve
     ) as subscribers_of:
         with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
             task = bar.add_task("", total=seconds)

@@ -51,9 +51,11 @@ def design_command(
 ) -> None:
     """Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml."""
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
-    from livebode.experiments.designing import design_experiment  # with the simulation
-    from livebode.experiments.experiment import Experiment
-    from livebode.experiments.matrix_experiment import describes_several_motors
+    from livebode.experiments import (
+        Experiment,
+        describes_several_motors,
+        design_experiment,  # with the simulation
+    )
     from livebode.records import to_json
 
     if describes_several_motors(experiment):
@@ -128,7 +130,7 @@ def _table() -> Table:
 
 def _show_lines(console: Console, design: Design) -> None:
     """A table of the lines; of many lines a selection that contains the weakest."""
-    from livebode.experiment_design.encoder import COUNTS_MIN
+    from livebode.experiment_design import COUNTS_MIN
 
     relative, windows = design.accuracy.relative, design.windows
     each = -(-len(relative) // _LINES_SHOWN)

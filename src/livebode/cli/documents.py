@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from livebode.core import OutputError
-from livebode.core.document import Document
-from livebode.core.installing import install_command
+from livebode.core import Document, OutputError, install_command
 
 _NO_PDF = "no PDF: Typst is not installed; run {}, or print the page from a browser"
 
@@ -20,8 +18,7 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
         If a file exists and must not be replaced, or cannot be written.
     """
     from livebode.export import save
-    from livebode.report.html import to_html
-    from livebode.report.svg import pictures_svg
+    from livebode.report import pictures_svg, to_html
 
     base = out.with_suffix("") if out.suffix.lower() in (".html", ".pdf") else out
     page, paper = (base.with_name(base.name + ending) for ending in (".html", ".pdf"))
@@ -35,7 +32,7 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
     drawn = pictures_svg(document)
     save(page, lambda partial: partial.write_text(to_html(document, drawn), encoding="utf-8"), force=force)
     try:
-        from livebode.report.pdf import save_pdf
+        from livebode.report import save_pdf
     except ImportError:
         return [page], _NO_PDF.format(install_command("pdf"))
     try:

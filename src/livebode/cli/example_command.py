@@ -22,36 +22,38 @@ def example_command(
     as_json: Json = False,
 ) -> None:
     """Write recordings of simulated axes and their configurations, which the documentation uses; or list them."""
-    from livebode.interface.example_recordings import EXAMPLES, write_examples
+    from livebode.interface import write_examples
+    from livebode.plugins import named
     from livebode.records import to_json
 
+    examples = named("examples")
     if name is None:
         if as_json:
-            print(to_json({name: {"about": e.about, "files": e.files} for name, e in EXAMPLES.items()}))
+            print(to_json({name: {"about": e.about, "files": e.files} for name, e in examples.items()}))
             return
-        for each, example in EXAMPLES.items():
+        for each, example in examples.items():
             print(f"{each:<12} {example.about}: {', '.join(example.files)}")
         print("\nlivebode example NAME writes one of them to the directory example; all: every one.")
         return
-    if name not in (*EXAMPLES, _ALL):
+    if name not in (*examples, _ALL):
         raise UsageError(
             "not-one-of",
             f"{name!r} is not one of the examples",
-            f"choose {', '.join(EXAMPLES)} or {_ALL}",
+            f"choose {', '.join(examples)} or {_ALL}",
             argument="name",
             value=name,
-            allowed=[*EXAMPLES, _ALL],
+            allowed=[*examples, _ALL],
         )
-    names = [one for one, example in EXAMPLES.items() if example.usable] if name == _ALL else [name]
+    names = [one for one, example in examples.items() if example.usable] if name == _ALL else [name]
     files = write_examples(names, out, force=force)
     if as_json:
         print(to_json({"directory": str(out), "files": [str(path) for path in files]}))
         return
     for path in files:
         print(path)
-    if left_out := [one for one in EXAMPLES if name == _ALL and one not in names]:
+    if left_out := [one for one in examples if name == _ALL and one not in names]:
         print(f"left out, because an optional package is missing: {', '.join(left_out)}")
     print("\nTry:" if name != _ALL else "\nTry, for example:")
     print(f"  cd {out}")
-    for command in EXAMPLES["standstill" if name == _ALL else name].commands:
+    for command in examples["standstill" if name == _ALL else name].commands:
         print(f"  {command}")

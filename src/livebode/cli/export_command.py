@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,10 +12,12 @@ import typer
 from livebode.cli.options import Entry, Json
 from livebode.cli.remote import beside
 from livebode.core import UsageError, counted
+from livebode.estimates import kind_of, rule
 from livebode.locations import location
+from livebode.plugins import loaded, named
 
 if TYPE_CHECKING:
-    from livebode.export import WriteResult
+    from livebode.core import MatrixResponses, Responses
     from livebode.records import RunRecord
 
 _IN_PYTHON = {
@@ -53,31 +56,31 @@ def export_command(
     from livebode import export
     from livebode.records import RunRecord, to_json
 
-    formats = export.MODELS if lpv else export.TABLES if parameters else export.FORMATS
+    formats = export.writers("model" if lpv else "parameters" if parameters else "responses")
     chosen = {"--at": at is not None, "--mean": mean, "--parameters": parameters, "--lpv": lpv}
     chosen["--entry"] = lpv and entry is not None
     _check(to, chosen, tuple(formats))
     record = RunRecord.open(run, output_only=parameters, matrix=not lpv, entry=entry)
     name = beside(record.path)
-    path = out or name.with_name(name.name + "-parameters" * parameters + "-lpv" * lpv + export.ENDINGS[to])
+    path = out or name.with_name(name.name + "-parameters" * parameters + "-lpv" * lpv + named("exports")[to].ending)
     if parameters:
         table = export.ParameterTable(record.path, partial(record.tables, "parameters"))
-        written = export.save(path, lambda path: export.TABLES[to](path, table), force=force)
+        written = export.save(path, lambda path: loaded(formats[to])(path, table), force=force)
         found = {"file": str(path), "rows": written.rows}
         print(to_json(found) if as_json else f"{path}: {written.rows} parameter values")
         return
     if lpv:
-        from livebode.analysis.place_fits import lpv_model
+        from livebode.analysis import lpv_model
 
         model = lpv_model(run)
-        written = export.save(path, lambda path: export.MODELS[to](path, model), force=force)
+        written = export.save(path, lambda path: loaded(formats[to])(path, model), force=force)
         print(to_json({"file": str(path), "rows": written.rows}) if as_json else f"{path}: {written.rows} places")
         return
-    if record.is_matrix:
-        _no_time(record, at)
-        written = export.save(path, lambda path: _write_matrices(record, path, to, mean), force=force)
-    else:
-        written = export.save(path, lambda path: _write_responses(record, path, to, at, mean), force=force)
+    export_rule = rule(kind_of(record.summary), "export")
+    parts = export_rule(record, at, mean)
+    formats = export.writers(export_rule.__name__)
+    _check(to, chosen, tuple(formats))
+    written = export.save(path, lambda path: loaded(formats[to])(path, parts, record.summary), force=force)
     if as_json:
         print(to_json({"file": str(path), "rows": written.rows, "left_out": written.left_out}))
         return
@@ -85,30 +88,22 @@ def export_command(
     print(f"{path}: {counted(written.rows)} at {counted(len(record.lines), 'line')}{left_out}")
 
 
-def _write_responses(record: RunRecord, path: Path, to: str, at: float | None, mean: bool) -> WriteResult:
+def responses(record: RunRecord, at: float | None, mean: bool) -> Iterator[Responses]:
+    """All responses, the one nearest to a time, or their mean."""
     from livebode import export
     from livebode.core import Responses
 
     if at is not None:
-        parts = iter([Responses.of(export.at(record.batches(), at))])
-    elif mean:
-        from livebode.analysis.averaged import mean_of
+        return iter([Responses.of(export.at(record.batches(), at))])
+    if mean:
+        from livebode.analysis import mean_of
 
-        parts = iter([mean_of(record)])
-    else:
-        parts = record.batches()
-    return export.FORMATS[to](path, parts, record.summary)
+        return iter([mean_of(record)])
+    return record.batches()
 
 
-def _write_matrices(record: RunRecord, path: Path, to: str, newest: bool) -> WriteResult:
-    from livebode import export
-
-    parts = iter([record.matrix().newest()]) if newest else record.matrix_batches()
-    return export.MATRIX_FORMATS[to](path, parts, record.summary)
-
-
-def _no_time(record: RunRecord, at: float | None) -> None:
-    """UsageError if one time of a matrix run is to be exported: its matrices are from several experiments."""
+def matrices(record: RunRecord, at: float | None, newest: bool) -> Iterator[MatrixResponses]:
+    """All matrices, or the newest; UsageError for one at a time, as each is from several experiments."""
     if at is not None:
         raise UsageError(
             "conflict",
@@ -116,6 +111,7 @@ def _no_time(record: RunRecord, at: float | None) -> None:
             "use --mean for the newest matrix, or select one entry with --entry",
             options=["--at"],
         )
+    return iter([record.matrix().newest()]) if newest else record.matrix_batches()
 
 
 def _check(to: str, chosen: dict[str, bool], formats: tuple[str, ...]) -> None:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import errno
 import sys
 import traceback
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from livebode.core import LivebodeError, UsageError, plural
-from livebode.core.writing import not_written
+from livebode.core import LivebodeError, UsageError, not_written, plural
 
 _OPTIONS_BY_CODE = {"output.exists": ("out", "force")}
 _UNITS = frozenset({"hz", "s", "days", "n", "m", "db", "deg", "rad"})
 _FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
+_INTERNAL, _USAGE, _TEMPORARY = 1, 2, 75
+"""Exit codes; the last one is EX_TEMPFAIL of sysexits.h."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +44,17 @@ def failure_of(error: Exception) -> Failure:
     if known is None:
         lines = "".join(traceback.format_exception(error))
         message, remedy = "internal error in livebode", "please report it with the lines above"
-        return Failure(f"{lines}livebode: {message}; {remedy}", _internal(error, lines), 1)
+        return Failure(f"{lines}livebode: {message}; {remedy}", _internal(error, lines), _INTERNAL)
     options = [option for option in known.facts.get("options", ()) if option not in str(known)]
     named = f" ({plural('option', len(options))} {', '.join(options)})" if options else ""
-    return Failure(f"livebode: {known}{named}", _written(known), 2)
+    return Failure(f"livebode: {known}{named}", _written(known), exit_code_of([known]))
+
+
+def exit_code_of(errors: Sequence[BaseException]) -> int:
+    """The exit code for the errors of several axes: internal, else what may pass, else wrong as it is."""
+    if not all(isinstance(error, LivebodeError) for error in errors):
+        return _INTERNAL
+    return _TEMPORARY if any(getattr(error, "temporary", False) for error in errors) else _USAGE
 
 
 def _written(error: LivebodeError) -> dict[str, Any]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from livebode.cli.commands import SUMMARIES
 from livebode.cli.frames import MINIMUM_WIDTH, paragraph, table, usage
+from livebode.plugins import named
 
 ABOUT = "The Bode plot of a machine while the machine works."
 OPTIONS: Mapping[str, str] = {
@@ -26,6 +26,7 @@ def first_page(width: int, *, colours: bool) -> str:
     Usage: livebode [OPTIONS] COMMAND [ARGS]...
     """
     width = max(width, MINIMUM_WIDTH)
+    summaries = {name: command.summary for name, command in named("commands").items()}
     lines = [
         "",
         usage("livebode [OPTIONS] COMMAND [ARGS]...", colours=colours),
@@ -33,7 +34,7 @@ def first_page(width: int, *, colours: bool) -> str:
         *paragraph(ABOUT, width),
         "",
         *table("Options", OPTIONS.items(), width, colours=colours),
-        *table("Commands", SUMMARIES.items(), width, colours=colours),
+        *table("Commands", summaries.items(), width, colours=colours),
         "",
     ]
     return "\n".join(lines) + "\n"

@@ -13,9 +13,8 @@ from livebode.core import UsageError
 from livebode.locations import location
 
 if TYPE_CHECKING:
-    from livebode.configuration.fit_section import FitSection
-    from livebode.fitting.common_poles import CommonPoles
-    from livebode.fitting.pole_search import Kind
+    from livebode.configuration import FitSection
+    from livebode.fitting import CommonPoles, Kind
     from livebode.records import RunRecord
 
 _OPTIONS = {"radius_m": "radius", "inertia_ratio": "ratio", "fixed": "fix"}
@@ -73,8 +72,7 @@ def fit_command(
     With modal or rational the outputs of several runs have their poles in common, and so do all entries of a matrix run
     (rational by default). Defaults are from the run's \\[fit] section. Exit code 3 if no model fits.
     """
-    from livebode.fitting import POLE_MODELS
-    from livebode.fitting.pole_search import Kind
+    from livebode.fitting import POLE_MODELS, Kind
 
     given: dict[str, Any] = {
         "model": model,
@@ -122,10 +120,9 @@ def _opened(directories: list[Path], entries: list[str]) -> list[RunRecord]:
 
 
 def _fit_physical(runs: list[RunRecord], specified: dict[str, Any], order: int | None, as_json: bool) -> None:
-    from livebode.analysis.averaged import averaged
-    from livebode.analysis.fits import fit_averaged, fit_remarks, plain_fit
+    from livebode.analysis import averaged, fit_averaged, fit_remarks, plain_fit
     from livebode.cli.pictures import show_fit
-    from livebode.configuration.recorded import recorded_configuration
+    from livebode.configuration import recorded_configuration
     from livebode.records import to_json
 
     if len(runs) > 1 or order is not None:
@@ -133,7 +130,7 @@ def _fit_physical(runs: list[RunRecord], specified: dict[str, Any], order: int |
         raise UsageError(
             "conflict",
             f"{what} cannot be combined with a physical model",
-            "add --model modal or --model rational",
+            "add --model modal or --model rational" + ", with one run for each output" * (len(runs) > 1),
             argument="RUN" if len(runs) > 1 else "order",
         )
     run = runs[0]
@@ -158,8 +155,8 @@ def _fit_poles(
     runs: list[RunRecord], model: Kind, specified: dict[str, Any], order: int | None,
     as_json: bool,
 ) -> None:  # fmt: skip
-    from livebode.analysis.poles import fit_poles
-    from livebode.configuration.recorded import recorded_configuration
+    from livebode.analysis import fit_poles
+    from livebode.configuration import recorded_configuration
 
     _check_options(model, specified)
     own = recorded_configuration(runs[0].summary).get("fit", {})
@@ -171,7 +168,7 @@ def _fit_poles(
 def _fit_matrix(
     run: RunRecord, model: Kind, specified: dict[str, Any], order: int | None, as_json: bool
 ) -> None:  # fmt: skip
-    from livebode.analysis.matrices import fit_matrix_run
+    from livebode.analysis import fit_matrix_run
 
     _check_options(model, specified)
     section = _section(run.path, {name: specified[name] for name in specified if name != "model"})
@@ -190,7 +187,7 @@ def _check_options(model: Kind, specified: dict[str, Any]) -> None:
 
 
 def _show_poles(found: CommonPoles, remarks: list[str], as_json: bool) -> None:
-    from livebode.analysis.poles import plain_poles
+    from livebode.analysis import plain_poles
     from livebode.cli.pictures import show_poles
     from livebode.records import to_json
 

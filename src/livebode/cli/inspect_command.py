@@ -14,8 +14,7 @@ from livebode.locations import location
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from livebode.preparation.inspection import Inspection
-    from livebode.preparation.quiet import Quiet
+    from livebode.preparation import Inspection, Quiet
 
 _SUITS = {
     "joint": "the excitation repeats; name the plant input by --input, and in an open loop take --estimator direct",
@@ -52,7 +51,7 @@ def inspect_command(
 
     With --lines, search for mains hum in a recording without excitation, or in its longest pause.
     """
-    from livebode.preparation.inspection import inspect  # with its statistics half a second to import
+    from livebode.preparation import inspect  # with its statistics half a second to import
     from livebode.records import to_json
 
     _check(excitation, output, input_, lines, window)
@@ -107,8 +106,8 @@ def _check(
         raise UsageError(
             "missing",
             "--input is for hum in a recording without excitation, and needs lines",
-            "give --lines and --window too",
-            options=["--input", "--lines", "--window"],
+            "give --output, --lines and --window too",
+            options=["--input", "--output", "--lines", "--window"],
         )
     elif output is not None and excitation is None:
         raise UsageError(
@@ -171,6 +170,11 @@ def _show_clocks(found: Inspection, console: Console) -> None:
             "a run fits spectra to the samples at these times; the excitation is examined in interpolated samples",
             soft_wrap=True,
         )
+        console.print(
+            "--output-only, friction and orders need even steps: where only the stamps are late, give them "
+            f"--rate {found.clocks[0].stamps.rate_hz:.6g} --time none; otherwise resample",
+            soft_wrap=True,
+        )
 
 
 def _show_hum(quiet: Quiet, console: Console) -> None:
@@ -224,8 +228,8 @@ def _show_stretches(found: Inspection, console: Console) -> None:
 def _show_excitation(found: Inspection, console: Console) -> None:
     from rich.table import Table
 
-    from livebode.estimation.settings import default_hop
-    from livebode.excitation.pattern import pattern
+    from livebode.estimation import default_hop
+    from livebode.excitation import pattern
 
     excitation = found.excitation
     assert excitation is not None

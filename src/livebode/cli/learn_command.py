@@ -34,7 +34,7 @@ def learn_command(
     as_json: Json = False,
 ) -> None:
     """Learn a baseline from runs of the healthy machine, for `livebode run --baseline`."""
-    from livebode.cli.learned_baseline import check_replaceable, sentences, written
+    from livebode.cli.learned_baseline import baseline_text, check_replaceable, write_baseline
     from livebode.records import to_json
 
     if history is not None:
@@ -43,15 +43,15 @@ def learn_command(
         return
     if out is None:
         raise UsageError("missing", "the file of the baseline is not named", "give --out BASELINE", argument="out")
-    from livebode.analysis.learning import learn  # with the simulation
+    from livebode.analysis import learn  # with the simulation
 
     check_replaceable(out, reason, force=force)
     console = terminal.console(stderr=True)
     with console.status("reading the runs", spinner="line") as status:
         learned = learn(runs or [], report=status.update)
-    found = written(learned, out, reason, force=force)
+    found = write_baseline(learned, out, reason, force=force)
     file = found.pop("file")
-    print(to_json(found) if as_json else f"{sentences(found)}\n{file}")
+    print(to_json(found) if as_json else f"{baseline_text(found)}\n{file}")
 
 
 def _check_alone(runs: list[Path] | None, out: Path | None) -> None:
@@ -87,7 +87,7 @@ def _history(path: Path, *, as_json: bool) -> str:
 
 
 def _version(version: dict[str, Any]) -> str:
-    when = (version["learned"] or "at an unknown time").replace("T", " ").replace("+00:00", " UTC")
+    when = version["learned"].replace("T", " ").replace("+00:00", " UTC")
     reason = f"reason: {version['reason']}" if version["reason"] else "no reason stated"
     file = version["file"] or "its file is not here"
     return f"{version['id']}  learned {when}; {reason}\n    {file}\n    from {', '.join(version['runs'])}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +27,7 @@ def check_replaceable(out: Path, reason: str | None, *, force: bool) -> None:
         )
 
 
-def written(learned: Baseline, out: Path, reason: str | None, *, force: bool) -> dict[str, Any]:
+def write_baseline(learned: Baseline, out: Path, reason: str | None, *, force: bool) -> dict[str, Any]:
     """Write a baseline as the file's next version; what it is, for JSON and for `sentences`."""
     before = _previous(out, force=force)
     baseline = _saved(learned, before, out, reason or "")
@@ -66,8 +67,7 @@ def _place(baseline: Baseline, before: Baseline | None, out: Path) -> str:
 
 
 def _found(baseline: Baseline) -> dict[str, Any]:
-    from livebode.monitoring import PLACES
-    from livebode.monitoring.table import STILL
+    from livebode.monitoring import PLACES, STILL
 
     table, machine = baseline.tables[0], baseline.machine
     at_standstill = baseline.signals["schedule"] is not None and table.count.sum() == table.count[:, STILL].sum()
@@ -83,6 +83,8 @@ def _found(baseline: Baseline) -> dict[str, Any]:
         "hop_at_most": baseline.lines.window // PLACES if coarse else None,
         "model": None,
         "remark": baseline.remark,
+        "torque": None if baseline.torque is None else baseline.torque.smallest,
+        "torque_remark": baseline.torque_remark,
     }
     if machine is not None:
         found["model"] = {
@@ -91,7 +93,7 @@ def _found(baseline: Baseline) -> dict[str, Any]:
             "slowest": machine.slowest_m_per_s,
             "fastest": machine.fastest_m_per_s,
             "ripple_cycles_per_m": machine.ripple.cycles_per_m.round(2).tolist(),
-            "ripple_n_m": (2**0.5 * machine.ripple.amplitude_n_m).round(6).tolist(),
+            "ripple_n_m": machine.ripple.peak_n_m.round(6).tolist(),
             "delay_samples": round(machine.delay_s * baseline.lines.rate_hz, 3),
             "covariates": _covariates(machine),
             "between_runs_percent": _between_runs(machine),
@@ -100,7 +102,7 @@ def _found(baseline: Baseline) -> dict[str, Any]:
     return found
 
 
-def sentences(found: dict[str, Any]) -> str:
+def baseline_text(found: dict[str, Any]) -> str:
     """What was learned, and which changes it detects."""
     cells = f"{counted(found['cells'], 'cell')} of the schedule"
     text = f"Learned from {found['windows']} windows in {cells}."
@@ -110,14 +112,31 @@ def sentences(found: dict[str, Any]) -> str:
         watched = "Lines and fitted parameters" if found["parameters"] else "Only lines"
         return (
             f"{text} No model of the moving machine: {found['remark']}. {watched} are monitored; "
-            f"the smallest change that a line detects is {sizes}.{_coarse(found)}"
+            f"the smallest change that a line detects is {sizes}.{_coarse(found)}{_friction(found)}"
         )
     changes = ", ".join(f"{name} {percent:g} %" for name, percent in model["changes_from_percent"].items())
     way, speeds = _between(model["from"], model["to"]), _between(model["slowest"], model["fastest"])
     return (
         f"{text}\nThe model of the machine covers positions {way} at speeds {speeds} per second. Smallest changes that "
-        f"it detects: {changes}.{_ripple(model)}{_dependence(model)}"
+        f"it detects: {changes}.{_ripple(model)}{_dependence(model)}{_friction(found)}"
     )
+
+
+def _friction(found: dict[str, Any]) -> str:
+    """From which changes on friction and orders are monitored, or why not."""
+    if (torque := found["torque"]) is None:
+        return f"\nFriction and orders are not monitored: {found['torque_remark']}." if found["torque_remark"] else ""
+    sizes = torque["friction_percent"].values()
+    text = f"\nFriction is monitored; the smallest change that it detects is {_range(sizes, '%')}."
+    if orders := torque["orders"]:
+        sizes = _range(orders.values(), torque["unit"])
+        text += f" So are the orders; one is reported from an amplitude of {sizes} on."
+    return text
+
+
+def _range(sizes: Collection[float], unit: str) -> str:
+    low, high = (f"{size:.2g}" for size in (min(sizes), max(sizes)))
+    return f"{low} {unit}".rstrip() if low == high else f"{low} to {high} {unit}".rstrip()
 
 
 def _ripple(model: dict[str, Any]) -> str:
@@ -125,11 +144,15 @@ def _ripple(model: dict[str, Any]) -> str:
     text, late = "", model["delay_samples"]
     if model["ripple_n_m"]:
         pairs = zip(model["ripple_cycles_per_m"], model["ripple_n_m"])
-        orders = ", ".join(f"{torque:.2g} N m at {order:.4g} cycles" for order, torque in pairs)
+        orders = ", ".join(f"{_torque(torque)} at {order:.4g} cycles" for order, torque in pairs)
         text += f"\nTorque ripple over the position: {orders} per metre. The model contains it."
     if abs(late) >= _LATE_SAMPLES:
         text += f"\nThe output is {late:.2f} samples late relative to the torque. The model contains this delay."
     return text
+
+
+def _torque(peak_n_m: float) -> str:
+    return f"{peak_n_m:.2g} N m" if peak_n_m > 0 else "an amplitude that no stroke away from the lines shows"
 
 
 def _covariates(machine: LearnedMachine) -> list[dict[str, Any]]:

@@ -1,14 +1,13 @@
-"""--log-level and --log-file, before a command or behind it."""
+"""--log-level and --log-file, which stand before the command."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -36,47 +35,32 @@ File = Annotated[Path | None, typer.Option(metavar="FILE", help="Write the log t
 
 @dataclass(frozen=True)
 class LogOptions:
-    """What was given before the command."""
+    """Values of both options."""
 
     level: LogLevel | None = None
     file: Path | None = None
 
 
-def with_log(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with both options; those behind it replace those before it."""
+@contextmanager
+def logged(command: str, module: str, options: LogOptions) -> Iterator[None]:
+    """Log of a command: its beginning and end, and the error that ends it."""
+    import logging  # not for the help of a command
 
-    @wraps(command)
-    def logged(*, context: typer.Context, log_level: LogLevel | None, log_file: Path | None, **given: Any) -> None:
-        import logging  # not for the help of a command
+    from livebode.cli.log_output import log_output
 
-        from livebode.cli.log_output import log_output
-
-        log = logging.getLogger(command.__module__)
-        before: LogOptions = context.obj
-        with log_output(log_level or before.level, log_file or before.file):
-            log.info("livebode %s begins", context.info_name)
-            try:
-                command(**given)
-            except LivebodeError as error:
-                log.error("%s: %s", error.code, error)
-                raise
-            except (typer.Exit, typer.Abort, BrokenPipeError):
-                raise
-            except Exception as error:
-                log.error("ended by %s", type(error).__name__, exc_info=error)
-                raise
-            finally:
-                log.info("livebode %s ends", context.info_name)
-
-    own = inspect.signature(command, eval_str=True)
-    kind = inspect.Parameter.KEYWORD_ONLY
-    added = [
-        inspect.Parameter("log_level", kind, default=None, annotation=Level),
-        inspect.Parameter("log_file", kind, default=None, annotation=File),
-        inspect.Parameter("context", kind, annotation=typer.Context),
-    ]
-    parameters = [parameter.replace(kind=kind) for parameter in own.parameters.values()]
-    signature = own.replace(parameters=[*parameters, *added])
-    logged.__signature__ = signature  # type: ignore[attr-defined]
-    logged.__annotations__ = {name: parameter.annotation for name, parameter in signature.parameters.items()}
-    return logged
+    # Below livebode, also the command of a plug-in: what is logged there is written.
+    log = logging.getLogger("livebode").getChild(module.removeprefix("livebode."))
+    with log_output(options.level, options.file):
+        log.info("livebode %s begins", command)
+        try:
+            yield
+        except LivebodeError as error:
+            log.error("%s: %s", error.code, error)
+            raise
+        except (typer.Exit, typer.Abort, BrokenPipeError):
+            raise
+        except Exception as error:
+            log.error("ended by %s", type(error).__name__, exc_info=error)
+            raise
+        finally:
+            log.info("livebode %s ends", command)

@@ -11,7 +11,7 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
 from livebode.cli.visible import visible
-from livebode.core.writing import not_written
+from livebode.core import not_written
 
 FILE_BYTES_MAX = 16 << 20
 """A file that has so many bytes is renamed to NAME.1, in the place of the one before."""
@@ -88,6 +88,14 @@ def log_output(level: str | None, file: Path | None) -> Iterator[None]:
         logger.setLevel(before)
         logger.removeHandler(handler)
         handler.close()
+
+
+@contextmanager
+def warnings_shown() -> Iterator[None]:
+    """Within, what livebode logs as a warning goes to standard error, if no log was asked for."""
+    asked_for = any(not isinstance(handler, logging.NullHandler) for handler in logging.getLogger(LOGGER).handlers)
+    with log_output(None if asked_for else "warning", None):
+        yield
 
 
 def _opened(file: Path) -> logging.Handler:

@@ -9,12 +9,11 @@ import typer
 
 from livebode.cli.options import Entry, Json
 from livebode.cli.remote import results_directory
-from livebode.core import RecordError
-from livebode.core.writing import writing
+from livebode.core import RecordError, writing
 from livebode.locations import location
 
 if TYPE_CHECKING:
-    from livebode.analysis.loop_report import LoopReport
+    from livebode.analysis import LoopReport
     from livebode.margins import Margins, Proposal, Tuning
 
 
@@ -36,10 +35,9 @@ def margins_command(
 
     Writes margins.png to the run directory.
     """
-    from livebode.analysis.loop_report import loop_of_run
+    from livebode.analysis import loop_of_run
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
-    from livebode.configuration import Axis
-    from livebode.configuration.fit_section import FitSection
+    from livebode.configuration import Axis, FitSection
     from livebode.records import to_json
     from livebode.report import save_loop_picture
 
@@ -70,6 +68,7 @@ def show_loop(found: LoopReport) -> None:
         if found.fit.taken or not found.fit.complete:
             print(f"  {found.fit.about_bounds}")
     size, bound, at_hz = found.at_lines
+    print(f"  above {high:g} Hz nothing is promised: a mode that the model does not have can reduce the margins")
     print(f"  lines alone, without the model: Ms is at least {size:.3g} ± {bound:.2g} (at {at_hz:g} Hz)")
     if len(found.places) > 1:
         print(f"worst of {len(found.places)} fits, at 12 places and of the whole run: {_in_short(found.tuning.before)}")
@@ -79,7 +78,7 @@ def show_loop(found: LoopReport) -> None:
 def _show_margins(margins: Margins) -> None:
     import numpy as np
 
-    from livebode.margins.margins import WORDS
+    from livebode.margins import WORDS
 
     bound = margins.bound()[0]
     for i, (name, unit) in enumerate(zip(margins.names, margins.units)):

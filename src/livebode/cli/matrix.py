@@ -1,16 +1,40 @@
-"""Printed results of a matrix run."""
+"""Pictures and printed results of a matrix run."""
 
 from __future__ import annotations
 
-from livebode.cli.picture_support import tell_how_to_draw
-from livebode.cli.pictures import show_monitoring, tracked_amount
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from livebode.cli.picture_support import can_draw, tell_how_to_draw
+from livebode.cli.pictures import one_drawing_at_a_time, show_monitoring, tracked_amount
+from livebode.configuration import Axis
 from livebode.core import MatrixResponses
 from livebode.locations import original
-from livebode.runtime import Outcome
+from livebode.runtime import Draw, Outcome
+
+if TYPE_CHECKING:
+    from livebode.runtime import ResponseMatrix
 
 
-def show_matrix(outcome: Outcome, newest: MatrixResponses) -> None:
+def drawing_matrix(axis: Axis) -> Draw:
+    """A function that draws the bode.png and singular-values.png of a matrix run, if Matplotlib is installed."""
+
+    def draw(estimate: ResponseMatrix, into: Path) -> None:
+        responses = estimate.drawn or estimate.newest
+        if responses is None or not can_draw():
+            return
+        from livebode.report import save_matrix_pictures
+
+        with one_drawing_at_a_time():
+            save_matrix_pictures(responses, into, title=axis.source.title)
+
+    return draw
+
+
+def show_matrix(outcome: Outcome) -> None:
     """Print the entries of the newest matrix, its condition, and why columns are invalid."""
+    newest = outcome.matrix
+    assert newest is not None
     print(tracked_amount(outcome.summary))
     print(f"{original(str(outcome.directory))}/")
     for line in matrix_lines(newest):

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from livebode.mimo.design import MatrixDesign
+    from livebode.mimo import MatrixDesign
 
 _LINES_SHOWN = 25
 
@@ -29,8 +29,7 @@ def design_several(
 ) -> None:
     """Design, write and show."""
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
-    from livebode.experiments.matrix_designing import design_matrix
-    from livebode.experiments.matrix_experiment import MatrixExperiment
+    from livebode.experiments import MatrixExperiment, design_matrix
     from livebode.records import to_json
 
     asked = MatrixExperiment.read(experiment, {key: value for key, value in over.items() if value is not None})

@@ -16,8 +16,7 @@ from livebode.cli.options import Json
 
 if TYPE_CHECKING:
     from livebode.experiment_design import Design
-    from livebode.experiments.experiment import Experiment
-    from livebode.experiments.measuring.measuring import Prepared, StopRequest
+    from livebode.experiments import Experiment, Prepared, StopRequest
 
 
 def measure_command(
@@ -37,8 +36,7 @@ def measure_command(
     A limit, a second without samples, SIGTERM and a closed terminal ramp it down, too. What was recorded remains.
     """
     from livebode.cli.design_command import show_design, working
-    from livebode.experiments.experiment import Experiment
-    from livebode.experiments.measuring.measuring import prepare
+    from livebode.experiments import Experiment, prepare
     from livebode.records import to_json
 
     asked = Experiment.read(experiment)
@@ -69,7 +67,7 @@ def _show_playing(prepared: Prepared) -> None:
 def _measure(asked: Experiment, prepared: Prepared, out: Path, as_json: bool) -> None:
     from livebode.cli.picture_support import can_draw
     from livebode.cli.running import run_targets
-    from livebode.experiments.measuring.measuring import measure
+    from livebode.experiments import measure
     from livebode.locations import location
 
     def say(sentence: str) -> None:
@@ -90,7 +88,7 @@ def _measure(asked: Experiment, prepared: Prepared, out: Path, as_json: bool) ->
 @contextmanager
 def _stopping() -> Iterator[tuple[StopRequest, list[int]]]:
     """Signals that ramp down, in place of those that end the process."""
-    from livebode.experiments.measuring.measuring import StopRequest
+    from livebode.experiments import StopRequest
 
     request, came = StopRequest(), list[int]()
 

@@ -14,15 +14,13 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.options import Dbc, Excitation, Json, Output, Rate, Time
 from livebode.cli.shell import command_line
-from livebode.core import OutputError, UsageError
-from livebode.core.files import write_whole
-from livebode.core.writing import writing
+from livebode.core import OutputError, UsageError, write_whole, writing
 from livebode.locations import Location, Url, location
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from livebode.preparation.proposal import Proposals
+    from livebode.preparation import Proposals
 
 _NONE = "-"
 _QUESTIONS = {
@@ -66,8 +64,7 @@ def new_command(
 
     What an option gives is not asked for; "-" means no channel.
     """
-    from livebode.preparation.configuring import settled, suitable_estimator
-    from livebode.preparation.proposal import Proposals
+    from livebode.preparation import Proposals, settled, suitable_estimator
     from livebode.records import to_json
     from livebode.sources import open_log
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from livebode.core.installing import install_command
+from livebode.core import install_command
 
 
 def can_draw() -> bool:

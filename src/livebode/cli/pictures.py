@@ -9,17 +9,18 @@ from importlib import import_module
 from math import isnan
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from livebode.cli.picture_support import can_draw, tell_how_to_draw
 from livebode.cli.terminal import is_terminal, print_drawn
-from livebode.core import MatrixResponses, Model, Responses, counted
-from livebode.core.clock import RunClock, moment, moments_by
-from livebode.fitting import Fit
-from livebode.fitting.common_poles import CommonPoles
+from livebode.configuration import Axis
+from livebode.core import RunClock, counted, moment, moments_by
+from livebode.fitting import CommonPoles, Fit
 from livebode.locations import original
 from livebode.runtime import Draw, Outcome
-from livebode.runtime.destination import DrawMatrix
+
+if TYPE_CHECKING:
+    from livebode.runtime import SingleResponse
 
 _ALARMS_SHOWN = 8
 _ONE_AT_A_TIME = threading.Lock()
@@ -33,29 +34,23 @@ def one_drawing_at_a_time() -> threading.Lock:
 def drawing(title: str, names: tuple[str, str]) -> Draw:
     """A function that draws bode.png and tracking.png, if Matplotlib is installed."""
 
-    def draw(responses: Responses, into: Path, schedule: str, fitted: Model | None) -> None:
-        if not can_draw():
+    def draw(estimate: SingleResponse, into: Path) -> None:
+        responses = estimate.overview.responses()
+        if not len(responses) or not can_draw():
             return
         from livebode.report import save_pictures  # with Matplotlib half a second to import
 
+        schedule, fitted = estimate.schedule_label, estimate.fit
         with _ONE_AT_A_TIME:
             save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
 
     return draw
 
 
-def drawing_matrix(title: str) -> DrawMatrix:
-    """A function that draws the bode.png and singular-values.png of a matrix run, if Matplotlib is installed."""
-
-    def draw(responses: MatrixResponses, into: Path) -> None:
-        if not can_draw():
-            return
-        from livebode.report import save_matrix_pictures
-
-        with _ONE_AT_A_TIME:
-            save_matrix_pictures(responses, into, title=title)
-
-    return draw
+def drawing_of(axis: Axis) -> Draw:
+    """A function that draws the pictures of an axis with a single response."""
+    names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
+    return drawing(f"{axis.source.title}: {axis.signals.output}", names)
 
 
 def load_beside() -> None:
@@ -134,7 +129,7 @@ def _judged(found: dict[str, Any]) -> list[str]:
 def tracked_amount(summary: dict[str, Any]) -> str:
     """One line with the amount of data tracked."""
     counts, speed, found = (summary[part] for part in ("counts", "speed", "found"))
-    invalid = f", {counts['invalid_responses']} of them not valid" if counts["invalid_responses"] else ""
+    invalid = f", {counts['invalid_responses']} of them with an invalid line" if counts["invalid_responses"] else ""
     gaps = f", {counted(counts['gaps'], 'gap')}" if counts["gaps"] else ""
     return (
         f"{counted(counts['responses'], 'response')} at {counted(len(found['frequency_hz']), 'line')}{invalid}, "

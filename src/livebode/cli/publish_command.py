@@ -12,8 +12,8 @@ from livebode.cli.options import Json
 from livebode.core import LivebodeError, PublishError
 
 if TYPE_CHECKING:
-    from livebode.configuration.publish_section import PublishSection
-    from livebode.publishing.messages import EventMessage
+    from livebode.configuration import PublishSection
+    from livebode.publishing import EventMessage
 
 
 def publish_command(
@@ -26,8 +26,7 @@ def publish_command(
     One line for each [[publish]] section: with --test the result, else what is sent. Exit code 2 if a test failed.
     """
     from livebode.configuration import ConfigurationFile
-    from livebode.publishing.exposure import exposure
-    from livebode.publishing.publisher import sections_of
+    from livebode.publishing import exposure, sections_of
     from livebode.records import to_json
 
     sections = sections_of(ConfigurationFile(configuration, {}).read())
@@ -62,7 +61,7 @@ def _description(section: PublishSection) -> str:
 
 def _tested(section: PublishSection) -> dict[str, Any]:
     """The result of a test message."""
-    from livebode.publishing.sink import open_sink
+    from livebode.publishing import open_sink
 
     begun_s = time.perf_counter()
     try:
@@ -81,7 +80,7 @@ def _tested(section: PublishSection) -> dict[str, Any]:
 
 def _message() -> EventMessage:
     """The test message; each has its own id, so that no receiver takes it for a repetition."""
-    from livebode.publishing.messages import EventMessage
+    from livebode.publishing import EventMessage
 
     now_s = time.time()
     message = "This is a test message of livebode; nothing has happened."

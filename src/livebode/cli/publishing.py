@@ -14,7 +14,7 @@ from livebode.configuration import Axes
 from livebode.runtime import Destination, Subscriber
 
 if TYPE_CHECKING:
-    from livebode.publishing.publisher import Publisher
+    from livebode.publishing import Publisher
 
 
 def outbox_of(directory: Path) -> Path:
@@ -31,7 +31,7 @@ def published(axes: Axes, directory: Path, alone: str, *, edited: bool) -> Itera
     if not edited and not any(axis.publish for axis in axes.values()):
         yield None
         return
-    from livebode.publishing.publisher import Publisher
+    from livebode.publishing import Publisher
 
     with Publisher(axes, outbox_of(directory), print_line, alone=alone) as publisher:
         yield publisher

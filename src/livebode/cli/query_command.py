@@ -27,8 +27,10 @@ def query_command(
     A query has no access to files. DuckDB, pandas and Polars can also read the Parquet files directly.
     `livebode archive query` is the same for all runs of a lake.
     """
-    from livebode.records import RunRecord
-    from livebode.records.query import query  # with Arrow's data sets
+    from livebode.records import (
+        RunRecord,
+        query,  # with Arrow's data sets
+    )
 
     check_form(as_csv=as_csv, as_json=as_json)
     found = query(RunRecord.open(run, output_only=True, matrix=True), sql, rows)

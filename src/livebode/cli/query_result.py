@@ -12,7 +12,7 @@ from livebode.cli import terminal
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
-    from livebode.records.confined_sql import QueryResult
+    from livebode.records import QueryResult
 
 RowsMax = Annotated[int, typer.Option("--rows", min=1, max=10_000_000, help="Maximum number of rows to print.")]
 Csv = Annotated[bool, typer.Option("--csv", help="Print the result as CSV.")]

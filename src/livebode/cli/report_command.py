@@ -26,11 +26,11 @@ from livebode.cli.report_options import (
     Template,
     header,
 )
+from livebode.estimates import kind_of, rule
 from livebode.locations import location
 
 if TYPE_CHECKING:
-    from livebode.analysis.acceptance import Accepted
-    from livebode.reporting.report_data import Judged
+    from livebode.reporting import Judged
 
 _NOT_ALL_MET = 4
 
@@ -78,15 +78,10 @@ def report_command(
     with --entry it is that of one response, with its limits.
     """
     from livebode.cli.documents import write_documents
-    from livebode.configuration.recorded import recorded_report
-    from livebode.core.clock import moments_by
+    from livebode.configuration import recorded_report
+    from livebode.core import moments_by
     from livebode.language import in_language
-    from livebode.records import RunRecord, to_json
-    from livebode.records.matrix_run import entry_missing
-    from livebode.reporting.matrix_data import read_matrix
-    from livebode.reporting.matrix_report import matrix_report
-    from livebode.reporting.report_data import read
-    from livebode.reporting.run_report import report_of
+    from livebode.records import RunRecord, entry_missing, to_json
 
     run = RunRecord.open(directory, on_damage=lambda _: None, matrix=True, entry=entry)
     options = {
@@ -102,12 +97,9 @@ def report_command(
         raise entry_missing(str(directory), run.summary)
     judged = None if on is None else _judged(directory, on)
     with moments_by(run.clock), in_language(language or first.language or "en"):
-        accepted: tuple[Accepted, ...] = ()
-        if run.is_matrix:
-            document = matrix_report(read_matrix(directory, first), made=datetime.now(UTC), appendix=appendix)
-        else:
-            of = read(directory, judged, first, entry)
-            document, accepted = report_of(of, made=datetime.now(UTC), appendix=appendix), of.accepted
+        document, accepted = rule(kind_of(run.summary), "report")(
+            directory, judged, made=datetime.now(UTC), header=first, appendix=appendix, entry=entry
+        )
         files, remark = write_documents(
             document, out or results_directory(directory) / "report", force=force or out is None
         )
@@ -151,11 +143,10 @@ def _not_on_an_entry() -> Exception:
 
 
 def _judged(directory: Path, on: Path) -> Judged:
-    from livebode.analysis.validation import validate_run
-    from livebode.configuration.fit_section import FitSection
-    from livebode.configuration.recorded import recorded_configuration
+    from livebode.analysis import validate_run
+    from livebode.configuration import FitSection, recorded_configuration
     from livebode.records import RunRecord
-    from livebode.reporting.report_data import Judged
+    from livebode.reporting import Judged
 
     section = FitSection.model_validate(recorded_configuration(RunRecord.open(directory).summary).get("fit", {}))
     found, notes = validate_run(directory, on, [section])

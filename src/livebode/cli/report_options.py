@@ -13,7 +13,7 @@ from livebode.core import UsageError
 from livebode.language import available
 
 if TYPE_CHECKING:
-    from livebode.configuration.report_section import ReportSection
+    from livebode.configuration import ReportSection
 
 _LETTERS_MAX = 500
 _ASKED = {
@@ -91,7 +91,7 @@ def header(recorded: ReportSection, template: Path | None, ask: bool, options: d
     """
     found = recorded
     if template is not None:
-        from livebode.configuration.report_section import read_template
+        from livebode.configuration import read_template
 
         used = read_template(template)
         found = found.over({name: getattr(used, name) for name in used.model_fields_set})

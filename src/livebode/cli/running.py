@@ -8,35 +8,31 @@ import signal
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from livebode.cli import terminal
 from livebode.cli.band import parsed_band
-from livebode.cli.matrix import show_matrix
+from livebode.cli.failures import exit_code_of
 from livebode.cli.notices import NoticePrinter
 from livebode.cli.picture_support import tell_how_to_draw
-from livebode.cli.pictures import drawing, drawing_matrix, load_beside, show, tracked_amount
+from livebode.cli.pictures import load_beside, tracked_amount
 from livebode.cli.publishing import published, publishing_to
 from livebode.cli.remote import recorded_at
 from livebode.cli.serving import SubscribersOf, served
-from livebode.configuration import Axes, Axis, ConfigurationFile
-from livebode.configuration.serve_section import ServeSection
-from livebode.core import ConfigError, LivebodeError, LocationError, UsageError
+from livebode.configuration import Axes, Axis, ConfigurationFile, ServeSection
+from livebode.core import ConfigError, LocationError, UsageError
+from livebode.estimates import rule
 from livebode.locations import Location, Url, local_copy, location, original
 from livebode.records import to_json
-from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, run
-from livebode.runtime.documents import TrackerResults
-from livebode.sources.formats import read_head
+from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, TrackerResults, run
+from livebode.sources import read_head
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from livebode.publishing.publisher import Publisher
-    from livebode.runtime import OutputOnlyOutcome
-
-T = TypeVar("T")
+    from livebode.publishing import Publisher
 
 
 def run_targets(
@@ -74,21 +70,24 @@ def run_targets(
     axes: Axes = _axes(places, over, each) if file is None else file.read()
     live = any(axis.source.live for axis in axes.values())
     alone = axes.get("")
-    names = [name or target.stem for name in axes]
     place = Path("runs") / target.stem if out is None else location(out)
     segments = live or any(axis.record is not None for axis in axes.values())
     with recorded_at(place, segments=segments) as (directory, send):
-        if alone is not None and alone.output_only is not None:
-            _run_output_only(alone, directory, force, as_json, serve, send)
-            return
-        matrices = {name or target.stem: entries for name, axis in axes.items() if (entries := _entries(axis))}
-        with served(serve, _serving(axes), port, names, stays=not live, matrices=matrices) as subscribers_of:
+        entries = {name or target.stem: axis.entries for name, axis in axes.items()}
+        if serve and alone is not None and rule(alone.kind, "page") is None:
+            raise UsageError(
+                "conflict",
+                "the dashboard shows responses, and an output-only run has none",
+                "run it without the dashboard",
+                options=["--output-only", "--serve"],
+            )
+        with served(serve, _serving(axes), port, entries, stays=not live) as subscribers_of:
             publishing = published(axes, directory, target.stem, edited=live and file is not None)
             with publishing as publisher:
                 if alone is not None and not live:
                     outcome = _run(alone, directory, force, as_json, subscribers_of(target.stem), publisher)
                     send()
-                    _show(outcome, as_json)
+                    _show(outcome, alone, as_json)
                 else:
                     _run_axes(
                         axes, directory, force, as_json, file,
@@ -127,14 +126,6 @@ def _output_only(target: Location, chosen: bool, outputs: list[str], band: str |
             options=["--band"],
         )
     return {}
-
-
-def _entries(axis: Axis) -> list[tuple[str, str]]:
-    """Output and input of each entry of a matrix of responses; none of an axis with one."""
-    if not axis.signals.is_matrix:
-        return []
-    columns = axis.signals.listed("excitation" if axis.tracking.estimator == "indirect" else "input")
-    return [(output, column) for output in axis.signals.listed("output") for column in columns]
 
 
 def _serving(axes: Axes) -> ServeSection:
@@ -199,34 +190,7 @@ def _run(
     return _with_progress(job, quiet)
 
 
-def _run_output_only(
-    axis: Axis, directory: Path, force: bool, as_json: bool, serve: bool, send: Callable[[], None]
-) -> None:
-    """Track the modes of one recording, and print the result."""
-    from livebode.cli.output_only import draw_modes, show_modes
-    from livebode.runtime import run_output_only
-
-    if serve:
-        raise UsageError(
-            "conflict",
-            "the dashboard shows responses, and an output-only run has none",
-            "run it without the dashboard",
-            options=["--output-only", "--serve"],
-        )
-    title = f"{axis.source.title}: {axis.signals.output}"
-
-    def job(own: tuple[Subscriber, ...]) -> OutputOnlyOutcome:
-        return run_output_only(axis, directory, lambda into: draw_modes(into, title), force=force, subscribers=own)
-
-    outcome = _with_progress(job, as_json)
-    send()
-    if as_json:
-        print(to_json({"directory": original(str(outcome.directory))} | outcome.summary), flush=True)
-    else:
-        show_modes(outcome)
-
-
-def _with_progress(job: Callable[[tuple[Subscriber, ...]], T], quiet: bool) -> T:
+def _with_progress(job: Callable[[tuple[Subscriber, ...]], Outcome], quiet: bool) -> Outcome:
     """Run a job whose subscribers show notices and, on a terminal, a progress bar."""
     if quiet or not terminal.is_terminal(stderr=True):
         return job((NoticePrinter(lambda message: _print_notice(terminal.console(stderr=True), message)),))
@@ -279,7 +243,7 @@ def _run_axes(
     if session.ended_by and all(thread.ended_early for thread in session.all):
         raise KeyboardInterrupt if session.ended_by == signal.SIGINT else SystemExit(128 + session.ended_by)
     if "" in session.threads:
-        _show(session.threads[""].result(), as_json)
+        _show(session.threads[""].result(), axes[""], as_json)
         return
     if as_json:
         print(to_json({"axes": plain(session)}))
@@ -292,22 +256,16 @@ def _run_axes(
         tell_how_to_draw()
     errors = [thread.error for thread in session.all if thread.error is not None and not thread.ended_early]
     if errors:
-        raise typer.Exit(2 if all(isinstance(error, (LivebodeError, StoppedError)) for error in errors) else 1)
+        raise typer.Exit(exit_code_of([error for error in errors if not isinstance(error, StoppedError)]))
 
 
 def _destination(axis: Axis, directory: Path, force: bool, subscribers: tuple[Subscriber, ...]) -> Destination:
     """Where an axis is recorded, with its pictures."""
-    if axis.signals.is_matrix:
-        title = axis.source.title
-        return Destination(directory, drawing(title, ("", "")), force, subscribers, draw_matrix=drawing_matrix(title))
-    names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
-    return Destination(directory, drawing(f"{axis.source.title}: {axis.signals.output}", names), force, subscribers)
+    return Destination(directory, rule(axis.kind, "draw")(axis), force, subscribers)
 
 
-def _show(outcome: Outcome, as_json: bool) -> None:
+def _show(outcome: Outcome, axis: Axis, as_json: bool) -> None:
     if as_json:
         print(to_json({"directory": original(str(outcome.directory))} | outcome.summary), flush=True)
-    elif outcome.matrix is not None:
-        show_matrix(outcome, outcome.matrix)
     else:
-        show(outcome)
+        rule(axis.kind, "show")(outcome)

@@ -10,7 +10,11 @@ import typer
 from livebode.cli.options import Json
 from livebode.core import UsageError
 
-_FILES = ("axis", "experiment", "matrix-experiment", "archive")
+_FILES = {
+    "axis": "livebode.configuration.schema:axis_schema",
+    "experiment": "livebode.experiments.experiment_schema:experiment_schema",
+    "matrix-experiment": "livebode.experiments.experiment_schema:matrix_experiment_schema",
+}
 
 
 def schema_command(
@@ -33,26 +37,20 @@ def schema_command(
     The first line of the TOML file names the schema for the editor: `#:schema ./axis.schema.json`.
     """
     from livebode import export
+    from livebode.plugins import loaded, named
     from livebode.records import to_json
 
-    if file not in _FILES:
+    files = _FILES | {name: command.schema for name, command in named("commands").items() if command.schema}
+    if file not in files:
         raise UsageError(
             "not-one-of",
             f"there is no schema of {file!r}",
-            f"choose {' or '.join(_FILES)}",
+            f"choose {' or '.join(files)}",
             argument="file",
             value=file,
-            allowed=list(_FILES),
+            allowed=list(files),
         )
-    if file == "axis":
-        from livebode.configuration.schema import axis_schema as schema
-    elif file == "archive":
-        from livebode.archive.settings import archive_schema as schema
-    elif file == "matrix-experiment":
-        from livebode.experiments.experiment_schema import matrix_experiment_schema as schema
-    else:
-        from livebode.experiments.experiment_schema import experiment_schema as schema
-    text = to_json(schema(), indent=2)
+    text = to_json(loaded(files[file])(), indent=2)
     if out is None:
         print(text)
         return

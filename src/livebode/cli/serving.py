@@ -8,14 +8,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from livebode.configuration.serve_section import ServeSection
-from livebode.core.ending import calls_at_end
+from livebode.configuration import ServeSection
+from livebode.core import calls_at_end
 from livebode.runtime import Subscriber
 
 if TYPE_CHECKING:
     from livebode.dashboard import Dashboard
 
-Entries = Sequence[tuple[str, str]]
 SubscribersOf = Callable[[str], tuple[Subscriber, ...]]
 
 
@@ -38,14 +37,13 @@ def served(
     required: bool,
     section: ServeSection,
     port: int | None,
-    names: Sequence[str],
+    entries: Mapping[str, Sequence[tuple[str, str]]],
     stays: bool,
-    matrices: Mapping[str, Entries] | None = None,
 ) -> Iterator[SubscribersOf]:
     """A function that returns the subscribers of an axis by its name: the dashboard, or nobody.
 
-    `names` are the axes that exist from the beginning; `stays` serves the page after the run until Ctrl-C; `matrices`
-    has the entries of those with a matrix of responses.
+    `entries` has the axes that exist from the beginning, with the entries of their matrices; `stays` serves the page
+    after the run until Ctrl-C.
     """
     if not required:
         yield lambda _: ()
@@ -53,10 +51,9 @@ def served(
     dashboard = dashboard_of(section, port)
 
     def hub(name: str) -> Subscriber:
-        entries = (matrices or {}).get(name)
-        return dashboard.hub(name) if entries is None else dashboard.matrix_hub(name, entries)
+        return dashboard.hub(name, entries.get(name, ()))
 
-    for name in names:
+    for name in entries:
         hub(name)
     with dashboard:
         print_line(f"the dashboard is at {dashboard.url}")

@@ -9,13 +9,11 @@ import typer
 
 from livebode.cli.options import Entry, Excitation, Json, Output
 from livebode.cli.remote import results_directory
-from livebode.core import LivebodeError, RecordError
-from livebode.core.writing import writing
+from livebode.core import LivebodeError, RecordError, writing
 from livebode.locations import location
 
 if TYPE_CHECKING:
-    from livebode.configuration import Axis
-    from livebode.configuration.fit_section import FitSection
+    from livebode.configuration import Axis, FitSection
     from livebode.validation import LineValidation, Validation
 
 Channels = dict[str, str | None]
@@ -58,9 +56,9 @@ def validate_command(
     not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was. So is
     an entry of a matrix run.
     """
+    from livebode.analysis import validate_run
     from livebode.cli.picture_support import tell_how_to_draw
-    from livebode.configuration.fit_section import FitSection
-    from livebode.configuration.recorded import recorded_configuration
+    from livebode.configuration import FitSection, recorded_configuration
     from livebode.records import RunRecord, to_json
 
     base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {}) | (
@@ -73,15 +71,16 @@ def validate_command(
     simulated = [section for section, reason in zip(sections, reasons) if not reason]
     found: list[Validation] = []
     notes: list[str] = []
-    picture: Path | None = None
     if simulated:
-        found, notes, picture = _simulated(directory, on, simulated, lags, samples, channels)
+        found, notes = validate_run(directory, on, simulated, lags=lags, samples=samples, channels=channels)
     drifting = {v.model: v.why_lines for v in found if v.drifts}
     wanted = [(section, reason) for section, reason in zip(sections, reasons) if reason or drifting]
     at: list[LineValidation] = []
     if wanted:
         at, more = _at_lines(directory, on, wanted, drifting, channels, entry)
         notes = list(dict.fromkeys([*notes, *more]))
+    found = [v for v in found if v.model not in {one.model for one in at}]  # one verdict for each model
+    picture = _picture(found, directory, on) if found else None
     if as_json:
         print(to_json({"models": [v.plain() for v in found] + [one.plain() for one in at], "notes": notes}))
         return
@@ -109,20 +108,16 @@ def _reason(section: FitSection, on: Path, at_lines: bool, entry: str | None) ->
     return f"a {section.model} model is not simulated" if section.model in POLE_MODELS else ""
 
 
-def _simulated(
-    directory: Path, on: Path, sections: list[FitSection], lags: int, samples: int | None, channels: Channels
-) -> tuple[list[Validation], list[str], Path | None]:
-    from livebode.analysis.validation import validate_run
+def _picture(found: list[Validation], directory: Path, on: Path) -> Path | None:
     from livebode.cli.picture_support import can_draw
+
+    if not can_draw():
+        return None
     from livebode.report import save_validation_picture
 
-    found, notes = validate_run(directory, on, sections, lags=lags, samples=samples, channels=channels)
     into = results_directory(directory)
-    if not can_draw():
-        return found, notes, None
     with writing(into, RecordError):
-        picture = save_validation_picture(found, into, title=f"{directory.name} on {on.name}")
-    return found, notes, picture
+        return save_validation_picture(found, into, title=f"{directory.name} on {on.name}")
 
 
 def _at_lines(
@@ -136,7 +131,7 @@ def _at_lines(
     """On another run; a recording is tracked as the run was, in a directory that is removed."""
     from tempfile import TemporaryDirectory
 
-    from livebode.analysis.line_validation import validate_run_at_lines
+    from livebode.analysis import validate_run_at_lines
     from livebode.runtime import Destination, run
 
     if (on / "run.json").exists():
@@ -154,8 +149,7 @@ def _at_lines(
 
 def _tracked_alike(directory: Path, on: Path, channels: Channels) -> Axis:
     """The configuration of the run for another recording."""
-    from livebode.configuration import Axis
-    from livebode.configuration.recorded import recorded_configuration
+    from livebode.configuration import Axis, recorded_configuration
     from livebode.records import RunRecord
 
     own = recorded_configuration(RunRecord.open(directory, matrix=True).summary)

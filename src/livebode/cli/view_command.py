@@ -28,10 +28,9 @@ def view_command(
     Of a directory that contains runs, show a list of them, to search, tag, compare and delete, and their trends.
     """
     from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
-    from livebode.configuration.axis import serve_section
-    from livebode.configuration.serve_section import ServeSection
+    from livebode.configuration import ServeSection, read_serve_section
 
-    dashboard = dashboard_of(ServeSection() if axis is None else serve_section(axis), port)
+    dashboard = dashboard_of(ServeSection() if axis is None else read_serve_section(axis), port)
     if len(runs) == 1 and runs[0].is_dir() and not (runs[0] / "run.json").exists():
         dashboard.view_all(runs[0])
     else:

@@ -1,6 +1,5 @@
 """The configuration of an axis: axis.toml, its validation, and the configuration that a run recorded."""
 
-from livebode.configuration.axes import Axes, ConfigurationFile
-from livebode.configuration.axis import Axis
+from livebode.on_first_use import on_first_use
 
-__all__ = ["Axes", "Axis", "ConfigurationFile"]
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

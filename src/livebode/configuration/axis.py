@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
@@ -29,8 +29,7 @@ from livebode.configuration.signals_section import SignalsSection
 from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.configuration.tracking_section import TrackingSection
 from livebode.core import ConfigError, nearest_name
-from livebode.sources.live import SourceSettings, checked_address
-from livebode.sources.live.settings import check_keys
+from livebode.sources.live import SourceSettings, check_keys, checked_address
 
 NOT_RECORDED = {"serve", "publish"}
 """Sections that are about this computer and its network, and change no result: run.json has none of them."""
@@ -150,6 +149,19 @@ class Axis(ConfigurationSection):
         return axis
 
     @property
+    def kind(self) -> str:
+        """The kind of its estimate, a key of `livebode.estimates.ESTIMATES`."""
+        return "output_only" if self.output_only is not None else "matrix" if self.signals.is_matrix else "response"
+
+    @property
+    def entries(self) -> list[tuple[str, str]]:
+        """Output and input of each entry of a matrix of responses; none of an axis with one."""
+        if not self.signals.is_matrix:
+            return []
+        columns = self.signals.listed("excitation" if self.tracking.estimator == "indirect" else "input")
+        return [(output, column) for output in self.signals.listed("output") for column in columns]
+
+    @property
     def ready(self) -> ReadyCondition | None:
         """At which samples the machine is ready; None without such a channel. ConfigError as `ready_condition`."""
         # An average of matrices has no window of a machine that was not ready.
@@ -174,7 +186,13 @@ class _ServeOnly(ConfigurationSection):
     serve: ServeSection
 
 
-def serve_section(path: Path) -> ServeSection:
+class _LoopOnly(ConfigurationSection):
+    """A file with nothing but [loop]."""
+
+    loop: LoopSection
+
+
+def read_serve_section(path: Path) -> ServeSection:
     """[serve] of a configuration, or of a file that has only this section, as `livebode view` needs it.
 
     Raises
@@ -182,11 +200,24 @@ def serve_section(path: Path) -> ServeSection:
     ConfigError
         As of `Axis.read`.
     """
+    return _with(path, _ServeOnly, "serve").serve.beside(path.parent)
+
+
+def read_loop(path: Path) -> LoopSection:
+    """[loop] of a configuration, or of a file that has only this section; errors as of `Axis.read`."""
+    return _with(path, _LoopOnly, "loop").loop
+
+
+Only = TypeVar("Only", bound=BaseModel)
+
+
+def _with(path: Path, only: type[Only], name: str) -> Only | Axis:
+    """A whole configuration, or a file that has only this section."""
     data = read_table(path)
-    if set(data) != {"serve"}:
-        return Axis.of(data, str(path)).beside(path.parent).serve
+    if set(data) != {name}:
+        return Axis.of(data, str(path))
     try:
-        return _ServeOnly.model_validate(data).serve.beside(path.parent)
+        return only.model_validate(data)
     except ValidationError as error:
         raise _first_of(error).at(str(path)) from None
 

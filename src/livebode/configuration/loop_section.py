@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import CHANNELS_MAX, PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, counted
+from livebode.core import CHANNELS_MAX, PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, UsageError, counted
 
 SAME_RATE = 1e-6
 Ticks = Annotated[int, Field(ge=0)]
@@ -176,6 +176,19 @@ class LoopSection(ConfigurationSection):
             excitation_logged=self.excitation_logged,
             output_logged=self.output_logged,
         )
+
+    def described(self, rate_hz: float) -> Loop:
+        """The same; UsageError without a controller."""
+        loop = self.build(rate_hz)
+        if loop.feedback is None:
+            raise UsageError(
+                "missing",
+                "the loop is not described: its controllers are not known",
+                "describe those of the drive under [loop] of an axis file (docs/how-to/loop.md), for example by the "
+                f"line loop.velocity = {{gain = 0.25, integral_time_s = 0.1, rate_hz = {rate_hz:.12g}}}, and use it",
+                argument="axis",
+            )
+        return loop
 
     def _feedback(self) -> Model | None:
         if self.position_pd is not None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from livebode.core.machine_levels import LEVELS
+from livebode.core import LEVELS
 
 _LETTERS_MAX = 80
 _PATTERN = r"^([^/\s\x00-\x1f\x7f]([^/\x00-\x1f\x7f]*[^/\s\x00-\x1f\x7f])?)?$"

@@ -7,7 +7,9 @@ from typing import Annotated
 from pydantic import Field
 
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.output_only import OUTPUTS_MAX
+
+OUTPUTS_MAX = 8
+"""Most outputs of an output-only run."""
 
 
 class OutputOnlySection(ConfigurationSection):

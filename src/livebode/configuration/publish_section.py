@@ -2,63 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, Field
 
 from livebode.configuration.message_template import check_template
 from livebode.configuration.section import ConfigurationSection, File
+from livebode.configuration.sink_kind import Events, Part
 from livebode.core import ConfigError
+from livebode.plugins import named
 
-Kind = Literal["webhook", "email", "prometheus", "mqtt", "sparkplug", "syslog", "influxdb", "opcua"]
-Part = Literal["parameters", "responses", "status"]
-Events = Literal["all", "alarms", "high", "medium", "low", "info"]
-
-_LOGIN = {"username", "password_env", "password_file"}
-_TOKEN = {"token_env", "token_file"}
-_TLS = {"ca_file", "certificate_file", "key_file"}
 _EVERY = {"kind", "name", "url", "timeout_s"}
-_SENDS = {"events", "values", "interval_s"}
-
-
-@dataclass(frozen=True)
-class SinkKind:
-    """What a kind of sink takes.
-
-    Attributes
-    ----------
-    ports
-        The schemes of its URL, each with its usual port; None where the URL must name the port.
-    keys
-        Its keys, in addition to those of every sink.
-    events, values
-        What it sends by default.
-    """
-
-    ports: Mapping[str, int | None]
-    keys: frozenset[str]
-    events: tuple[Events, ...] = ("all",)
-    values: tuple[Part, ...] = ("parameters", "status")
-
-
-_HTTP = {"http": 80, "https": 443}
-_MQTT = {"mqtt": 1883, "mqtts": 8883}
-_WEBHOOK = _SENDS | _TOKEN | _TLS | {"template", "url_env", "url_file", "secret_env", "secret_file"}
-_EMAIL = {"events", "template", "sender", "recipients", "group_s", "ca_file"} | _LOGIN
-SINK_KINDS: Mapping[Kind, SinkKind] = {
-    "webhook": SinkKind(_HTTP, frozenset(_WEBHOOK), ("alarms",), ()),
-    "email": SinkKind({"smtp": 587, "smtps": 465}, frozenset(_EMAIL), ("alarms",), ()),
-    "prometheus": SinkKind(_HTTP, frozenset({"values", "interval_s", "certificate_file", "key_file"}), ()),
-    "mqtt": SinkKind(_MQTT, frozenset(_SENDS | _LOGIN | _TLS | {"discovery"})),
-    "sparkplug": SinkKind(_MQTT, frozenset({"values", "interval_s"} | _LOGIN | _TLS), ()),
-    "syslog": SinkKind({"udp": 514, "tcp": 601, "tls": 6514}, frozenset({"events", "template", "ca_file"}), values=()),
-    "influxdb": SinkKind(_HTTP, frozenset(_SENDS | _TOKEN | _TLS)),
-    "opcua": SinkKind({"opc.tcp": 4840}, frozenset(_SENDS | _LOGIN | {"certificate_file", "key_file"})),
-}
 
 
 class PublishSection(ConfigurationSection):
@@ -124,7 +80,7 @@ class PublishSection(ConfigurationSection):
         Whether Home Assistant finds the quantities by itself (mqtt).
     """
 
-    kind: Kind
+    kind: str
     url: str | None = None
     url_env: str | None = None
     url_file: File | None = None
@@ -160,12 +116,12 @@ class PublishSection(ConfigurationSection):
     @property
     def sent_events(self) -> tuple[Events, ...]:
         """The events that are sent."""
-        return SINK_KINDS[self.kind].events if self.events is None else tuple(self.events)
+        return named("sinks")[self.kind].events if self.events is None else tuple(self.events)
 
     @property
     def sent_values(self) -> tuple[Part, ...]:
         """The results that are sent."""
-        return SINK_KINDS[self.kind].values if self.values is None else tuple(self.values)
+        return named("sinks")[self.kind].values if self.values is None else tuple(self.values)
 
     def beside(self, folder: Path) -> PublishSection:
         """With files relative to a folder."""
@@ -174,7 +130,7 @@ class PublishSection(ConfigurationSection):
 
 
 def check_publish(sections: list[PublishSection]) -> None:
-    """ConfigError for a section whose keys do not fit its kind, or for two receivers of one name."""
+    """ConfigError for a kind that does not exist, keys that do not fit it, or two receivers of one name."""
     for section in sections:
         _check_keys(section)
         if section.url is not None:
@@ -204,10 +160,10 @@ def check_publish(sections: list[PublishSection]) -> None:
         )
 
 
-def check_url(url: str, kind: Kind) -> tuple[str, str, int, str]:
+def check_url(url: str, kind: str) -> tuple[str, str, int, str]:
     """Scheme, host, port and path with query of a receiver; ConfigError without the URL, of which any part may be
     secret."""
-    ports = SINK_KINDS[kind].ports
+    ports = named("sinks")[kind].ports
     try:
         parts = urlsplit(url)
         port, host = parts.port, parts.hostname
@@ -230,8 +186,17 @@ def check_url(url: str, kind: Kind) -> tuple[str, str, int, str]:
 
 
 def _check_keys(section: PublishSection) -> None:
-    kind = section.kind
-    taken = SINK_KINDS[kind].keys | _EVERY
+    kind, kinds = section.kind, named("sinks")
+    if kind not in kinds:
+        raise ConfigError(
+            "value-invalid",
+            f"publish.kind is {kind!r}, which is not supported",
+            f"write one of {', '.join(kinds)}" if kinds else "install the wing connect of livebode",
+            key="publish.kind",
+            value=kind,
+            allowed=list(kinds),
+        )
+    taken = kinds[kind].keys | _EVERY
     if stray := sorted(section.model_fields_set - taken):
         raise ConfigError(
             "key-unused",

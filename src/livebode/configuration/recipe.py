@@ -6,7 +6,7 @@ import hashlib
 import json
 
 from livebode.configuration.axis import Axis
-from livebode.records.content import content_sha256
+from livebode.records import content_sha256
 
 _READING = {"time", "clock", "from_", "to", "skip_periods", "dbc", "rate_hz", "kinds"}
 _APART = {"source", "serve", "record", "report", "machine", "publish"}

@@ -7,8 +7,14 @@ from typing import Any
 from livebode.configuration.axis import Axis
 from livebode.core import LivebodeError, RecordingError
 from livebode.locations import local_copy
-from livebode.sources import Log, open_log
-from livebode.sources.uneven import UNEVEN, UnevenLog, open_uneven
+from livebode.sources import UNEVEN, Log, UnevenLog, open_log, open_uneven
+
+_NAMES = {
+    "signals": ("outputs", "inputs", "excitations", "schedule", "ready"),
+    "tracking": ("differenced", "spikes"),
+    "monitoring": ("covariates",),
+    "output_only": ("others",),
+}
 
 
 def open_recording(axis: Axis) -> Log:
@@ -35,6 +41,21 @@ def open_even_or_uneven(axis: Axis) -> Log | UnevenLog:
             if error.code not in UNEVEN or source.time == "none":
                 raise
         return open_uneven(path, names, **_reading(axis))
+
+
+def with_shared_names(axis: Axis, log: Log) -> Axis:
+    """The axis whose channels are named without the name of the file, so that runs on other files have the same."""
+
+    def shared(names: Any) -> Any:
+        if isinstance(names, str):
+            return log.shared_name(names)
+        return names if names is None else type(names)(map(shared, names))
+
+    changed = {}
+    for section, keys in _NAMES.items():
+        if (one := getattr(axis, section)) is not None:
+            changed[section] = one.model_copy(update={key: shared(getattr(one, key)) for key in keys})
+    return axis.model_copy(update=changed)
 
 
 def _reading(axis: Axis) -> dict[str, Any]:

@@ -11,8 +11,7 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from livebode.configuration.section import ConfigurationSection, File, Language
 from livebode.configuration.toml_file import one_line, read_table, shortened
-from livebode.core import ConfigError, nearest_name
-from livebode.core.paper import Paper
+from livebode.core import ConfigError, Paper, nearest_name
 
 LIMITS_MAX = 50
 MARGIN_UNITS = {

@@ -11,9 +11,9 @@ from pydantic.json_schema import GenerateJsonSchema
 from livebode.configuration.axes import AXES_MAX, NAME, SUCCESSOR
 from livebode.configuration.axis import Axis
 from livebode.configuration.descriptions import descriptions, summary
-from livebode.fitting import MODELS
 from livebode.language import available
-from livebode.sources.live.settings import EVERY, LOG, TAKEN, SourceSettings
+from livebode.plugins import named
+from livebode.sources.live import EVERY, LOG, SourceSettings
 
 Schema = dict[str, Any]
 
@@ -61,7 +61,8 @@ def schema_of(model: type[BaseModel], file: str) -> Schema:
 def axis_schema() -> Schema:
     """Schema of axis.toml, with one axis or with several in [axes]."""
     found = schema_of(Axis, "axis")
-    found["$defs"]["FitSection"]["properties"]["model"]["enum"] = ["auto", *MODELS]
+    found["$defs"]["FitSection"]["properties"]["model"]["enum"] = ["auto", *named("models")]
+    found["$defs"]["PublishSection"]["properties"]["kind"]["enum"] = [*named("sinks")]
     for section in ("ServeSection", "ReportSection"):
         found["$defs"][section]["properties"]["language"]["enum"] = [*available()]
     required = _required(found, found["$defs"])
@@ -102,10 +103,10 @@ def _source() -> Schema:
     """Which keys of [source] can be combined: a kind of live source has its own."""
     kinds = [
         {
-            "if": {"required": ["url"], "properties": {"url": {"pattern": f"^{kind.replace('.', '[.]')}:"}}},
-            "then": {"propertyNames": {"enum": sorted(taken | EVERY | {"url"})}},
+            "if": {"required": ["url"], "properties": {"url": {"pattern": f"^{scheme.replace('.', '[.]')}:"}}},
+            "then": {"propertyNames": {"enum": sorted(kind.keys | EVERY | {"url"})}},
         }
-        for kind, taken in TAKEN.items()
+        for scheme, kind in named("sources").items()
     ]
     growing = {
         "if": {"required": ["follow", "log"], "properties": {"follow": {"const": True}}},

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, ConfigDict, Field
 
-from livebode.core.deferred_model import DeferredModel
+from livebode.core import DeferredModel
 from livebode.language import available
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,9 @@ from livebode.core import ConfigError, LivebodeError
 
 FILE_BYTES_MAX = 1 << 20
 _SHOWN = 120
+_QUOTED = re.compile(r'"""(?:[^\\]|\\.)*?"""|\'\'\'.*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL)
+_BETWEEN_KEYS, _PARTS_MAX = re.compile(r"[,=\[\]{}\n]"), 64
+"""For a key of many parts tomllib takes the square of their number."""
 _TEXT_MAX, _LINES_MAX, _DEPTH_MAX, _INTEGER_MAX = 500, 20_000, 12, 1 << 63
 
 
@@ -31,6 +35,7 @@ def read_bytes(path: Path) -> bytes:
             f"{str(path)!r} cannot be read: {error.strerror}",
             "check the path and its permissions",
             path=str(path),
+            errno=error.errno,
         ) from None
 
 
@@ -45,7 +50,10 @@ def parse_table(data: bytes, origin: str) -> dict[str, Any]:
             limit_bytes=FILE_BYTES_MAX,
         )
     try:
-        found = tomllib.loads(data.decode("utf-8"))
+        text = data.decode("utf-8")
+        if any(part.count(".") > _PARTS_MAX for part in _BETWEEN_KEYS.split(_QUOTED.sub("", text))):
+            raise _too_deep(origin)
+        found = tomllib.loads(text)
         _check_texts(found, "", origin, 0)
         return found
     except UnicodeDecodeError:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.arrays import Floats
 from livebode.core._kinds import PlotKind
 from livebode.core._line_selection import position, within
 from livebode.core.lines import Lines
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from livebode.core._response import Responses
 
 Quantity = Literal["plant", "open loop", "closed loop", "sensitivity"]
-Floats = NDArray[np.float64]
 
 PER_LINE = ("value", "sigma", "coherence", "valid", "input_coherence", "weight", "distortion")
 """Attributes with one value for each line."""

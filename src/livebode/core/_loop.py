@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex
 from livebode.core.errors import UsageError
 from livebode.core.model import Model, as_model
 
 Logged = Literal["before", "after"]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

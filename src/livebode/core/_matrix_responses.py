@@ -9,24 +9,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core._line_selection import ends, position, within
 from livebode.core._matrix_conversion import dataset, frd
 from livebode.core._response import Responses, widened
 from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import Lines
 from livebode.core.rows import RowArrays
+from livebode.language import Message
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Names = str | int | Sequence[str | int] | None
 
 CHANNELS_MAX = 8
 """Largest number of inputs, and of outputs."""
 
-REASONS = ("", "incomplete", "not excited", "not separated")
+REASONS = ("", Message("incomplete"), Message("not excited"), Message("not separated"))
 """Why a column is invalid, by its number in `MatrixResponses.reason`; the first is that of a valid one."""
 
 
@@ -232,15 +232,26 @@ class MatrixResponses(RowArrays):
         rows = np.flatnonzero(self.valid.any(axis=(1, 2)))
         return self[rows[-1:]]
 
-    def why(self, row: int = -1) -> list[str]:
+    def why(self, row: int = -1) -> list[Message]:
         """Sentences about the columns that are invalid in a row: which, at how many lines, and the reason."""
         found = []
         for i, name in enumerate(self.inputs):
             for number, word in enumerate(REASONS):
                 at = self.frequency_hz[self.reason[row, :, i] == number]
                 if number and at.size:
-                    where = f"{at[0]:g} Hz" if at.size == 1 else f"{at.size} lines from {at[0]:g} to {at[-1]:g} Hz"
-                    found.append(_SENTENCES[word].format(name=name, where=where))
+                    where = Message("{line_hz:g} Hz", line_hz=at[0])
+                    if at.size > 1:
+                        where = Message(
+                            "{lines} lines from {low_hz:g} to {high_hz:g} Hz",
+                            lines=at.size,
+                            low_hz=at[0],
+                            high_hz=at[-1],
+                        )
+                    found.append(
+                        Message(
+                            "column {column} is invalid at {where}: {why}", column=name, where=where, why=_WHY[word]
+                        )
+                    )
         return found
 
     def transformed(
@@ -392,11 +403,12 @@ class MatrixResponses(RowArrays):
         )
 
 
-_SENTENCES = {
-    "incomplete": "column {name} is invalid at {where}: a window contains a start, a gap or an excluded sample",
-    "not excited": "column {name} is invalid at {where}: the input does not move; excite it there",
-    "not separated": "column {name} is invalid at {where}: the input moves together with others in all experiments; "
-    "use as many different experiments as inputs",
+_WHY = {
+    "incomplete": Message("a window contains a start, a gap or an excluded sample"),
+    "not excited": Message("the input does not move; excite it there"),
+    "not separated": Message(
+        "the input moves together with others in all experiments; use as many different experiments as inputs"
+    ),
 }
 
 

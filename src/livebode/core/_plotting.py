@@ -78,11 +78,11 @@ def _draw(kind: PlotKind, panels: Any, responses: Responses, one: Response, curv
     rows = use.any(axis=1)
     cloud = Cloud(np.where(use, responses.value, np.nan)[rows]) if np.count_nonzero(rows) > 1 else None
     if kind == "bode":
-        from livebode.drawing.bode import draw_bode
+        from livebode.drawing import draw_bode
 
         draw_bode(panels[0], panels[1], curve, cloud)
         return
-    from livebode.drawing.plane import draw_nichols, draw_nyquist
+    from livebode.drawing import draw_nichols, draw_nyquist
 
     draw = draw_nyquist if kind == "nyquist" else draw_nichols
     draw(panels[0], curve, cloud, critical=one.quantity == "open loop")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.arrays import Floats
 from livebode.core import _conversion, _description
 from livebode.core._frequency_response import PER_LINE, FrequencyResponse, Quantity
 from livebode.core._line_selection import ends
@@ -19,8 +20,6 @@ from livebode.core.rows import RowArrays
 if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
-
-Floats = NDArray[np.float64]
 
 
 def widened(sigma: ArrayLike, dof: ArrayLike, c: float) -> Floats:

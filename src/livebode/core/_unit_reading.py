@@ -46,6 +46,8 @@ _SYMBOLS: dict[str, tuple[float, _Dimension]] = {
     **dict.fromkeys(("rev", "turn", "r", "U"), (2 * pi, _ANGLE)),
     **dict.fromkeys(("rpm", "RPM"), (2 * pi / 60, (0, 0, -1, 0, 1))),
     "kg": (1.0, (0, 1, 0, 0, 0)),
+    **dict.fromkeys(("g", "gn", "G"), (9.80665, (1, 0, -2, 0, 0))),  # of accelerometers; no other kind has g
+    "mg": (9.80665e-3, (1, 0, -2, 0, 0)),
     "sec": (1.0, _SECOND),
     "min": (60.0, _SECOND),
     "h": (3600.0, _SECOND),
@@ -79,8 +81,8 @@ class UnitReading:
 def read_unit(text: str) -> UnitReading:
     """What a unit measures, by its dimension; spellings of the same unit give the same.
 
-    Recognised are products and quotients of m, kg, s, min, h, A, N, rad, °, deg, rev and rpm with SI prefixes. The unit
-    1/s is that of an angular velocity.
+    Recognised are products and quotients of m, kg, s, min, h, A, N, g, rad, °, deg, rev and rpm with SI prefixes. The
+    unit 1/s is that of an angular velocity.
 
     >>> [read_unit(text).kind for text in ("N m", "rad s^-1", "mm/s²", "Arms", "1/min", "counts", "")]
     ['torque', 'velocity', 'acceleration', 'current', 'velocity', 'other', 'other']

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from math import isfinite, nan
 from typing import Any, Literal
 
-from livebode.language import date, number
+from livebode.language import Moment, date
 
 ClockKind = Literal["utc", "relative"]
 """Whether times are seconds since 1970 in UTC, or seconds since any other moment."""
@@ -88,7 +88,7 @@ def moments_by(clock: RunClock) -> Iterator[None]:
         _CLOCK.reset(before)
 
 
-def moment(time_s: float, digits: int = 1) -> str:
+def moment(time_s: float, digits: int = 1) -> Moment:
     """A time of a run as text for a message.
 
     Parameters
@@ -100,19 +100,15 @@ def moment(time_s: float, digits: int = 1) -> str:
 
     Returns
     -------
-    str
+    Moment
         As `date_and_time` where the run has a clock (`moments_by`); else seconds.
 
     >>> moment(12.345), moment(12.345, 2), moment(float("nan"))
     ('12.3 s', '12.35 s', '—')
     """
-    if not isfinite(time_s):
-        return "—"
     clock = _CLOCK.get()
-    unix_s = None if clock is None else clock.unix_s(time_s)
-    if unix_s is None or not 0 <= unix_s < _DATES_TO_S:
-        return f"{number(time_s, f'.{digits}f')} s"
-    return date_and_time(unix_s)
+    unix_s = None if clock is None or not isfinite(time_s) else clock.unix_s(time_s)
+    return Moment(float(time_s), unix_s if unix_s is not None and 0 <= unix_s < _DATES_TO_S else None, digits)
 
 
 def date_and_time(unix_s: float) -> str:

@@ -206,7 +206,8 @@ class Cascade(Algebra):
 
     Nevaranta 2016, eq. (16), for sampled loops: the position is the trapezoidal integral of the sampled velocity
     at the velocity controller's rate, exact to about 2e-6 where the loop samples both. Velocity feedforward acts on
-    the reference only and so does not appear.
+    the reference only and so does not appear. Where the velocity controller is slower than the recording, it reads a
+    reference that changes only at its own ticks, so that its hold does not delay the position's part again.
 
     Parameters
     ----------
@@ -232,6 +233,22 @@ class Cascade(Algebra):
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)
+        return np.asarray(self.velocity.response(f) * (1 + self.outer(f)))
+
+    def outer(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Position controller and integral, in units of the velocity controller."""
+        inner, outer = self.velocity, self.position
         rule: Rule = "backward" if self.velocity_differenced else "trapezoidal"
-        position = integral(f, self.velocity.rate_hz * self.velocity.rate_divider, rule)
-        return np.asarray(self.velocity.response(f) * (1 + self.position.response(f) * position))
+        tick_hz = inner.rate_hz * inner.rate_divider
+        if self.in_step:
+            turn = np.exp(-2j * np.pi * frequency_hz / inner.rate_hz)
+            held = np.mean([turn**i for i in range(outer.rate_divider // inner.rate_divider)], axis=0)
+            position = outer.before_hold(frequency_hz) * held
+        else:
+            position = outer.response(frequency_hz)
+        return np.asarray(position * integral(frequency_hz, tick_hz, rule))
+
+    @property
+    def in_step(self) -> bool:
+        """Whether the position controller changes its output only at ticks of the velocity controller."""
+        return self.position.hold == "zero-order" and self.position.rate_divider % self.velocity.rate_divider == 0

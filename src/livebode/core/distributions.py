@@ -10,9 +10,9 @@ from math import atan, exp, inf, lgamma, log, pi, sin, sqrt
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
 
 normal_quantile = NormalDist().inv_cdf
 """Value that a standard normal variable remains below with a probability."""

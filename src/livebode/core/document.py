@@ -8,21 +8,21 @@ from datetime import UTC, datetime
 from typing import Any, Literal
 
 from livebode.core.paper import Paper
-from livebode.language import marked
+from livebode.language import Message
 
 Tone = Literal["ok", "check", "alarm", "differs", "open", "pass", "fail", "undecided"]
 """Nothing to do; a person should look; an alarm is active; two runs differ; not assessed; and the three results of a
 limit: inside by more than the bound, outside by more than the bound, too close to decide."""
 
 TONES: Mapping[str, str] = {
-    "ok": marked("OK"),
-    "check": marked("check"),
-    "alarm": marked("ALARM"),
-    "differs": marked("differs"),
-    "open": marked("not assessed"),
-    "pass": marked("PASS"),
-    "fail": marked("FAIL"),
-    "undecided": marked("not decided"),
+    "ok": Message("OK"),
+    "check": Message("check"),
+    "alarm": Message("ALARM"),
+    "differs": Message("differs"),
+    "open": Message(Message("not assessed")),
+    "pass": Message("PASS"),
+    "fail": Message("FAIL"),
+    "undecided": Message(Message("not decided")),
 }
 """The verdict that is printed for each tone."""
 
@@ -54,7 +54,10 @@ class PrintedTable:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture that is not drawn yet: its kind, its data, and its caption."""
+    """A picture that is not drawn yet: its kind, its data, and its caption.
+
+    The kind of a plug-in is "module:function" of what draws it, called with the data and `width_in`.
+    """
 
     what: str
     data: Mapping[str, Any]

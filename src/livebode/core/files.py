@@ -8,13 +8,15 @@ is already in place. Permissions are those of a usual `open` or `mkdir`.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
-import shutil
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from livebode.core.removal import remove_created, remove_files
 
 _NAME_MAX = 50  # letters of the name, so that the partial's name is valid where the name is
 
@@ -23,7 +25,7 @@ _NAME_MAX = 50  # letters of the name, so that the partial's name is valid where
 def whole_file(path: Path, *, locked: bool = False) -> Iterator[Path]:
     """A path to write a file to, which is moved to `path` when the block ends.
 
-    A link at `path` is replaced, not followed; a file keeps its permissions.
+    A link at `path` is replaced, not followed; a file keeps its permissions; anything else remains and is refused.
 
     Parameters
     ----------
@@ -59,12 +61,11 @@ def whole_files(folder: Path, name: str, *, locked: bool = False) -> Iterator[Pa
     name
         What they are, for the name of the directory: one word.
     locked
-        As of `whole_file`.
+        As of `whole_file`, but the remainder of a kill has to be removed before.
     """
     partial = _partial(folder / name, locked)
-    shutil.rmtree(partial, ignore_errors=True)
+    os.mkdir(partial)
     try:
-        os.mkdir(partial)
         yield partial
         files = sorted(partial.iterdir())
         for file in files:
@@ -73,7 +74,7 @@ def whole_files(folder: Path, name: str, *, locked: bool = False) -> Iterator[Pa
             _move(file, folder / file.name)
         sync_directory(folder)
     finally:
-        shutil.rmtree(partial, ignore_errors=True)
+        remove_created(partial)
 
 
 @contextmanager
@@ -95,14 +96,14 @@ def whole_directory(path: Path, remove: Callable[[Path], None]) -> Iterator[Path
     path = path.absolute()  # "." has no parent in which a sibling can be created
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = _partial(path, locked=False)
+    os.mkdir(partial)
     try:
-        os.mkdir(partial)
         yield partial
         for found in (*partial.rglob("*"), partial):
             (sync_directory if found.is_dir() else _sync_file)(found)
         _exchange(partial, path, remove)
     finally:
-        shutil.rmtree(partial, ignore_errors=True)
+        remove_created(partial)
 
 
 def move_directory(path: Path, folder: Path) -> Path:
@@ -112,6 +113,15 @@ def move_directory(path: Path, folder: Path) -> Path:
     for changed in (folder, path.parent):
         sync_directory(changed)
     return to
+
+
+def replace_file(path: Path, to: Path) -> None:
+    """Move a file to the place of another file or link, which is removed; OSError if something else is there."""
+    with contextlib.suppress(FileNotFoundError):
+        mode = os.lstat(to).st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISLNK(mode)):
+            raise FileExistsError(errno.EEXIST, "it is a directory, a pipe, a socket or a device", str(to))
+    os.replace(path, to)
 
 
 def write_all(file: int, data: bytes | memoryview) -> None:
@@ -137,10 +147,9 @@ def _created(path: Path, locked: bool) -> Iterator[tuple[Path, int]]:
     """The partial file, empty, and its descriptor."""
     partial = _partial(path, locked)
     if locked:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(partial)
+        remove_files(path.parent.resolve(), [partial.name])
+    file = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     try:
-        file = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
         try:
             yield partial, file
             os.fsync(file)
@@ -148,8 +157,7 @@ def _created(path: Path, locked: bool) -> Iterator[tuple[Path, int]]:
             os.close(file)
         _move(partial, path)
     except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(partial)
+        remove_created(partial)
         raise
     sync_directory(path.parent)
 
@@ -163,7 +171,7 @@ def _move(partial: Path, path: Path) -> None:
         mode = os.lstat(path).st_mode
         if stat.S_ISREG(mode):
             os.chmod(partial, stat.S_IMODE(mode))
-    os.replace(partial, path)
+    replace_file(partial, path)
 
 
 def _exchange(partial: Path, path: Path, remove: Callable[[Path], None]) -> None:

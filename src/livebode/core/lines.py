@@ -17,6 +17,9 @@ from livebode.core.errors import GridError, UsageError
 ON_GRID_BINS = 1e-6
 _LINES_MAX = 100_000
 _DIGITS_MAX, _SHOWN = 40, 120
+CLOCK_ERROR = 2e-4
+"""Relative difference up to which two rates are one: that of two quartz clocks, or of a rate estimated from stamps."""
+_BINS_APART_MAX, _BINS_APART = 0.25, 1e-3
 WINDOW_MAX = 1 << 24
 """Longest window, samples: that of the kernel; 70 minutes at 4 kHz."""
 
@@ -157,6 +160,15 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
         quiet = tuple(k for k in self.quiet if min(bins) < k < max(bins))
         return Lines(bins, self.window, self.rate_hz, quiet)
 
+    def alike(self, other: Lines) -> bool:
+        """Whether the other has the same lines of the same window, at the same rate but for the error of a clock.
+
+        >>> Lines((2, 4), 400, 1000.10884).alike(Lines((2, 4), 400, 1000.10883))
+        True
+        """
+        same = (self.bins, self.window) == (other.bins, other.window)
+        return same and bool(same_frequencies(self.frequency_hz, other.frequency_hz, self.resolution_hz).all())
+
     @property
     def resolution_hz(self) -> float:
         """Distance of neighbouring bins, rate/N."""
@@ -171,6 +183,27 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
     def z(self) -> NDArray[np.complex128]:
         """e^(jωTs) at each line, shape (lines,)."""
         return np.exp(2j * np.pi * np.asarray(self.bins) / self.window)
+
+
+def same_rate(one_hz: float, other_hz: float) -> bool:
+    """Whether two rates differ by no more than clocks do."""
+    return abs(one_hz / other_hz - 1) <= CLOCK_ERROR
+
+
+def same_frequencies(
+    one_hz: NDArray[np.float64], other_hz: NDArray[np.float64], spacing_hz: float
+) -> NDArray[np.bool_]:
+    """Which pairs of frequencies are one line, by elements; `spacing_hz` is the distance of bins.
+
+    They differ by no more than clocks do, and by at most a quarter of the spacing, less than a window resolves; or by a
+    thousandth of the spacing.
+
+    >>> same_frequencies(np.array([8.0008, 20.0]), np.array([8.0007, 20.01]), 0.2).tolist()
+    [True, False]
+    """
+    apart = np.abs(one_hz - other_hz)
+    limit = np.maximum(_BINS_APART * spacing_hz, CLOCK_ERROR * np.abs(other_hz))
+    return np.asarray(apart <= np.minimum(limit, _BINS_APART_MAX * spacing_hz))
 
 
 def check_window(window: int, rate_hz: float) -> None:

@@ -9,12 +9,11 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core._wording import counted
 from livebode.core.distributions import normal_quantile
 from livebode.core.errors import UsageError
 from livebode.core.rows import RowArrays
-
-Floats = NDArray[np.float64]
 
 OK = "ok"
 """The status of a valid row; any other status is the reason why the row contains NaN."""

@@ -37,14 +37,10 @@ _INVALID = ArithmeticError, AssertionError, AttributeError, LookupError, TypeErr
 
 
 class Stage(NamedTuple):
-    """Name of a stage in its states, and the version of their content. Neither depends on the name of a class.
-
-    `converts_from` is the oldest version that the stage converts; None: it reads only its own.
-    """
+    """Name of a stage in its states, and the version of their content. Neither depends on the name of a class."""
 
     name: str
     version: int
-    converts_from: int | None = None
 
 
 class Stateful(Protocol):
@@ -79,12 +75,10 @@ class StatefulBase:
         Raises
         ------
         StateError
-            If the snapshot is damaged, or from another stage, other settings, a newer version or one that is too old;
-            nothing has changed then.
+            If the snapshot is damaged, or from another stage, other settings or another version; nothing has changed
+            then.
         """
         state, before = decode(self._stage, snapshot, self._identity), self.snapshot()
-        if (version := _head(self._stage, snapshot)[0]) < self._stage.version:
-            state = self._converted(state, version)
         try:
             self._load(state)
         except _INVALID as error:
@@ -92,10 +86,6 @@ class StatefulBase:
             if isinstance(error, StateError):
                 raise
             _damaged(self._stage, f"invalid value ({error})")
-
-    def _converted(self, state: dict[str, Any], version: int) -> dict[str, Any]:  # noqa: ARG002 - for subclasses
-        """The values of a state of an older version as this version has them."""
-        return state
 
     @property
     def _identity(self) -> str:
@@ -157,7 +147,7 @@ def decode(stage: Stage, data: bytes, identity: str = "") -> dict[str, Any]:
     Raises
     ------
     StateError
-        If the bytes are damaged, or not a state of this stage and these settings in a version that can be read.
+        If the bytes are damaged, or not a state of this stage and these settings in its version.
     """
     version, text, at, check = _head(stage, data)
     try:
@@ -226,17 +216,16 @@ def _head(stage: Stage, data: bytes) -> tuple[int, bytes, int, int]:
 
 
 def _check_version(stage: Stage, version: int, writer: str) -> None:
-    oldest = stage.version if stage.converts_from is None else stage.converts_from
     if version > stage.version:
         _newer(stage, version, stage.version, writer)
-    if version < oldest:
+    if version < stage.version:
         raise StateError(
             "older-version",
-            f"{_written(stage, version, writer)}, which reads from version {oldest} on",
+            f"{_written(stage, version, writer)}, which reads version {stage.version}",
             _remedy(writer),
             name=stage.name,
             found=version,
-            readable=oldest,
+            readable=stage.version,
             written_by=writer,
         )
 

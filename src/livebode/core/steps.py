@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
 
 _LEVELS_MAX = 2.0**23  # between the smallest and the largest value
 _SINGLE, _DOUBLE = 2.0**-24, 2.0**-50  # relative errors of a value, with room for a few operations in double precision

@@ -1,7 +1,5 @@
 """The page that shows a run while it is recorded, and afterwards (docs/how-to/dashboard.md)."""
 
-from livebode.dashboard.dashboard import Dashboard
-from livebode.dashboard.hub import Hub
-from livebode.dashboard.settings import Serving
+from livebode.on_first_use import on_first_use
 
-__all__ = ["Dashboard", "Hub", "Serving"]
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

@@ -7,14 +7,15 @@ import hmac
 import ipaddress
 import secrets
 import time
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
 from math import ceil
-from typing import Literal
+from typing import Any, Literal
 
 from livebode.core import ServerError
 from livebode.dashboard.settings import Serving
+from livebode.language import Message, for_page
 
 Role = Literal["operator", "viewer"]
 
@@ -24,6 +25,12 @@ _SESSIONS_MAX = 64
 _ADDRESSES_MAX = 1024
 _FREE_TRIES = 5
 _PAUSE_S_MAX = 300.0
+
+
+def error_answer(error: Exception | str) -> dict[str, Any]:
+    """What a page gets instead of an answer."""
+    words = getattr(error, "words", str(error)) if isinstance(error, Exception) else error
+    return {"error": str(words), "words": for_page(words)}
 
 
 class Access:
@@ -48,7 +55,7 @@ class Access:
         if serving.viewer_token is not None:
             self._hashes.append(("viewer", _hash(serving.viewer_token)))
         self._read_only, self._report, self._clock = serving.read_only, report, clock
-        self._sessions: OrderedDict[bytes, tuple[Role, float]] = OrderedDict()
+        self._sessions: dict[Role, dict[bytes, tuple[str, float]]] = {"operator": {}, "viewer": {}}
         self._wrong: OrderedDict[str, tuple[int, float]] = OrderedDict()
         self._reported: OrderedDict[str, None] = OrderedDict()
         self.refused = 0
@@ -69,15 +76,16 @@ class Access:
         role = self._check(token, address)
         if role is None:
             return None
-        session = secrets.token_urlsafe(32)
-        self._sessions[_hash(session)] = role, self._clock() + SESSION_S
-        while len(self._sessions) > _SESSIONS_MAX:
-            self._sessions.popitem(last=False)
+        session, sessions = secrets.token_urlsafe(32), self._sessions[role]
+        if len(sessions) >= _SESSIONS_MAX:
+            self._displace(sessions)
+        sessions[_hash(session)] = network(address), self._clock() + SESSION_S
         return session
 
     def logout(self, cookie: str) -> None:
         """Remove the session of a Cookie header."""
-        self._sessions.pop(_hash(_session(cookie)), None)
+        for sessions in self._sessions.values():
+            sessions.pop(_hash(_session(cookie)), None)
 
     def role(self, cookie: str, authorization: str, address: str) -> Role | None:
         """The role of a client from the headers Cookie and Authorization; None without access.
@@ -91,17 +99,36 @@ class Access:
             return self._limited("operator")
         if authorization:
             scheme, _, token = authorization.partition(" ")
-            return self._check(token.strip() if scheme.lower() == "bearer" else "", address)
+            role = self._check(token.strip() if scheme.lower() == "bearer" else "", address)
+            return None if role is None else self._limited(role)
         # The lookup uses the hash, so its duration reveals nothing about the secret.
-        role, until = self._sessions.get(_hash(_session(cookie)), (None, 0.0))
-        return self._limited(role) if role is not None and self._clock() < until else None
+        session = _hash(_session(cookie))
+        for role, sessions in self._sessions.items():
+            if session in sessions and self._clock() < sessions[session][1]:
+                return self._limited(role)
+        return None
+
+    def _displace(self, sessions: dict[bytes, tuple[str, float]]) -> None:
+        """Remove those that are over, else the oldest one of the address with the most.
+
+        So a program that logs in again and again ends its own sessions, not that of a person at another address.
+        """
+        now_s = self._clock()
+        over = [session for session, (_, until_s) in sessions.items() if until_s <= now_s]
+        counts = Counter(address for address, _ in sessions.values())
+        (most, _), *_ = counts.most_common(1)
+        for session in over or [next(one for one, (address, _) in sessions.items() if address == most)]:
+            del sessions[session]
 
     def _check(self, token: str, address: str) -> Role | None:
         address = network(address)
         count, until = self._wrong.get(address, (0, 0.0))
         if (left := until - self._clock()) > 0:
             raise ServerError(
-                "too-many-tries", "too many wrong tokens", f"try again in {ceil(left)} s", retry_after_s=ceil(left)
+                "too-many-tries",
+                Message("too many wrong tokens"),
+                Message("try again in {seconds} s", seconds=ceil(left)),
+                retry_after_s=ceil(left),
             )
         given, found = _hash(token), None
         for role, known in self._hashes:  # always all of them: the duration must not depend on the match
@@ -109,7 +136,7 @@ class Access:
                 found = role
         if found is not None:
             self._wrong.pop(address, None)
-            return self._limited(found)
+            return found
         self.refused += 1
         pause = 0.0 if count + 1 < _FREE_TRIES else min(2.0 ** (count + 1 - _FREE_TRIES), _PAUSE_S_MAX)
         self._wrong[address] = count + 1, self._clock() + pause

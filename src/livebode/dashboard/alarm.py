@@ -8,7 +8,7 @@ from math import isfinite
 from typing import Any, Literal
 
 from livebode.core import Event
-from livebode.monitoring.alarm_kinds import AlarmKind
+from livebode.monitoring import AlarmKind
 
 Condition = Literal["unacknowledged", "acknowledged", "returned", "normal"]
 """Active and not acknowledged; active and acknowledged; over but not acknowledged; over (and acknowledged)."""

@@ -6,6 +6,8 @@ from collections import deque
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
+from livebode.language import for_page
+
 What = Literal[
     "raised", "returned", "acknowledged", "shelved", "unshelved", "suppressed", "unsuppressed", "chattering"
 ]  # fmt: skip
@@ -23,7 +25,7 @@ class Transition:
         Of the row, and of its last change.
     time_s
         Time of the run.
-    cause, kind, message
+    cause, kind, words
         Of the alarm, and of the event that caused the change.
     what
         What happened.
@@ -40,12 +42,17 @@ class Transition:
     time_s: float
     cause: str
     kind: str
-    message: str
+    words: str
     what: What
     state: str
     by: str = ""
     comment: str = ""
     count: int = 1
+
+
+def limited(message: str, letters: int) -> str:
+    """The message, or the beginning of its text if it is longer."""
+    return message if len(message) <= letters else message[:letters]
 
 
 class AlarmHistory:
@@ -63,7 +70,7 @@ class AlarmHistory:
             self._chattering.pop(cause, None)
         at = self._place(self._chattering.get(cause)) if chatters else None
         count = facts.pop("count", 1)
-        facts["message"] = facts["message"][:_MESSAGE_MAX]
+        facts["words"] = limited(facts["words"], _MESSAGE_MAX)
         if at is not None:
             known = self._rows[at]
             count = known.count + (count if what == "raised" else 0)
@@ -77,7 +84,11 @@ class AlarmHistory:
 
     def since(self, version: int) -> list[dict[str, Any]]:
         """Rows that are new or changed after `version`, oldest first."""
-        return [asdict(row) for row in self._rows if row.version > version]
+        return [
+            asdict(row) | {"message": str(row.words), "words": for_page(row.words)}
+            for row in self._rows
+            if row.version > version
+        ]
 
     def _place(self, number: int | None) -> int | None:
         """Index of a row that is still there."""

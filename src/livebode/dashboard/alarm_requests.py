@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import unicodedata
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from livebode.core import ServerError, UsageError
-from livebode.dashboard.queries import plain, whole_number
+from livebode.dashboard.queries import check_letters, json_object, whole_number
+from livebode.language import Message
 
 Act = Literal["acknowledge", "shelve", "unshelve"]
 NAME_MAX, TEXT_MAX = 60, 200
 """Most letters of a name, and of a comment or reason."""
 MINUTES_MAX = 24 * 60
-_TURNING = {*map(chr, range(0x202A, 0x202F)), *map(chr, range(0x2066, 0x206A))}  # the direction of the text
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ def alarm_request(data: bytes, axes: int, act: Act) -> AlarmRequest:
     >>> alarm_request(b'{"axis": 0, "event": "3f", "by": "Ann", "reason": "test", "minutes": 30}', 1, "shelve").minutes
     30.0
     """
-    message = plain(data)
+    message = json_object(data)
     axis, event = message.get("axis"), message.get("event")
     if isinstance(axis, bool) or not isinstance(axis, int) or not isinstance(event, str) or len(event) > 64:
         raise ServerError("request-malformed", "the request does not have an axis and an event", "send both")
@@ -50,13 +49,12 @@ def _text(message: dict[str, Any], name: str, letters_max: int, *, required: boo
         least = 1 if required else 0
         raise UsageError(
             "out-of-range",
-            f"{name} is not a text of {least} to {letters_max} letters",
-            "shorten it, or add it",
+            Message("{name} is not a text of {least} to {most} letters", name=name, least=least, most=letters_max),
+            Message("shorten it, or add it"),
             argument=name,
             high=letters_max,
         )
-    if any(letter in _TURNING or unicodedata.category(letter) in ("Cc", "Cs") for letter in text):
-        raise UsageError("unreadable", f"{name} contains a control character", "remove it", argument=name)
+    check_letters(text, name)
     return text
 
 
@@ -65,8 +63,8 @@ def _minutes(value: object) -> float:
         return float(value)
     raise UsageError(
         "out-of-range",
-        f"minutes is not a number from 1 to {MINUTES_MAX}",
-        "shelve the alarm for at most a day, and again if necessary",
+        Message("minutes is not a number from 1 to {most}", most=MINUTES_MAX),
+        Message("shelve the alarm for at most a day, and again if necessary"),
         argument="minutes",
         low=1,
         high=MINUTES_MAX,

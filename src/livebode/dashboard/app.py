@@ -13,36 +13,38 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from livebode import export
-from livebode.core import LivebodeError, RecordError, Responses, ServerError
+from livebode.core import LivebodeError, RecordError, Responses, ServerError, remove_created
 from livebode.dashboard import queries
-from livebode.dashboard.access import COOKIE, SESSION_S
+from livebode.dashboard.access import COOKIE, SESSION_S, error_answer
 from livebode.dashboard.admission import serve_browser
 from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
 from livebode.dashboard.client import Client
-from livebode.dashboard.fleet_pages import FleetPages
-from livebode.dashboard.fleet_view import FleetView
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
-from livebode.dashboard.loop_trials import LoopTrials
 from livebode.dashboard.matrix_answer import matrix_answer
 from livebode.dashboard.past import Past
+from livebode.dashboard.plugin_pages import PluginPages
 from livebode.dashboard.runs_pages import RunsPages
 from livebode.dashboard.saved import applied, listed
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
-from livebode.language import for_page, negotiated
-from livebode.records.saved_curves import SavedCurves, change_saved, read_saved
+from livebode.dashboard.trials import loop_trials
+from livebode.language import Message, catalogue_for_page, negotiated
+from livebode.plugins import loaded
+from livebode.records import SavedCurves, change_saved, read_saved
 
 _HERE = Path(__file__).parent
 _FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
 
-def application(board: Board, serving: Serving, directory: Path | None = None, fleet: FleetView | None = None) -> Guard:
-    """The ASGI application: the page of the board, of a fleet, or all runs of a directory, each with its own board."""
-    pages = _Pages(board, serving, _files())
+def application(
+    board: Board, serving: Serving, directory: Path | None = None, others: PluginPages | None = None
+) -> Guard:
+    """The ASGI application: the page of the board, of a plug-in, or of all runs of a directory, each with a board."""
+    pages = _Pages(board, serving, _files(others))
     routes: list[BaseRoute] = [
         Route("/login", pages.login_page, methods=["GET"]),
         Route("/login", pages.login, methods=["POST"]),
@@ -50,8 +52,8 @@ def application(board: Board, serving: Serving, directory: Path | None = None, f
         Route("/logout", pages.logout, methods=["POST"]),
         Route("/static/{name:path}", pages.static),
     ]
-    if fleet is not None:
-        routes += FleetPages(fleet, board, pages.file, pages.order).routes
+    if others is not None:
+        routes += others.routes(board, pages.file, pages.order)
     elif directory is None:
         routes += _page_routes(pages)
     else:
@@ -95,7 +97,7 @@ class _Pages:
     def __init__(self, board: Board, serving: Serving, files: dict[str, tuple[bytes, str]]) -> None:
         self._board, self._secure, self._language = board, serving.tls is not None, serving.language
         self.files = files
-        self._trials = LoopTrials()
+        self._trials = loop_trials()
 
     async def page(self, request: Request) -> Response:
         if self._role(request) is None:
@@ -107,12 +109,12 @@ class _Pages:
 
     async def login(self, request: Request) -> Response:
         data = await body(request)
-        token = None if data is None else queries.plain(data).get("token")
+        token = None if data is None else queries.json_object(data).get("token")
         if not isinstance(token, str):
             raise ServerError("request-malformed", "the login has no token", "send an object with the text token")
         session = self._board.access.login(token, _address(request))
         if session is None:
-            return JSONResponse({"error": "this token is wrong"}, 401)
+            return JSONResponse(error_answer(Message("this token is wrong")), 401)
         answer = JSONResponse({})
         answer.set_cookie(
             COOKIE, session, max_age=int(SESSION_S), httponly=True, samesite="strict", secure=self._secure
@@ -123,7 +125,7 @@ class _Pages:
         """The language of the page; also for the login, so without access control."""
         asked_for = request.query_params.get("language", "")
         code = negotiated(asked_for, self._language, request.headers.get("accept-language", ""))
-        return Response(for_page(code), media_type="application/json", headers={"vary": "accept-language"})
+        return Response(catalogue_for_page(code), media_type="application/json", headers={"vary": "accept-language"})
 
     async def logout(self, request: Request) -> Response:
         self._board.access.logout(request.headers.get("cookie", ""))
@@ -179,7 +181,7 @@ class _Pages:
             return _unknown()
         group, time_s = state.group, queries.moment(request.query_params)
         if group is None:
-            raise RecordError("no-matrix", "this run has one response and no matrix", "reload the page")
+            raise RecordError("no-matrix", "this run has one response and no matrix", Message("reload the page"))
         found = await self._board.elsewhere(group.at, _directory(state), state.readable, time_s)
         units = [[_unit(self._board.states[group.axis(o, i)]) for i in group.inputs] for o in group.outputs]
         return JSONResponse(matrix_answer(group, found, units))
@@ -195,16 +197,17 @@ class _Pages:
             with tempfile.NamedTemporaryFile(suffix=f".{span.format}", delete=False) as file:
                 path = Path(file.name)
             try:
-                export.FORMATS[span.format](path, (_as(state, part, span) for part in parts), {})
+                write_responses = loaded(export.writers("responses")[span.format])
+                write_responses(path, (_as(state, part, span) for part in parts), {})
             except BaseException:
-                path.unlink(missing_ok=True)
+                remove_created(path)
                 raise
             return path
 
         path = await self._board.elsewhere(write)
         name = f"{span.quantity.replace(' ', '-')}-{span.from_s:.6g}s.{span.format}"
         return FileResponse(
-            path, media_type=_TYPES[span.format], filename=name, background=BackgroundTask(path.unlink, True)
+            path, media_type=_TYPES[span.format], filename=name, background=BackgroundTask(remove_created, path)
         )
 
     async def acknowledge(self, request: Request) -> Response:
@@ -251,7 +254,7 @@ class _Pages:
         if role is None:
             return _unknown()
         if role != "operator":
-            return JSONResponse({"error": "this session is read-only"}, 403)
+            return JSONResponse(error_answer(Message("this session is read-only")), 403)
         data = await body(request)
         if data is None or request.headers.get("content-type", "").partition(";")[0] != "application/json":
             raise ServerError(
@@ -283,14 +286,15 @@ class _Pages:
         state = self._board.states[axis]
         state.refresh()
         if state.quantities is None:
-            raise ServerError("not-begun", "the run has not begun", "wait for its first samples")
+            raise ServerError("not-begun", Message("the run has not begun"), Message("wait for its first samples"))
         return state
 
 
-def _files() -> dict[str, tuple[bytes, str]]:
+def _files(others: PluginPages | None) -> dict[str, tuple[bytes, str]]:
     """Content and type of the static files, in memory: reading a file would take a thread for each request."""
     found = {}
-    for folder, prefix in ((_HERE / "static", ""), (_HERE / "_vendor" / "uplot", "uplot/")):
+    folders = [(_HERE / "static", ""), (_HERE / "_vendor" / "uplot", "uplot/")]
+    for folder, prefix in folders if others is None else [*folders, (others.static, "")]:
         for path in folder.iterdir():
             if kind := _FILE_TYPES.get(path.suffix):
                 found[prefix + path.name] = path.read_bytes(), kind
@@ -316,11 +320,11 @@ def _address(request: Request) -> str:
 
 
 def _unknown() -> Response:
-    return JSONResponse({"error": "log in first"}, 401)
+    return JSONResponse(error_answer(Message("log in first")), 401)
 
 
 async def _sorry(_request: Request, error: Exception) -> Response:
     pause_s = error.facts.get("retry_after_s") if isinstance(error, LivebodeError) else None
     if pause_s is None:
-        return JSONResponse({"error": str(error)}, 400)
-    return JSONResponse({"error": str(error)}, 429, headers={"retry-after": str(pause_s)})
+        return JSONResponse(error_answer(error), 400)
+    return JSONResponse(error_answer(error), 429, headers={"retry-after": str(pause_s)})

@@ -19,6 +19,7 @@ from livebode.dashboard.pulse import Pulse
 from livebode.dashboard.state import State
 from livebode.dashboard.verdict import verdict
 from livebode.dashboard.viewed import Viewed
+from livebode.language import Message
 
 UPDATES_PER_S = 30.0
 _IDLE_S = 0.5
@@ -93,7 +94,7 @@ class Board:
     async def elsewhere(self, job: Callable[..., T], *arguments: Any) -> T:
         """Run a long job in another thread; ServerError if too many are waiting."""
         if self._jobs >= _JOBS_MAX:
-            raise ServerError("busy", "too much of the record is being read", "try again in a moment")
+            raise ServerError("busy", Message("too much of the record is being read"), Message("try again in a moment"))
         self._jobs += 1
         try:
             return await asyncio.get_running_loop().run_in_executor(self._worker, job, *arguments)
@@ -109,18 +110,23 @@ class Board:
         found = state.notices.of(asked.event)
         if found is None:
             raise ServerError(
-                "event-unknown", f"there is no event {asked.event!r}", "reload the page", event=asked.event
+                "event-unknown",
+                Message("there is no event {event}", event=repr(asked.event)),
+                Message("reload the page"),
+                event=asked.event,
             )
         if state.hub is None or state.finished:
             raise ServerError(
                 "run-ended",
-                "the run has ended, and its record is closed",
-                "acknowledge events while a run continues",
+                Message("the run has ended, and its record is closed"),
+                Message("acknowledge events while a run continues"),
                 event=asked.event,
             )
         event = _event_of(act, asked, state, *found)
         if event is not None and not state.hub.record(event):
-            raise ServerError("busy", "too many acknowledgements wait to be recorded", "try again in a moment")
+            raise ServerError(
+                "busy", Message("too many acknowledgements wait to be recorded"), Message("try again in a moment")
+            )
 
     def close(self) -> None:
         """Stop the reading thread."""
@@ -152,7 +158,9 @@ def _event_of(act: Act, asked: AlarmRequest, state: State, notice: Notice, count
             return None
         return acknowledgement(notice, asked.event, count, *at, asked.by, asked.words)
     if notice.alarm is None:
-        raise ServerError("no-alarm", "this event is not an alarm", "shelve alarms only", event=asked.event)
+        raise ServerError(
+            "no-alarm", Message("this event is not an alarm"), Message("shelve alarms only"), event=asked.event
+        )
     if act == "shelve":
         shelf = AlarmShelf(asked.by, round(time.time() + 60 * asked.minutes, 3), asked.words)
         return shelving(cause, shelf, *at, notice)

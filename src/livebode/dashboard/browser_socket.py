@@ -10,6 +10,8 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from livebode.core import LivebodeError, ServerError
+from livebode.dashboard.access import error_answer
+from livebode.language import Message
 from livebode.records import to_json
 
 SLOW_S = 20.0
@@ -46,7 +48,9 @@ class BrowserSocket(ABC):
             for task in done:
                 task.result()
             if displaced in done:
-                await asyncio.wait_for(self._socket.close(DISPLACED, "another browser took this place"), SLOW_S)
+                await asyncio.wait_for(
+                    self._socket.close(DISPLACED, Message("another browser took this place")), SLOW_S
+                )
         except (TimeoutError, WebSocketDisconnect, RuntimeError, OSError):
             pass  # it is gone, or too slow
         finally:
@@ -78,11 +82,11 @@ class BrowserSocket(ABC):
                 count, since = 0, now
             count += 1
             if count > _REQUESTS_PER_S:
-                await self._socket.close(1008, "too many messages")
+                await self._socket.close(1008, Message("too many messages"))
                 return
             try:
                 if text is None:
                     raise ServerError("request-malformed", "a message is text, not bytes", "send text")
                 await self.heed(text)
             except (LivebodeError, KeyError) as error:
-                await self.send({"error": str(error)})
+                await self.send(error_answer(error))

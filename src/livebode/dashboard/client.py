@@ -10,10 +10,10 @@ from starlette.websockets import WebSocket
 from livebode.core import Responses, ServerError
 from livebode.dashboard.browser_socket import BrowserSocket
 from livebode.dashboard.frames import frame, reference_kind
-from livebode.dashboard.message_times import with_times
 from livebode.dashboard.past import Past
 from livebode.dashboard.queries import ClientMessage, client_message
-from livebode.records.saved_curves import read_saved
+from livebode.language import Message
+from livebode.records import read_saved
 
 if TYPE_CHECKING:
     from livebode.dashboard.board import Board
@@ -72,7 +72,9 @@ class Client(BrowserSocket):
             saved = (await self._board.elsewhere(read_saved, state.directory)).reference(asked.saved)
             if saved is None:
                 raise ServerError(
-                    "reference-unknown", f"no reference {asked.saved!r} is saved with this run", "reload the page"
+                    "reference-unknown",
+                    f"no reference {asked.saved!r} is saved with this run",
+                    Message("reload the page"),
                 )
             return saved.response
         if asked.time_s is None or state.newest is None:
@@ -104,9 +106,9 @@ class Client(BrowserSocket):
         """Send all changes, in at most two messages."""
         news: dict[str, Any] = {}
         if state.notices.version != self._sent["notices"]:
-            news["notices"] = with_times(state.notices.since(self._sent["notices"]))
+            news["notices"] = state.notices.since(self._sent["notices"])
             news["forgotten"] = state.notices.forgotten(self._sent["notices"])
-            news["history"] = with_times(state.notices.history.since(self._sent["notices"]))
+            news["history"] = state.notices.history.since(self._sent["notices"])
             self._sent["notices"] = state.notices.version
         if self._due("health", HEALTH_EVERY_S):
             news |= {"health": self._board.health(state), "span": state.span(), "verdicts": self._board.verdicts()}

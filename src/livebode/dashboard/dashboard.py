@@ -12,8 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from livebode.core import RecordError, ServerError
-from livebode.core.installing import not_installed
+from livebode.core import RecordError, ServerError, not_installed
 from livebode.dashboard.access import Access
 from livebode.dashboard.hub import Hub
 from livebode.dashboard.matrix_group import MatrixGroup
@@ -24,7 +23,7 @@ from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 
 if TYPE_CHECKING:
-    from livebode.dashboard.fleet_view import FleetView
+    from livebode.dashboard.plugin_pages import PluginPages
 
 HEADER_BYTES_MAX = 16 << 10
 BACKLOG = 4096
@@ -59,30 +58,29 @@ class Dashboard:
         self._serving, self._hears = serving, report
         self._states: list[State] = []
         self._viewed: dict[int, Viewed] = {}
-        self._matrices: list[MatrixHub] = []
+        self._hubs: dict[str, Hub | MatrixHub] = {}
         self._runs: Path | None = None
-        self._fleet: FleetView | None = None
+        self._others: PluginPages | None = None
         self._server: Any = None
         self._thread: threading.Thread | None = None
         self._socket: socket.socket | None = None
 
-    def hub(self, name: str) -> Hub:
-        """The audience for the runs of the axis of this name.
+    def hub(self, name: str, entries: Sequence[tuple[str, str]] = ()) -> Hub | MatrixHub:
+        """The audience for the runs of the axis of this name; each entry of a matrix of responses is an axis.
 
         An open page shows an axis that is added later only after it is reloaded.
         """
-        for state in self._states:
-            if state.name == name and state.hub is not None:
-                return state.hub
+        if name not in self._hubs:
+            self._hubs[name] = self._of_matrix(name, entries) if entries else self._of_axis(name)
+        return self._hubs[name]
+
+    def _of_axis(self, name: str) -> Hub:
         hub = Hub(name)
         self._states.append(State(name, len(self._states), hub))
         return hub
 
-    def matrix_hub(self, name: str, entries: Sequence[tuple[str, str]]) -> MatrixHub:
-        """The audience for the runs of an axis with a matrix of responses, output by output; each entry is an axis."""
-        for hub in self._matrices:
-            if hub.name == name:
-                return hub
+    def _of_matrix(self, name: str, entries: Sequence[tuple[str, str]]) -> MatrixHub:
+        """Its entries are in order, output by output."""
         hub = MatrixHub(name, list(entries))
         outputs, inputs = (tuple(dict.fromkeys(entry[k] for entry in entries)) for k in (0, 1))
         group = MatrixGroup(name, outputs, inputs, len(self._states), hub.newest)
@@ -90,7 +88,6 @@ class Dashboard:
             state = State(one.name, len(self._states), one)
             state.group, state.entry = group, f"{output}/{input}"
             self._states.append(state)
-        self._matrices.append(hub)
         return hub
 
     def view(self, directory: Path) -> None:
@@ -118,9 +115,9 @@ class Dashboard:
             )
         self._runs = directory
 
-    def view_fleet(self, fleet: FleetView) -> None:
-        """Show a fleet, instead of axes."""
-        self._fleet = fleet
+    def show(self, pages: PluginPages) -> None:
+        """Show the pages of a plug-in, instead of axes."""
+        self._others = pages
 
     @property
     def url(self) -> str:
@@ -217,8 +214,8 @@ class Dashboard:
         self._faults = Faults(self._report)
         asyncio.get_running_loop().set_exception_handler(self._faults.handler)
         board = Board(self._states, self._viewed, Access(self._serving, self._report))
-        self._application = application(board, self._serving, self._runs, self._fleet)
-        beating = asyncio.create_task(board.run() if self._fleet is None else self._fleet.run())
+        self._application = application(board, self._serving, self._runs, self._others)
+        beating = asyncio.create_task(board.run() if self._others is None else self._others.run())
         beating.add_done_callback(self._stopped)
         try:
             await self._server.serve()
@@ -264,5 +261,6 @@ def listening(serving: Serving) -> socket.socket:
             argument="port",
             address=serving.address,
             port=serving.port,
+            errno=error.errno,
         ) from None
     return found

@@ -9,19 +9,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from livebode.analysis.overview import Overview
+from livebode.analysis import Overview
 from livebode.core import Block, Event, Parameters, Responses
 from livebode.dashboard.signal_tap import SignalTap
-from livebode.runtime.documents import (
-    Channels,
-    ClockSet,
-    Document,
-    FitResults,
-    RunEnded,
-    RunStarted,
-    TrackerResults,
-)
-from livebode.runtime.run_control import RunControl
+from livebode.runtime import Channels, ClockSet, Document, FitResults, RunControl, RunEnded, RunStarted, TrackerResults
 from livebode.sources.live import Health, LiveBlock
 
 Item = Responses | tuple[Parameters, ...] | Event

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import select
 import socket
 import ssl
 import sys
-from collections import Counter
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from livebode.dashboard.access import network
 from livebode.dashboard.patience import ClientWait, PatientProtocol
@@ -20,6 +22,17 @@ _DESCRIPTORS_PER_CONNECTION = 4  # the connection and a file that it receives; a
 _SWEEP_S = 1.0
 _SENTENCE_S = 60.0
 _REST_S = 0.2
+_Accepted = tuple[socket.socket, Any]
+_ROUND = 8
+"""Connections that are taken at once, so that all their requests are read: more than a browser opens."""
+_QUEUE_S = 2.0
+"""Time until a queue that never was empty is emptied, and only its newest connections are taken."""
+_AT_ONCE, _LONG_S, _TURN_S = 3, 1.0, 0.002
+"""Requests of an address that are worked on at once, but for those that take longer; time between two looks."""
+_ROUND_S = 0.2
+"""Longest time to read the requests of connections that were accepted together, before the next ones are."""
+_STEPS = 4
+"""Turns of the loop until a request is read: transport, reader, data, task."""
 
 
 def connections_max() -> int:
@@ -38,7 +51,9 @@ class _Connection:
     """An accepted connection. Its transport closes the socket."""
 
     def __init__(self, taken: socket.socket, address: str, since_s: float) -> None:
-        self.socket, self.address, self._since_s = taken, address, since_s
+        self.socket, self.address, self.since_s = taken, address, since_s
+        self.asks = False
+        """Whether it has sent something."""
         self.protocol: PatientProtocol | None = None  # known after the TLS handshake
         self.serving: asyncio.Task[None] | None = None
 
@@ -48,17 +63,33 @@ class _Connection:
 
     @property
     def waits(self) -> ClientWait:
-        return ClientWait(self._since_s, HANDSHAKE_S) if self.protocol is None else self.protocol.waits
+        return ClientWait(self.since_s, HANDSHAKE_S) if self.protocol is None else self.protocol.waits
+
+    @property
+    def unread(self) -> bool:
+        """Whether it has sent something, and nothing of it was read."""
+        return self.asks and (self.protocol is None or not self.protocol.heard)
+
+    @property
+    def left_work(self) -> bool:
+        """Whether the client has gone, and the server still works on its request."""
+        return not self.open and self.protocol is not None and self.protocol.answers
 
     def drop(self) -> None:
         if self.protocol is not None:
             self.protocol.transport.abort()
         elif self.serving is not None:
             self.serving.cancel()
+        else:
+            asyncio.get_running_loop().remove_reader(self.socket)
+            self.socket.close()
 
 
 class Listener:
     """Accepts connections and hands them to the server's protocol.
+
+    Where many wait, those whose client has gone are closed unread, and the newest ones are served first: a client that
+    waits is among them, however many connections came and went before it.
 
     At most `connections_max` are open, half of them from one address. If there is no room, the connection that has
     waited longest without a complete request is closed for the new one: a client with many connections cannot exclude
@@ -86,59 +117,142 @@ class Listener:
         self._socket, self._tls, self._protocol, self._report = listening, tls, protocol, report
         self._most = connections_max()
         self._connections: list[_Connection] = []
+        self._left: list[_Connection] = []
+        self._asking: list[_Connection] = []
+        self._crowded = False
+        self._asked, self._all_read = asyncio.Event(), asyncio.Event()
+        self._all_read.set()
         self._closed: Counter[str] = Counter()
         self._reported_s = float("-inf")
 
     async def run(self) -> None:
         """Accept connections until it is cancelled."""
         loop = asyncio.get_running_loop()
-        sweeping = loop.create_task(self._sweep())
+        tasks = [loop.create_task(self._sweep()), loop.create_task(self._hand_over())]
+        crowded_s = loop.time()
         try:
             while True:
                 try:
-                    taken, address = await loop.sock_accept(self._socket)
+                    first = await loop.sock_accept(self._socket)
                 except OSError:  # the client has gone, or another part used up the descriptors
                     await asyncio.sleep(_REST_S)
                     continue
-                self._take(taken, network(str(address[0])), loop.time())
-                await asyncio.sleep(0)  # one at a time: with more, a request would be closed before it is read
+                if not self._crowded:
+                    crowded_s = loop.time()
+                accepted = self._accepted(first, all_of_them=loop.time() - crowded_s > _QUEUE_S)
+                self._crowded = len(accepted) >= _ROUND
+                self._take(accepted)
+                # Else the next ones would take the places of these before their requests are read.
+                await asyncio.sleep(0)  # until `_ask` has been called for them
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(self._all_read.wait(), _ROUND_S)
         finally:
-            sweeping.cancel()
+            for task in tasks:
+                task.cancel()
             self._report_closed(float("inf"))
 
-    def _take(self, taken: socket.socket, address: str, now_s: float) -> None:
-        if not self._room(address):
-            taken.close()
-            return
-        connection = _Connection(taken, address, now_s)
-        self._connections.append(connection)
-        connection.serving = asyncio.get_running_loop().create_task(self._serve(connection))
+    def _accepted(self, first: _Accepted, *, all_of_them: bool) -> Sequence[_Accepted]:
+        """The first connections that wait to be accepted, or the newest ones of all.
 
-    def _room(self, address: str) -> bool:
-        """Whether there is room for a connection from this address; closes another one if necessary."""
+        In a crowd those whose client has gone are closed.
+        """
+        kept = deque([first], self._most)
+        while all_of_them or len(kept) < _ROUND:
+            try:
+                taken, address = self._socket.accept()
+            except OSError:
+                break
+            taken.setblocking(False)
+            if self._crowded and _gone(taken):
+                taken.close()
+                continue
+            if len(kept) == self._most:
+                oldest, place = kept.popleft()
+                oldest.close()
+                self._closed[network(str(place[0]))] += 1
+            kept.append((taken, address))
+        return kept
+
+    def _take(self, accepted: Sequence[_Accepted]) -> None:
+        """Take connections, and close others, or some of them, where there are too many."""
+        loop = asyncio.get_running_loop()
+        self._left = [connection for connection in self._left + self._connections if connection.left_work]
         self._connections = [connection for connection in self._connections if connection.open]
-        crowd = [connection for connection in self._connections if connection.address == address]
-        if len(crowd) < self._most // 2:
-            crowd = self._connections
-            if len(crowd) < self._most:
-                return True
+        for taken, address in accepted:
+            connection = _Connection(taken, network(str(address[0])), loop.time())
+            connection.asks = self._crowded and _has_sent(taken)
+            loop.add_reader(taken, self._ask, connection)
+            self._connections.append(connection)
+        for address in {connection.address for connection in self._connections}:
+            crowd = [connection for connection in self._connections if connection.address == address]
+            self._make_room(crowd, self._most // 2)
+        self._make_room(self._connections, self._most)
+
+    def _make_room(self, crowd: list[_Connection], most: int) -> None:
+        """Close connections until there are no more than this: first those that waited longest without a request."""
+        excess = len(crowd) - most
+        if excess <= 0:
+            return
         waits = [connection.waits for connection in crowd]
-        closable = [(one.since_s, i) for i, one in enumerate(waits) if one.limit_s is not None]
-        self._closed[address] += 1
-        if not closable:
-            return False
-        longest = crowd[min(closable)[1]]
-        longest.drop()
-        self._connections.remove(longest)
-        return True
+        closable = sorted(
+            (crowd[i].unread, wait.since_s, i) for i, wait in enumerate(waits) if wait.limit_s is not None
+        )
+        refused = {crowd[i] for *_, i in closable[:excess]}  # enough: those that are new have no request yet
+        for connection in refused:
+            self._closed[connection.address] += 1
+            connection.drop()
+        self._connections = [connection for connection in self._connections if connection not in refused]
+
+    def _ask(self, connection: _Connection) -> None:
+        """The client has sent something, or has gone."""
+        asyncio.get_running_loop().remove_reader(connection.socket)
+        try:
+            gone = connection.socket.recv(1, socket.MSG_PEEK) == b""
+        except OSError:
+            gone = True
+        if gone:
+            connection.socket.close()
+            return
+        connection.asks = True
+        self._asking.append(connection)
+        self._all_read.clear()
+        self._asked.set()
+
+    async def _hand_over(self) -> None:
+        """Hand connections that have sent something to the server, the newest one first, one at a time."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await self._asked.wait()
+            self._asked.clear()
+            while self._asking:
+                connection = self._next(loop.time())
+                if connection is None:
+                    await asyncio.sleep(_TURN_S)
+                elif self._crowded and _gone(connection.socket):
+                    connection.socket.close()
+                else:
+                    connection.serving = loop.create_task(self._serve(connection))
+                    for _ in range(_STEPS):
+                        await asyncio.sleep(0)
+            self._all_read.set()
+
+    def _next(self, now_s: float) -> _Connection | None:
+        """The newest connection that asks, of an address for which the server does not work on enough requests."""
+        self._asking = [connection for connection in self._asking if connection.open]
+        working = Counter(
+            one.address
+            for one in (*self._connections, *self._left)
+            if one.protocol is not None and one.protocol.answers and now_s - one.protocol.waits.since_s < _LONG_S
+        )
+        for index in reversed(range(len(self._asking))):
+            if working[self._asking[index].address] < _AT_ONCE:
+                return self._asking.pop(index)
+        return None
 
     async def _serve(self, connection: _Connection) -> None:
         loop, limit_s = asyncio.get_running_loop(), None if self._tls is None else HANDSHAKE_S
         try:
             # No protocol before the first byte; with TLS it takes a quarter of a megabyte.
-            if not await _spoken(connection.socket):
-                connection.socket.close()
-                return
             _, connection.protocol = await loop.connect_accepted_socket(
                 self._protocol,
                 connection.socket,
@@ -175,12 +289,17 @@ class Listener:
             )
 
 
-async def _spoken(taken: socket.socket) -> bool:
-    """Wait for the first byte; False if the client has gone without one."""
-    loop, came = asyncio.get_running_loop(), asyncio.Event()
-    loop.add_reader(taken, came.set)
+def _gone(taken: socket.socket) -> bool:
+    """Whether the client has closed its end, whatever it has sent before; False where the system does not tell."""
+    if not hasattr(select, "POLLRDHUP"):
+        return False
+    poll = select.poll()
+    poll.register(taken, select.POLLRDHUP)
+    return bool(poll.poll(0))
+
+
+def _has_sent(taken: socket.socket) -> bool:
     try:
-        await came.wait()
-    finally:
-        loop.remove_reader(taken)
-    return taken.recv(1, socket.MSG_PEEK) != b""
+        return taken.recv(1, socket.MSG_PEEK) != b""
+    except OSError:
+        return False

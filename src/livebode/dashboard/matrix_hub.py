@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from livebode.analysis.overview import LIVE_VALUES_MAX, Overview
+from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.core import MatrixResponses
 from livebode.dashboard.hub import Hub
-from livebode.records.matrix_run import entry_summary
-from livebode.runtime.documents import Document, RunEnded, RunStarted
+from livebode.records import entry_summary
+from livebode.runtime import Document, RunEnded, RunStarted
 
 
 class MatrixHub:

@@ -7,22 +7,25 @@ from pathlib import Path
 from livebode.dashboard.matrix_group import MatrixGroup
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
-from livebode.records import RunRecord
-from livebode.records.matrix_run import is_matrix
-from livebode.records.summary_file import read_summary
+from livebode.estimates import kind_of, rule
+from livebode.records import RunRecord, read_summary
 
 
 def views_of(directory: Path, first_axis: int = 0) -> list[tuple[State, Viewed]]:
     """The states of a run with all its data; LivebodeError if it cannot be read."""
-    name = directory.resolve().name
-    if is_matrix(read_summary(directory)[0]):
-        return _of_matrix(directory, name, first_axis)
+    summary, _ = read_summary(directory)
+    page = rule(kind_of(summary), "page") or views_of_response  # which says why there is none
+    return page(directory, directory.resolve().name, first_axis)
+
+
+def views_of_response(directory: Path, name: str, first_axis: int) -> list[tuple[State, Viewed]]:
+    """The only axis of a run with single responses."""
     state, viewed = State(name, first_axis), Viewed(directory)
     viewed.fill(state)
     return [(state, viewed)]
 
 
-def _of_matrix(directory: Path, name: str, first_axis: int) -> list[tuple[State, Viewed]]:
+def views_of_matrix(directory: Path, name: str, first_axis: int) -> list[tuple[State, Viewed]]:
     """All entries: of a long run from its means, else from one reading of the matrices."""
     run = RunRecord.open(directory, matrix=True)
     found = run.summary["found"]

@@ -11,10 +11,11 @@ from typing import Any
 
 from livebode.core import Event
 from livebode.dashboard.alarm import OPEN, AlarmShelf, AlarmState, AlarmStatus, number_in, text_in
-from livebode.dashboard.alarm_history import AlarmHistory, What
-from livebode.monitoring.alarm_kinds import ALARMS, FAR, PRIORITIES, RETURNS, SOURCE, cause_of
-from livebode.records.grouped_events import each_event, event_counts, group_of
-from livebode.runtime.readiness import ENDED, SUPPRESSED
+from livebode.dashboard.alarm_history import AlarmHistory, What, limited
+from livebode.language import for_page
+from livebode.monitoring import ALARMS, FAR, PRIORITIES, RETURNS, SOURCE, UNMONITORED, cause_of
+from livebode.records import each_event, event_counts, group_of
+from livebode.runtime import ENDED, SUPPRESSED
 
 ACKNOWLEDGED, SHELVED, UNSHELVED = "acknowledged", "shelved", "unshelved"
 CAUSES_MAX = 500
@@ -30,7 +31,7 @@ class Notice:
     ----------
     cause
         Identifier of the common cause.
-    id, kind, message
+    id, kind, words
         Of the newest event.
     first_s, last_s
         Times of the first and of the newest event.
@@ -47,7 +48,7 @@ class Notice:
     last_s: float
     id: str = ""
     kind: str = ""
-    message: str = ""
+    words: str = ""
     count: int = 0
     seen: int = 0
     changed: int = 0
@@ -61,14 +62,15 @@ class Notice:
         self.kinds.add(event.kind)
         self.id = key
         if self.alarm is None or event.kind in ALARMS:  # its end is shown with what has ended
-            self.kind, self.message = event.kind, event.message[:_PLAIN_MAX]
+            self.kind, self.words = event.kind, limited(event.words, _PLAIN_MAX)
         self.count += times
         self.last_s = max(self.last_s, event.time_s)
 
     def plain(self) -> dict[str, Any]:
         """Plain data for the page."""
-        names = ("cause", "id", "kind", "message", "first_s", "last_s", "count", "seen")
-        return {name: getattr(self, name) for name in names} | {"kinds": sorted(self.kinds)}
+        names = ("cause", "id", "kind", "first_s", "last_s", "count", "seen")
+        message = {"message": str(self.words), "words": for_page(self.words)}
+        return {name: getattr(self, name) for name in names} | message | {"kinds": sorted(self.kinds)}
 
 
 class EventCauses:
@@ -94,6 +96,8 @@ class EventCauses:
         self._source_sample: int | None = None  # at which a silent source returned
         self.suppressed_s: float | None = None
         """Time of the run since which the machine is not ready; None if it is ready."""
+        self.unmonitored_s: float | None = None
+        """Time of the run since which no change would be found, or only of a part; None if it is monitored."""
 
     @property
     def changed(self) -> set[str]:
@@ -219,6 +223,8 @@ class EventCauses:
 
     def _judge(self, notice: Notice, event: Event, times: int) -> None:
         """The state of the alarm after an event of its cause."""
+        if event.kind in UNMONITORED:
+            self.unmonitored_s = number_in(event, "since_s")  # not in the one that reports the end
         if (kind := ALARMS.get(event.kind)) is not None:
             self._raise(notice, event, times)
             if notice.cause.startswith("change: ") and notice.cause != FAR and FAR in self._shown:
@@ -267,14 +273,12 @@ class EventCauses:
 
     def _acknowledge(self, event: Event) -> None:
         found = self.of(str(event.details.get("event")))
-        # Earlier versions used other names for the events of a group.
         notice = self._shown.get(str(event.details.get("cause"))) if found is None else found[0]
         if notice is None:
             return
         count, alarm = event.details.get("count"), notice.alarm
         open_before = alarm is not None and alarm.condition(notice.seen) in OPEN
-        # Runs from before the grouping of causes acknowledge each event individually.
-        seen = max(notice.seen, count) if isinstance(count, int) else notice.seen + 1
+        seen = max(notice.seen, count) if isinstance(count, int) else notice.seen
         notice.seen = min(seen, notice.count)
         if alarm is not None and open_before and notice.seen >= alarm.raised:
             alarm.acknowledge(event)
@@ -298,7 +302,7 @@ class EventCauses:
         facts = {
             "cause": notice.cause,
             "kind": notice.kind if acted else event.kind,
-            "message": notice.message if acted else event.message,
+            "words": notice.words if acted else event.words,
             "state": self.state(notice) or "",
             "by": text_in(event, "by"),
             "comment": text_in(event, "comment") or text_in(event, "reason"),

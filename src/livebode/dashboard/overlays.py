@@ -9,20 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.fit_settings import chosen_model
-from livebode.configuration.recorded import recorded_configuration
+from livebode.arrays import Floats
+from livebode.configuration import FitSection, chosen_model, recorded_configuration
 from livebode.core import Lines, LivebodeError, Quantity, Responses
 from livebode.dashboard.quantities import Quantities
 from livebode.dashboard.trends import Trends
 from livebode.fitting import EvaluationGrid, PhysicalModel
+from livebode.language import Message
 
 if TYPE_CHECKING:
     from livebode.monitoring import ScheduleTable
 
-Floats = NDArray[np.float64]
 _GRID_POINTS = 240
 
 
@@ -134,7 +132,7 @@ class HealthyEntry:
     @classmethod
     def of(cls, path: Path, output: str, input: str) -> HealthyEntry:
         """Read the run that is the baseline; LivebodeError if it cannot be read."""
-        from livebode.runtime.matrix_baseline import MatrixBaseline
+        from livebode.runtime import MatrixBaseline
 
         return cls(MatrixBaseline.load(path).mean.entry(output, input))
 
@@ -157,7 +155,7 @@ def _healthy_of(summary: Mapping[str, Any]) -> Healthy | HealthyEntry | None:
 
 
 def _way(step: float, still: float) -> int:
-    from livebode.monitoring.table import BACK, FORTH, STILL
+    from livebode.monitoring import BACK, FORTH, STILL
 
     return FORTH if step > still else BACK if step < -still else STILL
 
@@ -166,15 +164,15 @@ def overlays_of(
     summary: Mapping[str, Any], quantities: Quantities
 ) -> tuple[FittedCurve | None, Healthy | HealthyEntry | None, str]:
     """Both overlays, and the reasons why a requested one is missing."""
-    remarks = []
+    remarks = list[Message]()
     fitted: FittedCurve | None = None
     healthy: Healthy | HealthyEntry | None = None
     try:
         fitted = FittedCurve.of(summary, quantities)
     except ValueError as error:
-        remarks.append(f"the fitted model cannot be drawn: {error}")
+        remarks.append(Message("the fitted model cannot be drawn: {why}", why=error))
     try:
         healthy = _healthy_of(summary)
     except LivebodeError as error:
-        remarks.append(f"the baseline cannot be drawn: {error}")
-    return fitted, healthy, "; ".join(remarks)
+        remarks.append(Message("the baseline cannot be drawn: {why}", why=error))
+    return fitted, healthy, Message("{remarks}", remarks=remarks) if remarks else ""

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.analysis.overview import Overview
+from livebode.analysis import Overview
 from livebode.core import Responses, ServerError
 from livebode.dashboard.state import State
-from livebode.records import RunRecord
-from livebode.records.tiers import thinned
+from livebode.language import Message
+from livebode.records import RunRecord, thinned
 
 ROWS_MAX = 2000
 _READ_BYTES = 8 << 20
@@ -70,7 +70,7 @@ class Past:
         Means are used where the record has them, for spans with very many responses.
         """
         if self.overview is None:
-            raise ServerError("not-begun", "there is no response yet", "wait for the first window")
+            raise ServerError("not-begun", Message("there is no response yet"), Message("wait for the first window"))
         rows = max(1, min(rows, ROWS_MAX))
         within = self.overview.between(from_s, to_s)
         if (to_s - from_s) >= _WHOLE * (self.last_s - self.first_s):
@@ -111,7 +111,7 @@ class Past:
         if self.readable:
             yield from self.record().between(from_s, to_s)
         elif self.recent is None or self.overview is None:
-            raise ServerError("not-begun", "there is no response yet", "wait for the first window")
+            raise ServerError("not-begun", Message("there is no response yet"), Message("wait for the first window"))
         else:
             yield (self.recent if from_s >= self.recent.time_s[0] else self.overview).between(from_s, to_s)
 
@@ -123,7 +123,9 @@ class Past:
             found += self.record().between(time_s - reach_s, time_s + reach_s)
         best = _nearest(found, time_s)
         if best is None:
-            raise ServerError("not-begun", "no response has a valid line yet", "wait for the first window")
+            raise ServerError(
+                "not-begun", Message("no response has a valid line yet"), Message("wait for the first window")
+            )
         return best
 
 

@@ -6,6 +6,7 @@ import asyncio
 from dataclasses import dataclass
 
 import h11
+from starlette.types import Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 REQUEST_S = 10.0
@@ -41,13 +42,23 @@ class PatientProtocol(H11Protocol):
     """`waits` reports what the client must do: send a request or the rest of one, or read its answer."""
 
     _since_s = _unread_s = 0.0
-    _idle = _upgraded = False
+    _idle = _upgraded = _working = False
+    heard = False
+    """Whether anything that the client has sent was read."""
+
+    async def _call(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self._working = True
+        try:
+            await self.config.loaded_app(scope, receive, send)
+        finally:
+            self._working = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
-        self._since_s = self.loop.time()
+        self._since_s, self.app = self.loop.time(), self._call
 
     def data_received(self, data: bytes) -> None:
+        self.heard = True
         if self._idle:
             self._since_s, self._idle = self.loop.time(), False
         super().data_received(data)
@@ -65,12 +76,19 @@ class PatientProtocol(H11Protocol):
         super().handle_websocket_upgrade(event)
 
     @property
+    def answers(self) -> bool:
+        """Whether the server works on an answer: the request is complete, and the client reads or has gone."""
+        asked: object = self.cycle  # None before the first request, which uvicorn's type omits
+        if asked is None or self._upgraded or self.flow.write_paused or self.cycle.response_complete:
+            return False
+        return self._working if self.cycle.disconnected else not self.cycle.more_body
+
+    @property
     def waits(self) -> ClientWait:
         if self._upgraded:  # the web socket has its own limits
             return ClientWait(self._since_s, None)
         if self.flow.write_paused:
             return ClientWait(self._unread_s, UNREAD_S)
-        asked: object = self.cycle  # None before the first request, which uvicorn's type omits
-        if asked is not None and not self.cycle.response_complete and not self.cycle.more_body:
+        if self.answers:
             return ClientWait(self._since_s, None)
         return ClientWait(self._since_s, IDLE_S if self._idle else REQUEST_S)

@@ -9,20 +9,22 @@ from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.configuration.recorded import recorded_loop
+from livebode.arrays import Complex
+from livebode.configuration import recorded_loop
 from livebode.core import Lines, Loop, Model, PlantKinds, Quantity, Responses, ServerError, split_plant_unit
-from livebode.estimation.quantities import convert
-from livebode.records.run import kinds_in, lines_in
-
-Complex = NDArray[np.complex128]
+from livebode.estimation import convert
+from livebode.language import Message
+from livebode.records import kinds_in, lines_in
 
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 POWERS = range(-2, 3)
 _SECONDS = re.compile(r"(.*[^/])/s(?:\^?([2-9])|([²³⁴]))?")
 _RAISED = str.maketrans("²³⁴", "234")
-_UNKNOWN, _REMEDY = "the run's configuration contains no controllers", "describe its controllers under [loop]"
+_UNKNOWN, _REMEDY = (
+    Message("the run's configuration contains no controllers"),
+    Message("describe its controllers under [loop]"),
+)
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class Quantities:
     def why_not(self, quantity: Quantity) -> str:
         """The reason why the page cannot show a quantity; empty if it can."""
         shown = quantity == self.own or (self.loop is not None and self.loop.feedback is not None)
-        return "" if shown else f"{_UNKNOWN}; {_REMEDY}"
+        return "" if shown else Message("{message}; {remedy}", message=_UNKNOWN, remedy=_REMEDY)
 
     def check(self, quantity: Quantity) -> None:
         """Raise ServerError if the page cannot show a quantity."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast, get_args
@@ -12,11 +13,13 @@ from livebode.core import Quantity, ServerError, UsageError
 from livebode.dashboard.frames import REFERENCES_MAX
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.dashboard.signal_answer import Picture
-from livebode.records.saved_curves import TEXT_MAX
+from livebode.language import Message
+from livebode.records import TEXT_MAX
 
 MESSAGE_BYTES_MAX = 1024
 _FORMATS = ("csv", "mat")
 _KINDS = ("watch", "pause", "resume", "freeze", "unfreeze")
+_TURNING = {*map(chr, range(0x202A, 0x202F)), *map(chr, range(0x2066, 0x206A))}  # the direction of the text
 _TIME_S_MAX = 1e12
 _ID_MAX = 64
 
@@ -142,7 +145,7 @@ def client_message(text: str, axes: int) -> ClientMessage:
             "send a shorter one",
             limit_bytes=MESSAGE_BYTES_MAX,
         )
-    message = plain(text, "message")
+    message = json_object(text, "message")
     kind = message.get("kind")
     if kind == "watch":
         axis = message.get("axis", 0)
@@ -192,7 +195,7 @@ def saved_change(data: bytes, axes: int) -> SavedChange:
     >>> saved_change(b'{"axis": 0, "kind": "annotation", "text": "belt", "frequency_hz": 62.5}', axes=1).at
     62.5
     """
-    message = plain(data)
+    message = json_object(data)
     axis, kind = message.get("axis"), message.get("kind")
     place = {"reference": "time_s", "annotation": "frequency_hz", "remove": None}
     text = message.get("text")
@@ -203,6 +206,7 @@ def saved_change(data: bytes, axes: int) -> SavedChange:
             f"a change needs axis, kind ({', '.join(place)}) and a text of at most {TEXT_MAX} characters",
             "send them",
         )
+    check_letters(text, "text")
     number = whole_number(str(axis)[:10], 0, axes - 1, "axis")
     name = place[str(kind)]
     if name is None:
@@ -216,15 +220,28 @@ def saved_change(data: bytes, axes: int) -> SavedChange:
     return SavedChange(number, str(kind), text.strip(), found)
 
 
-def plain(data: bytes | str, what: str = "body") -> dict[str, Any]:
-    """Parse a JSON object; ServerError if it is invalid."""
+def json_object(data: bytes | str, what: str = "body") -> dict[str, Any]:
+    """Parse a JSON object; ServerError if it is invalid, or has half of a letter, which no file and no answer can."""
     try:
         message = json.loads(data)
+        json.dumps(message, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        raise ServerError(
+            "request-malformed", f"the {what} has half of a letter (a surrogate)", "remove the letter"
+        ) from None
     except (ValueError, RecursionError):
         raise ServerError("request-malformed", f"the {what} is not JSON", "send an object of JSON") from None
     if not isinstance(message, dict):
         raise ServerError("request-malformed", f"the {what} is not an object of JSON", "send one")
     return message
+
+
+def check_letters(text: str, name: str) -> None:
+    """UsageError if a text in one line has a letter that moves a terminal's cursor or turns the text around it."""
+    if any(letter in _TURNING or unicodedata.category(letter) == "Cc" for letter in text):
+        raise UsageError(
+            "unreadable", Message("{name} contains a control character", name=name), "remove it", argument=name
+        )
 
 
 def _quantity(word: object) -> Quantity:

@@ -9,8 +9,7 @@ import numpy as np
 from livebode.core import Block
 from livebode.dashboard.signal_answer import Picture, answer, why_not
 from livebode.dashboard.signal_tap import span_samples
-from livebode.records import RunRecord
-from livebode.records.sample_table import channels_of
+from livebode.records import RunRecord, channels_of
 from livebode.tables import Table
 
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from livebode.analysis.run_trend import alarms_of, fitted_rows, trend_points
-from livebode.core import LivebodeError, ServerError
-from livebode.core.clock import RunClock
+from livebode.analysis import alarms_of, fitted_rows, trend_points
+from livebode.core import LivebodeError, RunClock, ServerError
 from livebode.dashboard.run_entry import RunEntry, entry
+from livebode.language import Message, for_page
 from livebode.records import RunRecord
 
 SCAN_EVERY_S = 1.0
@@ -81,7 +81,9 @@ class RunCatalogue:
     def path(self, name: str) -> Path:
         """The directory of a listed run; ServerError if there is none of this name."""
         if name not in runs_in(self.directory):  # a name from outside never becomes a path by itself
-            raise ServerError("run-unknown", f"there is no run {name[:80]!r}", "reload the page", run=name[:80])
+            raise ServerError(
+                "run-unknown", f"there is no run {name[:80]!r}", Message("reload the page"), run=name[:80]
+            )
         return self.directory / name
 
     def rows(self, since: int) -> dict[str, Any]:
@@ -144,7 +146,7 @@ def trend(run: Path) -> dict[str, Any]:
                 [p.model, p.name, p.unit, p.value, p.bound_95, p.low, p.high, p.time_s, clock.unix_s(p.time_s), p.fits]
                 for p in points
             ],
-            "alarms": [[e.time_s, clock.unix_s(e.time_s), e.kind, e.message] for e in alarms_of(record)],
+            "alarms": [[e.time_s, clock.unix_s(e.time_s), e.kind, for_page(e.words)] for e in alarms_of(record)],
             "baseline": None if baseline is None else str(baseline)[:200],
         }
 

@@ -11,15 +11,12 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any, Literal
 
-from livebode.core import LivebodeError
-from livebode.core.clock import RunClock
-from livebode.core.machine_levels import LEVELS
-from livebode.records.inside import open_read
-from livebode.records.notes import read_notes
-from livebode.records.segments.manifest import Manifest
-from livebode.records.summary_file import RUN, read_summary
-from livebode.records.summary_shape import what_is_wrong
-from livebode.tables.parquet_footer import read_footer
+from livebode.core import LEVELS, LivebodeError, RunClock
+from livebode.dashboard.alarm_history import limited
+from livebode.language import for_page, recorded
+from livebode.monitoring import result_tone
+from livebode.records import RUN, Manifest, open_read, read_notes, read_summary, what_is_wrong
+from livebode.tables import read_footer
 
 RunState = Literal["finished", "recording", "stopped", "broken"]
 _GROWS_S = 10.0
@@ -82,7 +79,7 @@ class RunEntry:
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
-        return asdict(self)
+        return asdict(self) | {"message": str(self.message), "said": for_page(self.message)}
 
 
 def entry(run: Path) -> RunEntry:
@@ -95,7 +92,7 @@ def entry(run: Path) -> RunEntry:
             return RunEntry(run.name, "broken", written, size, wrong[:_TEXT_MAX])
         return _readable(run, summary, size, newest)
     except (LivebodeError, OSError, ValueError) as error:
-        return RunEntry(run.name, "broken", written, size, str(error)[:_TEXT_MAX])
+        return RunEntry(run.name, "broken", written, size, limited(getattr(error, "words", str(error)), _TEXT_MAX))
 
 
 def grows(newest: Mapping[str, float]) -> bool:
@@ -145,10 +142,9 @@ def _verdict(summary: Mapping[str, Any]) -> tuple[str, str, int]:
     monitoring = summary.get("monitoring", {})
     active = monitoring.get("standing") or []
     alarms = len(active) if isinstance(active, list) else 0
-    message = str(monitoring.get("message", ""))[:_TEXT_MAX]
-    if monitoring.get("baseline") is None or not monitoring.get("judged_s"):
-        return "open", message, 0
-    return "alarm" if alarms else "check" if monitoring.get("changes") else "ok", message, alarms
+    message = limited(recorded(monitoring.get("words", {}), str(monitoring.get("message", ""))), _TEXT_MAX)
+    tone = result_tone(monitoring, active=alarms > 0)
+    return tone, message, 0 if tone == "open" else alarms
 
 
 def _machine(configuration: Mapping[str, Any]) -> str:

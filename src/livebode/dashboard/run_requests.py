@@ -8,8 +8,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from livebode.core import ServerError, UsageError
-from livebode.dashboard.queries import plain
-from livebode.records.notes import Notes
+from livebode.dashboard.queries import json_object
+from livebode.language import Message
+from livebode.records import Notes
 
 NAME_LETTERS_MAX = 255
 VERSION_MAX = 1 << 53
@@ -23,14 +24,16 @@ def version(query: Mapping[str, str]) -> int:
     """
     text = query.get("since", "0")
     if not (text.isascii() and text.isdigit() and len(text) <= 16 and int(text) <= VERSION_MAX):
-        raise UsageError("unreadable", f"since={text[:20]!r} is not a version", "reload the page", value=text[:20])
+        raise UsageError(
+            "unreadable", f"since={text[:20]!r} is not a version", Message("reload the page"), value=text[:20]
+        )
     return int(text)
 
 
 def run_name(value: object) -> str:
     """The name of a run in a request."""
     if not isinstance(value, str) or not 0 < len(value) <= NAME_LETTERS_MAX:
-        raise ServerError("request-malformed", "the request does not name a run", "reload the page")
+        raise ServerError("request-malformed", "the request does not name a run", Message("reload the page"))
     return value
 
 
@@ -62,4 +65,4 @@ def deletion_of(data: bytes | None) -> str:
 def _object(data: bytes | None) -> dict[str, Any]:
     if data is None:
         raise ServerError("request-malformed", "the request is too long or incomplete", "send a shorter one")
-    return plain(data)
+    return json_object(data)

@@ -16,15 +16,13 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from livebode.core import LivebodeError, ServerError
 from livebode.dashboard import run_requests
-from livebode.dashboard.access import Role
+from livebode.dashboard.access import Role, error_answer
 from livebode.dashboard.board import Board
 from livebode.dashboard.guard import body
 from livebode.dashboard.opened_runs import OpenedRuns
 from livebode.dashboard.run_catalogue import RunCatalogue, details
-from livebode.language import in_language, negotiated
-from livebode.records import to_json
-from livebode.records.deletion import delete
-from livebode.records.notes import write_notes
+from livebode.language import Message, in_language, negotiated
+from livebode.records import delete, to_json, write_notes
 
 BODY_BYTES_MAX = 16 << 10
 _COMPARISONS_MAX = 8
@@ -159,18 +157,15 @@ class RunsPages:
             await page(scope, receive, send)
 
     def _compared(self, before: Path, after: Path, code: str) -> str:
-        from livebode.configuration.recorded import recorded_report
-        from livebode.records.summary_file import read_summary
-        from livebode.report.html import to_html
-        from livebode.reporting.compare_report import Comparison
-        from livebode.reporting.first_page import trusted
-        from livebode.reporting.matrix_comparison import MatrixComparison, both_matrices
+        from livebode.configuration import recorded_report
+        from livebode.records import read_summary
+        from livebode.report import to_html
+        from livebode.reporting import comparison_of, trusted
 
         key = code, *((path.name, (path / "run.json").stat().st_mtime_ns) for path in (before, after))
         if key not in self._comparisons:
             with in_language(code):
-                pair = both_matrices(before, after)
-                found = Comparison.of(before, after) if pair is None else MatrixComparison.of(*pair)
+                found = comparison_of(before, after).of(before, after)
                 header = trusted(recorded_report(read_summary(after)[0]), after)
                 self._comparisons[key] = to_html(found.document(datetime.now(UTC), header=header))
             while len(self._comparisons) > _COMPARISONS_MAX:
@@ -192,7 +187,7 @@ class RunsPages:
         if (role := self._role(request)) is None:
             return _unknown()
         if role != "operator":
-            return JSONResponse({"error": "this session is read-only"}, 403)
+            return JSONResponse(error_answer(Message("this session is read-only")), 403)
         if request.headers.get("content-type", "").partition(";")[0] != "application/json":
             raise ServerError("request-malformed", "the request is not JSON", "send it with the type application/json")
         return None
@@ -203,4 +198,4 @@ def _json(value: dict[str, Any]) -> Response:
 
 
 def _unknown() -> Response:
-    return JSONResponse({"error": "log in first"}, 401)
+    return JSONResponse(error_answer(Message("log in first")), 401)

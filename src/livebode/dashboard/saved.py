@@ -9,7 +9,7 @@ from livebode.core import ServerError
 from livebode.dashboard.past import Past
 from livebode.dashboard.queries import SavedChange
 from livebode.dashboard.state import State
-from livebode.records.saved_curves import SavedCurves
+from livebode.records import SavedCurves
 
 
 def listed(saved: SavedCurves) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import socket
 import time
 import traceback
@@ -14,7 +15,11 @@ import uvicorn
 from livebode.dashboard.listener import Listener
 from livebode.dashboard.patience import PatientProtocol
 
+_OBJECTS_NEW = 5_000
+"""Most new objects of Python after which cycles are searched while a page is served: a closed connection under TLS is a
+cycle with 256 KiB of buffers, and a crowd of them waited for the 100,000 objects of the command line with 600 MB."""
 _FAULT_EVERY_S = 60.0
+_FAULT_LETTERS_MAX = 300
 
 
 class Server(uvicorn.Server):
@@ -34,9 +39,12 @@ class Server(uvicorn.Server):
         super().__init__(config)
         self._listening, self._report = listening, report
         self._accepting: asyncio.Task[None] | None = None
+        self._threshold = gc.get_threshold()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets=sockets or [])
+        first, *others = self._threshold
+        gc.set_threshold(min(first, _OBJECTS_NEW), *others)
         listener = Listener(self._listening, self.config.ssl, self._protocol, self._report)
         self._accepting = asyncio.create_task(listener.run())
 
@@ -44,6 +52,7 @@ class Server(uvicorn.Server):
         if self._accepting is not None:
             self._accepting.cancel()
         await super().shutdown(sockets)
+        gc.set_threshold(*self._threshold)
 
     def _protocol(self) -> PatientProtocol:
         return PatientProtocol(self.config, self.server_state, self.lifespan.state)
@@ -69,7 +78,8 @@ class Faults:
         frames = traceback.extract_tb(error.__traceback__) if error is not None else []
         place = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""
         often = f", the {self._count}th" if self._count > 1 else ""
-        self._report(f"internal error in the dashboard{often}: {what or repr(error)}{place}; the run continues")
+        about = (what or repr(error))[:_FAULT_LETTERS_MAX]  # an error may contain the data that it is about
+        self._report(f"internal error in the dashboard{often}: {about}{place}; the run continues")
 
     def handler(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """Handler for `loop.set_exception_handler`."""

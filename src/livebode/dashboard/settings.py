@@ -10,9 +10,9 @@ import stat
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.configuration.serve_section import ServeSection
+from livebode.configuration import ServeSection
 from livebode.core import ConfigError
-from livebode.sources.live.secret import secret
+from livebode.sources.live import secret
 
 TOKEN_LETTERS_MIN = 32
 _MAKE = 'umask 077; python -c "import secrets; print(secrets.token_urlsafe(32))"'
@@ -62,9 +62,9 @@ class Serving:
         if viewer is not None and viewer == token:
             raise ConfigError(
                 "tokens-equal",
-                "serve.token and serve.viewer_token are equal, so viewers would be operators",
+                "the tokens of operators and viewers in [serve] are equal, so viewers would be operators",
                 "make another token for viewers",
-                key="serve.viewer_token",
+                key="serve.viewer_token_file" if section.viewer_token_file else "serve.viewer_token_env",
             )
         tls = _tls(section)
         if not _loopback(section.address):
@@ -105,7 +105,7 @@ def _loopback(address: str) -> bool:
 
 
 def _token(key: str, variable: str | None, path: Path | None) -> str | None:
-    token = secret("serve", key, variable, path)
+    token, named = secret("serve", key, variable, path), f"serve.{key}_{'env' if path is None else 'file'}"
     if path is not None:
         _check_rights(key, path)
     if token is None:
@@ -113,9 +113,9 @@ def _token(key: str, variable: str | None, path: Path | None) -> str | None:
     if len(token) < TOKEN_LETTERS_MIN or not token.isascii() or not token.isprintable() or " " in token:
         raise ConfigError(
             "token-weak",
-            f"serve.{key} is not a token of at least {TOKEN_LETTERS_MIN} letters and digits",
+            f"{named} has no token of at least {TOKEN_LETTERS_MIN} letters and digits",
             f"make one with `{_MAKE}`",
-            key=f"serve.{key}",
+            key=named,
             letters_min=TOKEN_LETTERS_MIN,
         )
     return token

@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.overview import Overview
-from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Event, LivebodeError, Quantity, Responses
-from livebode.core.clock import RunClock
+from livebode.analysis import Overview
+from livebode.configuration import recorded_configuration
+from livebode.core import Event, LivebodeError, Quantity, Responses, RunClock
 from livebode.dashboard.alarm import AlarmShelf
 from livebode.dashboard.alarm_actions import shelving, unshelving
 from livebode.dashboard.frames import curve, frame
@@ -29,6 +28,7 @@ from livebode.dashboard.overlays import FittedCurve, Healthy, HealthyEntry, grid
 from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses
 from livebode.dashboard.trends import Trends
+from livebode.language import for_page
 from livebode.margins import peak_sensitivity_at_lines
 from livebode.records import RunRecord, to_json
 from livebode.runtime import RunControl
@@ -278,7 +278,7 @@ class State:
                     "symbol": _SYMBOLS[name],
                     "unit": q.unit_of(name),
                     "units": q.units_of(name),
-                    "why_not": q.why_not(name),
+                    "why_not": for_page(q.why_not(name)),
                 }
                 for name in QUANTITIES
             ],
@@ -286,7 +286,7 @@ class State:
             "schedule": found.get("schedule") or words.get("signals", {}).get("schedule", ""),
             "model": self._fitted.model.name if self._fitted else "",
             "baseline": self._healthy is not None,
-            "remark": self._remark,
+            "remark": for_page(self._remark),
             "matrix": None if self.group is None else self.group.plain(),
         }
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Parameters, RowArrays
-
-Floats = NDArray[np.float64]
 
 POINTS_MAX = 1024
 TRENDS_MAX = 256

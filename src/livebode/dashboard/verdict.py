@@ -6,10 +6,10 @@ import time
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from livebode.core.clock import RunClock
+from livebode.core import RunClock
 from livebode.dashboard.alarm import OPEN
-from livebode.dashboard.message_times import times_in
-from livebode.monitoring.alarm_kinds import PRIORITIES, SOURCE
+from livebode.language import for_page
+from livebode.monitoring import PRIORITIES, SOURCE
 
 if TYPE_CHECKING:
     from livebode.dashboard.alarm import AlarmState, AlarmStatus
@@ -30,7 +30,7 @@ class AxisVerdict:
         can be concluded.
     word
         Which sentence: ``change``, ``shelved``, ``silent``, ``disconnected``, ``behind``, ``alarms``, ``active``,
-        ``suppressed``, ``healthy``, ``no-baseline``, ``not-judged`` or ``not-begun``.
+        ``suppressed``, ``not-monitored``, ``healthy``, ``no-baseline``, ``not-judged`` or ``not-begun``.
     since_s, since_unix_s
         Second of the run, and seconds since 1970, since which it applies; None if not known.
     seconds
@@ -57,7 +57,7 @@ class AxisVerdict:
 
     def plain(self) -> dict[str, Any]:
         """Plain data for the page."""
-        return asdict(self) | {"times": times_in(self.message)}
+        return asdict(self) | {"message": str(self.message), "words": for_page(self.message)}
 
 
 def verdict(axis: State) -> AxisVerdict:
@@ -80,6 +80,8 @@ def verdict(axis: State) -> AxisVerdict:
         return _of_alarm("check", "active", found, clock)
     if not axis.has_baseline:
         return AxisVerdict("open", "no-baseline")
+    if (since_s := axis.notices.unmonitored_s) is not None:
+        return AxisVerdict("open", "not-monitored", since_s, clock.unix_s(since_s))
     return AxisVerdict("ok", "healthy") if axis.judged else AxisVerdict("open", "not-judged")
 
 
@@ -90,7 +92,7 @@ def _of_alarm(
     notice, alarm, _ = min(found, key=lambda one: (PRIORITIES.index(one[1].kind.priority), one[1].since_s))
     since_s = alarm.since_s
     return AxisVerdict(
-        tone, word, since_s, clock.unix_s(since_s), None, alarm.facts, notice.message, len(found), notice.cause
+        tone, word, since_s, clock.unix_s(since_s), None, alarm.facts, notice.words, len(found), notice.cause
     )  # fmt: skip
 
 

@@ -13,9 +13,7 @@ from livebode.core import Event, Responses
 from livebode.dashboard.hub import Item
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import TrendRows
-from livebode.records import RunRecord
-from livebode.records.grouped_events import still_waiting
-from livebode.records.tiers import thinned
+from livebode.records import RunRecord, still_waiting, thinned
 
 _LONG_BYTES = 16 << 20  # larger tables are not read whole
 _MEANS = 2000
@@ -86,7 +84,8 @@ class Viewed:
         state.read()
 
     def _new_events(self) -> list[Event]:
-        waiting, lines = self._run.waiting_events(), list(self._run.event_lines())
+        written, waiting = self._run.event_lines()
+        lines = list(written)
         new = list(still_waiting(lines, waiting))[self._events :]
         self._events = len(lines)
         for damage in self._run.damages:

@@ -1,8 +1,5 @@
 """Doctor: what a person asks first when something does not work, and a bundle for a report (docs/how-to/doctor.md)."""
 
-from livebode.doctor.bundle import write_bundle
-from livebode.doctor.check import Check, Verdict, worst
-from livebode.doctor.examination import examine
-from livebode.doctor.subject import Subject
+from livebode.on_first_use import on_first_use
 
-__all__ = ["Check", "Subject", "Verdict", "examine", "worst", "write_bundle"]
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

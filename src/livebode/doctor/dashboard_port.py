@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from livebode.configuration.axis import Axis
-from livebode.configuration.serve_section import ServeSection
+from livebode.configuration import Axis, ServeSection
 from livebode.core import LivebodeError
-from livebode.dashboard.dashboard import listening
-from livebode.dashboard.settings import Serving
+from livebode.dashboard import Serving, listening
 from livebode.doctor.check import Check
 
 NAME = "dashboard port"

@@ -8,9 +8,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from livebode.core.writing import why
+from livebode.core import why
 from livebode.doctor.check import Check
-from livebode.records.segments.limits import SegmentLimits
+from livebode.records import SegmentLimits
 
 NAME = "disk"
 FREE_BYTES_MIN = 10**9

@@ -11,6 +11,7 @@ from livebode.doctor.dashboard_port import check_dashboard_port
 from livebode.doctor.disk import check_disk
 from livebode.doctor.extras import check_extras
 from livebode.doctor.instructions import check_instruction_set
+from livebode.doctor.plugins import check_plugins
 from livebode.doctor.sources import check_sources
 from livebode.doctor.subject import Subject
 from livebode.doctor.udp_buffer import check_udp_buffer
@@ -35,6 +36,7 @@ def examine(subject: Subject, directory: Path) -> list[Check]:
         check_run(subject),
         *check_sources(subject.sourced),
         check_extras(),
+        check_plugins(),
         check_instruction_set(),
         check_disk(directory, sum(budget or 0 for budget in budgets)),
         check_udp_buffer(axes),

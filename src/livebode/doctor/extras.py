@@ -7,7 +7,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, metadata, requires, version
 from typing import TYPE_CHECKING
 
-from livebode.core.installing import install_command, packages_of
+from livebode.core import install_command, packages_of
 from livebode.doctor.check import Check
 
 if TYPE_CHECKING:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from livebode.configuration.axis import Axis
-from livebode.configuration.recording import open_even_or_uneven, open_recording
+from livebode.configuration import Axis, open_even_or_uneven, open_recording
 from livebode.core import LivebodeError
 from livebode.doctor.check import Check
 from livebode.locations import Location
-from livebode.preparation.contents import ChannelSummary, contents_of
+from livebode.preparation import ChannelSummary, contents_of
 
 
 def check_recording(name: str, axis: Axis, path: Location) -> Check:

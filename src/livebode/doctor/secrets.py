@@ -13,11 +13,10 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-from livebode.configuration.axis import MAY_BE_SECRET, Axis
+from livebode.configuration import MAY_BE_SECRET, Axis
 from livebode.core import LivebodeError
-from livebode.experiments.experiment import Experiment
-from livebode.sources.live.address import parse_address
-from livebode.sources.live.secret import secret
+from livebode.experiments import Experiment
+from livebode.sources.live import parse_address, secret
 
 REMOVED = "[removed]"
 _SECRET_NAME = re.compile(r"pass(word|wd|phrase)|secret|token|credential|auth|user|login|api_?key", re.IGNORECASE)

@@ -7,13 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from livebode.configuration.axes import axes_of
-from livebode.configuration.axis import Axis
-from livebode.configuration.recorded import recorded_configuration
-from livebode.configuration.toml_file import parse_table, read_bytes
+from livebode.configuration import Axis, axes_of, parse_table, read_bytes, recorded_configuration
 from livebode.core import LivebodeError, UsageError
-from livebode.experiments.experiment import Experiment
-from livebode.preparation.plan import live_follower
+from livebode.experiments import Experiment
+from livebode.preparation import live_follower
 from livebode.records import RunRecord
 
 
@@ -130,8 +127,8 @@ def _check_baseline(axis: Axis, path: Path) -> None:
 
         Baseline.load(path)
         return
-    from livebode.analysis.matrices import read_gantry
-    from livebode.runtime.matrix_baseline import MatrixBaseline
+    from livebode.analysis import read_gantry
+    from livebode.runtime import MatrixBaseline
 
     MatrixBaseline.load(path)
     if axis.monitoring.gantry is not None:

@@ -7,9 +7,9 @@ import socket
 import sys
 from collections.abc import Mapping
 
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.doctor.check import Check
-from livebode.sources.live.udp import BUFFER_BYTES
+from livebode.sources.live import BUFFER_BYTES
 
 NAME = "UDP receive buffer"
 

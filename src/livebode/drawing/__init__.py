@@ -5,18 +5,6 @@ from the same parts. Matplotlib is imported when something is drawn. Text and co
 the settings of the caller's Matplotlib.
 """
 
-from livebode.drawing._curve import Cloud, Curve
-from livebode.drawing._curves import SPAN, bound_db, bound_deg, circular, decibels, near, quantiles, unwrapped
+from livebode.on_first_use import on_first_use
 
-__all__ = [
-    "SPAN",
-    "Cloud",
-    "Curve",
-    "bound_db",
-    "bound_deg",
-    "circular",
-    "decibels",
-    "near",
-    "quantiles",
-    "unwrapped",
-]
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

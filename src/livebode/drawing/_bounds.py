@@ -7,15 +7,13 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.drawing._curves import FLOOR_DB, decibels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _CORNERS = 72
 _REACH = 0.35  # of the range of the values: as far as bounds move the limits

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.arrays import Complex, Floats
 
 SPAN = (0.05, 0.95)
 FLOOR_DB = -1000.0

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 
 FEW_LINES = 40
 """Up to this many lines each has a marker and an error bar; more are drawn as a band."""

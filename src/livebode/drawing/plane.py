@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.drawing._bounds import circles, nichols_regions, without_stretching
 from livebode.drawing._curve import Cloud, Curve
 from livebode.drawing._curves import decibels, near
@@ -16,7 +16,6 @@ from livebode.drawing.ticks import frequency_label
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 
 _CLOUD_MAX = 200  # responses
 

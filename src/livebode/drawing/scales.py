@@ -8,15 +8,13 @@ import numpy as np
 from matplotlib import rcParams
 from matplotlib.markers import TICKDOWN
 from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, Locator, NullFormatter, NullLocator
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.drawing import ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
-
-Floats = NDArray[np.float64]
 
 
 def frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:

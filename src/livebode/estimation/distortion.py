@@ -9,14 +9,11 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Lines
-from livebode.core.distributions import f_quantile
+from livebode.arrays import Complex, Floats
+from livebode.core import Lines, f_quantile
 from livebode.estimation.detection import Groups, Interpolation
 from livebode.estimation.moments import Moments
 from livebode.estimation.products import divided, power, times
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _INSIDE_MIN = 2  # smallest number of detection lines between the outermost lines for an estimate in the band
 _OUTSIDE = 6  # more of them on each side

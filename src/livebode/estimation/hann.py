@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex
 from livebode.core import GridError, Lines
-
-Complex = NDArray[np.complex128]
 
 
 class Hann:

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import SignalError
-from livebode.core.mains import MAINS_HZ
+from livebode.arrays import Complex, Floats
+from livebode.core import MAINS_HZ, Lines, SignalError
 from livebode.estimation.mains import HARMONICS, prominence
 from livebode.estimation.silence import STEADY
 
-Floats = NDArray[np.float64]
-
 SECONDS_MIN = 2.0  # its thirds separate 50 from 60 Hz, with bins between them
 _PARTS = 3
+_MULTIPLES = np.unique(np.outer(MAINS_HZ, np.arange(1, HARMONICS + 1)))
 _REACH = 3e-3  # of its frequency by which the mains may be off
 _LOBE = 2  # bins on each side that a tone reaches in a Hann window
-_NOISE = 4.0  # two standard deviations of a tone's power in a third: √(2·35/18) is one, times √(noise per bin/power)
+_NOISE = 2.0  # standard deviation of a tone's power in a part: √(2·35/18), times √(noise per bin/power)
 _BESIDE = np.r_[-12:-3, 4:13]  # bins that a tone is compared with
+_OFF = 0.2  # bins by which the place of a tone may be wrong, besides
+_WANDER = 0.45  # of the highest power of the parts: the lowest one of a tone whose amplitude changes by ± 20 %
+_DRIFT = 1e-4  # of its frequency per second by which the mains changes it
+_TURN_MAX = 0.1  # rad: above it, the phase does not separate hum from a mode that noise drives
+_PART_S = 2.0  # in which the mains changes its frequency by less than a bin, up to the tenth multiple
 
 
 @dataclass(frozen=True)
@@ -44,9 +49,13 @@ def find_hum(signals: Mapping[str, Floats], rate_hz: float) -> list[Hum]:
 
     A tone is detected if its power, over thirds of the recording with a Hann window, exceeds the noise of its
     neighbours (probability of chance 1e-8), and if each third has nine tenths of the power of each other third, less
-    the scatter of the noise. So a decaying oscillation is not hum, nor is a mode that noise excites, whose amplitude
-    varies; the latter passes by chance about once in 20 recordings. Bias: the squared amplitude contains the noise
-    power of five bins.
+    the scatter of the noise; 45 % are enough where the phase advances by the same angle from third to third, because
+    the amplitude of the mains changes, its frequency hardly. So a decaying oscillation is not hum, nor is a mode that
+    noise excites, whose amplitude and phase vary; the latter passes by chance once in 20 recordings of three seconds,
+    once in eight of six. A tone of another machine is separated from the mains if it is off by 0.3 % and a fifth of the
+    resolution of a third. Recordings of twelve seconds or more are also
+    searched in parts of two seconds, because the mains drifts by more than the resolution of a third. Bias: the squared
+    amplitude contains the noise power of five bins.
 
     Parameters
     ----------
@@ -67,41 +76,67 @@ def find_hum(signals: Mapping[str, Floats], rate_hz: float) -> list[Hum]:
     >>> [(round(hum.frequency_hz, 2), round(hum.amplitude["y"], 3)) for hum in find_hum({"y": y}, 1000)]
     [(50.0, 0.2)]
     """
-    spectra = {name: _powers(x, rate_hz) for name, x in signals.items()}
-    samples = min(x.size for x in signals.values()) // _PARTS
-    resolution_hz = rate_hz / samples
-    multiples = np.unique(np.outer(MAINS_HZ, np.arange(1, HARMONICS + 1)))
-    near = np.rint(multiples / resolution_hz).astype(np.int64)
-    found = []
-    for f in multiples[multiples * (1 + _REACH) < rate_hz / 2 - (_LOBE + 1) * resolution_hz]:
-        tones = {name: tone for name, power in spectra.items() if (tone := _tone(power, f / resolution_hz, near))}
+    samples = min(x.size for x in signals.values())
+    if samples < SECONDS_MIN * rate_hz:
+        raise SignalError(
+            "too-short",
+            f"{samples / rate_hz:.3g} s without excitation are too short to detect hum",
+            "record two seconds or more",
+            seconds=samples / rate_hz,
+            seconds_min=SECONDS_MIN,
+        )
+    found = _tones(signals, rate_hz, _PARTS)
+    parts = int(samples / rate_hz / _PART_S)
+    if parts >= 2 * _PARTS:
+        found = _tones(signals, rate_hz, parts) | found  # thirds have the best frequency
+    return [found[multiple] for multiple in sorted(found)]
+
+
+def disturbed_lines(tones: Sequence[Hum], lines: Lines) -> NDArray[np.bool_]:
+    """Which lines each tone disturbs: closer than half a bin of their window, shape (tones, lines)."""
+    tones_hz = np.array([tone.frequency_hz for tone in tones]).reshape(-1, 1)
+    return np.asarray(np.abs(lines.frequency_hz - tones_hz) <= lines.resolution_hz / 2)
+
+
+def may_disturb(lines: Lines) -> bool:
+    """Whether a tone that `find_hum` may find can disturb one of the lines."""
+    reach_hz = _REACH * _MULTIPLES + lines.resolution_hz  # half a bin, and the resolution of a short recording
+    return bool(np.any(np.abs(lines.frequency_hz[:, np.newaxis] - _MULTIPLES) <= reach_hz))
+
+
+def _tones(signals: Mapping[str, Floats], rate_hz: float, parts: int) -> dict[float, Hum]:
+    """Tones that have the same power in so many parts, by the multiple that each belongs to."""
+    spectra = {name: _spectra(x, parts) for name, x in signals.items()}
+    resolution_hz = rate_hz / (min(x.size for x in signals.values()) // parts)
+    near = np.rint(_MULTIPLES / resolution_hz).astype(np.int64)
+    found = {}
+    highest_hz = (rate_hz / 2 - (_LOBE + 1) * resolution_hz) / (1 + _REACH)
+    for f in _MULTIPLES[highest_hz > _MULTIPLES].tolist():
+        turn = 2 * np.pi * _DRIFT * f / resolution_hz**2
+        tones = {name: tone for name, x in spectra.items() if (tone := _tone(x, f / resolution_hz, near, turn))}
         if tones:
             bins = max(tones.values(), key=lambda tone: tone[1])[0]
-            found.append(Hum(bins * resolution_hz, {name: amplitude for name, (_, amplitude) in tones.items()}))
+            found[f] = Hum(bins * resolution_hz, {name: amplitude for name, (_, amplitude) in tones.items()})
     return found
 
 
-def _powers(x: Floats, rate_hz: float) -> Floats:
-    """Power of the thirds at each bin, so scaled that a sine of amplitude A has A² in the bins that it reaches."""
-    if x.size < SECONDS_MIN * rate_hz:
-        raise SignalError(
-            "too-short",
-            f"{x.size / rate_hz:.3g} s without excitation are too short to detect hum",
-            "record two seconds or more",
-            seconds=x.size / rate_hz,
-            seconds_min=SECONDS_MIN,
-        )
-    n = x.size // _PARTS
-    parts = x[: n * _PARTS].reshape(_PARTS, n)
+def _spectra(x: Floats, count: int) -> Complex:
+    """Of the parts, so scaled that a sine of amplitude A has the power A² in the bins that it reaches."""
+    n = x.size // count
+    parts = x[: n * count].reshape(count, n)
     slope = np.arange(n) - (n - 1) / 2
     parts = parts - parts.mean(axis=1, keepdims=True)
     parts = parts - np.outer(parts @ slope / (slope @ slope), slope)
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)  # Hann
-    return np.asarray(np.abs(np.fft.rfft(parts * window, axis=1)) ** 2 * 4 / (n * np.sum(window**2)))
+    return np.asarray(np.fft.rfft(parts * window, axis=1) * 2 / np.sqrt(n * np.sum(window**2)))
 
 
-def _tone(power: Floats, expected: float, multiples: NDArray[np.int64]) -> tuple[float, float] | None:
-    """Place in bins and amplitude of a tone near a place; None where the noise hides it, or its power changes."""
+def _tone(spectra: Complex, expected: float, multiples: NDArray[np.int64], turn: float) -> tuple[float, float] | None:
+    """Place in bins and amplitude of a tone at a place; None where the noise hides it, or it is not steady.
+
+    `turn` is the angle in rad by which the phase of the mains may advance differently from part to part.
+    """
+    power = np.abs(spectra) ** 2
     mean, reach = power.mean(axis=0), max(1, round(_REACH * expected))
     first = max(round(expected) - reach, 1)
     at = first + int(np.argmax(mean[first : round(expected) + reach + 1]))
@@ -114,8 +149,25 @@ def _tone(power: Floats, expected: float, multiples: NDArray[np.int64]) -> tuple
     beside = beside[np.abs(beside[:, np.newaxis] - others).min(axis=1, initial=mean.size) > _LOBE]
     if beside.size < _BESIDE.size // 2 or mean[at] <= prominence(beside.size // 2) * mean[beside].mean():
         return None
-    of_part = power[:, lobe].sum(axis=1)
-    by_noise = _NOISE * np.sqrt(mean[beside].mean() / of_part.mean())
-    if of_part.min() < (STEADY - by_noise) * of_part.max():
+    place = float(np.average(lobe, weights=mean[lobe]))
+    if abs(place - expected) > _REACH * expected + _OFF:
         return None
-    return float(np.average(lobe, weights=mean[lobe])), float(np.sqrt(of_part.mean()))
+    of_part = power[:, lobe].sum(axis=1)
+    noise = float(np.sqrt(mean[beside].mean() / of_part.mean()))
+    lowest = of_part.min() / of_part.max() + _noise(len(power)) * noise
+    if lowest < STEADY and (
+        lowest < _WANDER or _curvature(spectra[:, at]) > min(turn, _TURN_MAX) + 1.5 * _NOISE * noise
+    ):
+        return None
+    return place, float(np.sqrt(of_part.mean()))
+
+
+def _curvature(parts: Complex) -> float:
+    """Largest change, from part to part, of the angle by which the phase advances."""
+    advance = parts[1:] * parts[:-1].conj()
+    return float(np.abs(np.angle(advance[1:] * advance[:-1].conj())).max())
+
+
+def _noise(parts: int) -> float:
+    """Change of a tone's power by noise that one of the parts exceeds as seldom as one of three exceeds two sigma."""
+    return _NOISE * NormalDist().inv_cdf(1 - 0.0228 * _PARTS / parts)

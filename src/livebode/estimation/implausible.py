@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
 from livebode.kernel import largest_sizes
-
-Floats = NDArray[np.float64]
 
 # Against a sample this much larger, 16 digits leave 8 for everything else until the kernel renews its sums.
 _FACTOR = 1e8

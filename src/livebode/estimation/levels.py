@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Lines, Stage, StatefulBase
-from livebode.core.distributions import f_quantile
-from livebode.core.mains import meets_mains
+from livebode.arrays import Complex, Floats
+from livebode.core import Lines, Stage, StatefulBase, f_quantile, meets_mains
 from livebode.estimation.detection import Interpolation
 from livebode.estimation.products import power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
+from livebode.language import Message
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Bins = NDArray[np.int64]
 
 KINDS = ("even", "odd")
@@ -75,9 +73,11 @@ class Level:
     significant: bool
 
     @property
-    def words(self) -> str:
+    def words(self) -> Message:
         """The level for a message."""
-        return f"{self.db:.1f} dB" if self.significant else f"below {self.bound_db[1]:.1f} dB"
+        if self.significant:
+            return Message("{level_db:.1f} dB", level_db=self.db)
+        return Message("below {level_db:.1f} dB", level_db=self.bound_db[1])
 
     def plain(self) -> dict[str, Any]:
         low, high = (None if np.isnan(bound) else bound for bound in self.bound_db)
@@ -214,11 +214,15 @@ class DistortionLevels(StatefulBase):
         levels = self.levels()
         if not any(level is not None and level.significant for level in levels.values()):
             return ""
-        words = {kind: "not measurable" if level is None else level.words for kind, level in levels.items()}
+        words = {kind: Message("not measurable") if level is None else level.words for kind, level in levels.items()}
         noise_db = max(level.noise_db for level in levels.values() if level is not None)
-        return (
-            f"distortion at the detection lines, relative to the output at a line: even {words['even']}, odd "
-            f"{words['odd']}; noise of the mean over {self._periods + self._now} periods {noise_db:.1f} dB"
+        return Message(
+            "distortion at the detection lines, relative to the output at a line: even {even}, odd {odd}; noise "
+            "of the mean over {periods} periods {noise_db:.1f} dB",
+            even=words["even"],
+            odd=words["odd"],
+            periods=self._periods + self._now,
+            noise_db=noise_db,
         )
 
 

@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Flags, Floats
 from livebode.estimation.quantities import from_plant
 from livebode.estimation.settings import Settings
 from livebode.kernel import LineRows
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Channel, Event, PlantKinds, Responses, Stage, StatefulBase
 from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.estimators import Role
@@ -33,10 +34,7 @@ from livebode.kernel import (
     process_each,
     process_lines,
 )
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
+from livebode.language import Message
 
 
 class LineStage(StatefulBase):
@@ -302,8 +300,10 @@ class LineStage(StatefulBase):
                     "noise-from-detection-lines",
                     int(sample[at]),
                     float(centre[0, at]),
-                    "the schedule moves: the noise is taken from detection lines (non-excited bins), because the "
-                    "scatter between periods contains the motion",
+                    Message(
+                        "the schedule moves: the noise is taken from detection lines (non-excited bins), because the "
+                        "scatter between periods contains the motion"
+                    ),
                 )
             )
         self._moving += int(np.count_nonzero(moving))

@@ -7,13 +7,10 @@ Mechanical Systems and Signal Processing 24, 2010, parts I and II.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Lines, Stage, StatefulBase, UsageError
 from livebode.estimation.quotient import Quotient, triangular
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 HALF_WIDTH = 6
 """Bins on each side of a line that its polynomials are fitted to."""
@@ -99,6 +96,8 @@ class LocalPolynomial(StatefulBase):
 
 def _solved(triangle: Complex, information: Complex, weights: Floats, power: Floats) -> Quotient:
     """Quotient of the parabolas' values at the line, from the triangular factor of [regression, signals]."""
+    # A window whose squares overflow has no quotient.
+    triangle = np.where(np.isfinite(triangle).all(axis=(1, 2), keepdims=True), triangle, 0.0)
     left, right, rest = triangle[:, :_COUNT, :_COUNT], triangle[:, :_COUNT, _COUNT:], triangle[:, _COUNT:, _COUNT:]
     u, size, v = np.linalg.svd(left)
     used = size > _RANK * size[:, :1]

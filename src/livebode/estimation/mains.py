@@ -8,10 +8,8 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Lines
-from livebode.core.mains import MAINS_HZ
-
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
+from livebode.core import MAINS_HZ, Lines
 
 _ON_BIN = 0.1  # bins: a tone this close to a bin has nearly all its power there
 HARMONICS = 10

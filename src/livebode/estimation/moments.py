@@ -9,11 +9,9 @@ from math import ceil, log
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Stage, StatefulBase
 from livebode.kernel import MEANS, SCATTER, LineMoments, WeightSums
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Flags, Floats
 from livebode.core import Stage, StatefulBase
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 PLACES = 20  # of a period that are looked at
 _PERIODS = 9  # before, with which the schedule is compared

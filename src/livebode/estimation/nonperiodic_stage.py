@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Channel, Responses, Stage, StatefulBase
 from livebode.estimation.line_stage import response_unit
 from livebode.estimation.local_polynomial import LocalPolynomial
@@ -17,9 +18,6 @@ from livebode.estimation.quotient import Quotient
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
 from livebode.estimation.welch_average import WelchAverage
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _EXCITED = 1e-12  # of the largest power so far, as for a LineStage
 # The input must respond to the excitation significantly. Where it contains only noise that came around the loop, the
@@ -139,8 +137,9 @@ class NonPeriodicStage(StatefulBase):
         unexplained = self._after[1:][: len(gains)].copy()
         unexplained[1:] *= -plant
         sigma = np.sqrt(quotient.noise(unexplained) * quotient.variance) / np.abs(divisor * self._after[0])
-        separable = quotient.variance * quotient.power < _INFLATED_MAX
-        valid = separable & np.isfinite(sigma) & np.isfinite(plant) & (quotient.power > _EXCITED * self._largest)
+        valid = (
+            separable(quotient) & np.isfinite(sigma) & np.isfinite(plant) & (quotient.power > _EXCITED * self._largest)
+        )
         coherence = _coherence(quotient, 0)
         input_coherence = np.full(plant.size, np.nan)
         weight = quotient.power.astype(np.complex128)
@@ -187,6 +186,11 @@ class NonPeriodicStage(StatefulBase):
                 for name, nothing in self._nothing().items()
             },
         )
+
+
+def separable(quotient: Quotient) -> NDArray[np.bool_]:
+    """Lines at which the response can be told from what the samples before the window cause."""
+    return np.asarray((quotient.variance * quotient.power < _INFLATED_MAX) & np.isfinite(quotient.gains).all(axis=0))
 
 
 def _coherence(quotient: Quotient, signal: int) -> Floats:

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Block, Emit, Event, Responses, Stage, UsageError, hand_over, ignore
 from livebode.estimation.centre import Centre
 from livebode.estimation.newest_samples import NewestSamples
@@ -15,8 +16,6 @@ from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.stream_estimator import StreamEstimator, signals_of
 from livebode.estimation.watch import InputStatistics
-
-Floats = NDArray[np.float64]
 
 
 class NonPeriodicTracker(StreamEstimator[InputStatistics]):

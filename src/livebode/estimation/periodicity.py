@@ -7,13 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, Lines, Stage, StatefulBase
-from livebode.core.errors.signal import ANY_EXCITATION
+from livebode.arrays import Complex, Flags, Floats
+from livebode.core import ANY_EXCITATION, Event, Lines, Stage, StatefulBase
 from livebode.estimation.products import power, times
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
+from livebode.language import Message
 
 _CHANGED = 0.1  # of the input's power: a smaller change leaks less than it
 _CHANCE, _CHANCE_Z = 1e-6, 4.75  # the same probability, as a quantile of the normal distribution
@@ -123,9 +120,13 @@ class Periodicity(StatefulBase):
         row = int(np.argmax(rows))
         f = self._lines.frequency_hz[found[row]]
         where = ", ".join(f"{x:g}" for x in f[:_LISTED_MAX]) + " …" * (f.size > _LISTED_MAX)
-        message = (
-            f"the input {self._name!r} does not repeat every {self._lines.window} samples at {where} Hz: a response is "
-            f"not valid where its window does not repeat; {ANY_EXCITATION}"
+        message = Message(
+            "the input {input} does not repeat every {window} samples at {places} Hz: a response is not valid "
+            "where its window does not repeat; {advice}",
+            input=repr(self._name),
+            window=self._lines.window,
+            places=where,
+            advice=ANY_EXCITATION,
         )
         details: dict[str, Any] = {"lines_hz": f[:_LISTED_MAX].tolist(), "window": self._lines.window}
         self._events.append(Event("not-periodic", int(sample[row]), float(centre_s[row]), message, details))

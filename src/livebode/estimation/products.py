@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.arrays import Complex, Floats
 
 
 def power(spectrum: Complex) -> Floats:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Loop, Quantity
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def convert(quantity: Quantity, plant: Complex, feedback: Complex) -> tuple[Complex, Complex]:

@@ -9,22 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Event, QuantityKind, Stage
-from livebode.core.steps import step_of
+from livebode.arrays import Complex, Flags, Floats
+from livebode.core import Block, Event, Lines, QuantityKind, Stage, step_of
 from livebode.estimation.distortion import by_chance
+from livebode.estimation.hum import may_disturb
 from livebode.estimation.levels import DistortionLevels
 from livebode.estimation.moments import PeriodMoments
 from livebode.estimation.movement import PLACES, Movement
 from livebode.estimation.periods import PeriodCutter, Periods
 from livebode.estimation.settings import Settings
 from livebode.estimation.silence import SilentHum
+from livebode.estimation.silence_search import HumSpan, SilenceSearch, SilentStretch, updated
 from livebode.estimation.spectra import SpectraRows
-from livebode.estimation.verdicts import KINDS, Verdict, judge_of, reason
+from livebode.estimation.verdicts import HUM, KINDS, Verdict, judge_of, reason
 from livebode.kernel import ADDED, FORGOTTEN, NEWS, NEWS_GONE, PeriodSpectra, PeriodState, PeriodVerdicts
+from livebode.language import Message
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
+_LOOKS_S = 2.0, 4.0, 8.0, 16.0  # of silence, after which it is searched: the last one limits memory and time
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,8 @@ class RepeatingErrors(PeriodCutter):
 
     The periods of a Block are computed together, with the same results as one by one.
 
+    Hum in two seconds of silence or more is that which `find_hum` finds there.
+
     Parameters
     ----------
     settings
@@ -68,10 +71,10 @@ class RepeatingErrors(PeriodCutter):
         Even and odd distortion.
     """
 
-    _stage = Stage("repeating-errors", 2, converts_from=1)
+    _stage = Stage("repeating-errors", 4)
     _STATE = (
         *PeriodCutter._STATE, "_output", "_told", "_largest", "_step", "_moments",
-        "_movement", "_silence", "levels",
+        "_movement", "_silence", "levels", "_silent_hum", "_search",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, events: list[Event] | None = None) -> None:
@@ -86,6 +89,12 @@ class RepeatingErrors(PeriodCutter):
         self._output = np.zeros(self._judge.mains.bins.size, dtype=np.complex128)
         self._now = Verdict.nothing(len(lines))
         self._silence = SilentHum(len(lines))
+        self._reference = settings.roles.index(settings.method.reference)
+        looks = [int(np.ceil(s * lines.rate_hz)) for s in _LOOKS_S]
+        self._search = SilenceSearch(len(settings.roles), lines.rate_hz, looks)
+        self._searches = may_disturb(lines)
+        self._silent_hum = np.zeros(len(lines))  # shortest silence in samples that shows hum at each line
+        self._spans: Sequence[HumSpan] | None = None
         self._told = np.zeros((len(KINDS), len(lines)), dtype=np.bool_)
         self._events = [] if events is None else events
         self._dof = self._judge.distortion.dof if self._judge.distortion else np.inf
@@ -101,14 +110,12 @@ class RepeatingErrors(PeriodCutter):
         super()._load(state)
         self._now = Verdict(state["distortion"], state["invalid"])
 
-    def _converted(self, state: dict[str, Any], version: int) -> dict[str, Any]:
-        """Version 1 has no levels."""
-        return {"levels": DistortionLevels(self._settings).snapshot()} | state if version < 2 else state
-
     def judged(self) -> dict[str, Any]:
         """For a record: the lines with a reason against them, and the newest distortion at each."""
         f = self._settings.lines.frequency_hz
-        reasons = {kind: f[self._told[i]].tolist() for i, kind in enumerate(KINDS) if self._told[i].any()}
+        told = self._told.copy()
+        told[HUM] |= self._known_hum()
+        reasons = {kind: f[told[i]].tolist() for i, kind in enumerate(KINDS) if told[i].any()}
         newest = [None if np.isnan(d) else float(d) for d in self._now.distortion]
         return {
             "distortion": None if self._judge.distortion is None else newest,
@@ -116,20 +123,36 @@ class RepeatingErrors(PeriodCutter):
             "mains_lines_hz": f[self._judge.mains.lines.any(axis=0)].tolist(),
         } | ({"levels": levels} if (levels := self.levels.plain()) else {})
 
+    def _known_hum(self) -> Flags:
+        """Lines that contain hum by the long silences, shape (lines,)."""
+        known = self._silent_hum > 0
+        known[[span.line for span in self._spans or ()]] = True
+        return known
+
+    def know_hum(self, spans: Sequence[HumSpan]) -> None:
+        """Where all silences of a recording show hum, so that no other silence of two seconds is searched."""
+        self._spans = spans
+
     def finish(self, sample: int, time_s: float) -> None:
-        """Report the levels of even and odd distortion, at the end of the samples."""
+        """Report hum in the last silence, and the levels of even and odd distortion, at the end of the samples."""
+        for stretch in self._search.interrupt():
+            self._take_silence(stretch, time_s)
         if message := self.levels.sentence():
             self._events.append(Event("distortion-levels", sample, time_s, message))
 
-    def restart(self, sample: int) -> None:
-        """The next sample has this number and does not follow the previous one."""
+    def restart(self, sample: int, time_s: float) -> None:
+        """The next sample has this number and this time and does not follow the previous one."""
+        for stretch in self._search.interrupt():
+            self._take_silence(stretch, time_s)
         self._begin_at(sample)
         self.levels.end_stretch()
         self._moments.forget()
         self._output[:] = 0
         self._silence.interrupt()
 
-    def process(self, data: Floats, rows: SpectraRows, schedule: Floats | None, block: Block) -> Repeating:
+    def process(
+        self, data: Floats, rows: SpectraRows, schedule: Floats | None, block: Block, aside: NDArray[np.intp]
+    ) -> Repeating:
         """The verdicts for the windows of these rows.
 
         Parameters
@@ -142,8 +165,10 @@ class RepeatingErrors(PeriodCutter):
             Shape (samples,); None without one.
         block
             The Block of the samples: their numbers, times and channels.
+        aside
+            Positions of the samples that are set aside.
         """
-        left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes, rows.left_out])
+        left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes, rows.left_out, aside])
         which = (rows.sample - block.start + self._at) // self._window  # so many periods end before
         kind = next((c.stated_kind for c in block.channels if c.name == self._settings.output), None)
         begun, found = self._now, [self._verdicts(p, block, kind) for p in self._cut(data, schedule, left_out)]
@@ -153,7 +178,39 @@ class RepeatingErrors(PeriodCutter):
             now = found[0].distortion, found[0].invalid
         else:
             now = _joined([one.distortion for one in found]), _joined([one.invalid for one in found])
-        return Repeating(*now, which, self._dof)
+        hum = self._hum_of_windows(data, rows.sample, block, aside)
+        if hum is None or not hum.any():
+            return Repeating(*now, which, self._dof)
+        return Repeating(now[0][which], now[1][which] | hum, np.arange(which.size), self._dof)
+
+    def _hum_of_windows(
+        self, data: Floats, sample: NDArray[np.int64], block: Block, aside: NDArray[np.intp]
+    ) -> Flags | None:
+        """Lines that contain hum by the long silences, for each window by its newest sample, (rows, lines)."""
+        if not self._searches:
+            return None
+        if self._spans is not None:
+            hum = np.zeros((sample.size, self._silent_hum.size), dtype=np.bool_)
+            for span in self._spans:
+                before_stop = True if span.stop is None else sample - self._window + 1 < span.stop
+                hum[:, span.line] |= (sample >= span.first) & before_stop
+            return hum
+        found: Flags | None = np.tile(self._silent_hum > 0, (sample.size, 1)) if self._silent_hum.any() else None
+        for stretch in self._search.process(data, data[self._reference], block.start, aside):
+            self._take_silence(stretch, block.origin_s + (stretch.stop - 1) / block.rate_hz)
+            found = np.zeros((sample.size, self._silent_hum.size), dtype=np.bool_) if found is None else found
+            found[sample >= stretch.stop] = self._silent_hum > 0
+        return found
+
+    def _take_silence(self, stretch: SilentStretch, time_s: float) -> None:
+        """What a silence shows; an Event for each line that it makes invalid, or valid again."""
+        before, told = self._silent_hum > 0, self._told[HUM]
+        self._silent_hum = updated(self._silent_hum, stretch, self._settings.lines, withdraw=not self._settings.average)
+        now = self._silent_hum > 0
+        for line in np.flatnonzero((now != before) & ~told).tolist():
+            self._events.append(
+                hum_event(self._settings.lines, line, stretch.stop - 1, time_s, gone=bool(before[line]))
+            )
 
     def _verdicts(self, periods: Periods, block: Block, kind: QuantityKind | None) -> PeriodVerdicts:
         """Those before and after each of these periods."""
@@ -197,16 +254,41 @@ class RepeatingErrors(PeriodCutter):
     def _report(
         self, found: PeriodVerdicts, period: int, block: Block, sample: int, output: QuantityKind | None
     ) -> None:
-        time_s = block.origin_s + sample / block.rate_hz
+        time_s, known = block.origin_s + sample / block.rate_hz, self._known_hum()
         for i, at in zip(*np.nonzero(found.news[period])):
             f = self._settings.lines.frequency_hz[at]
-            if found.news[period, i, at] == NEWS_GONE:
-                message = f"mains hum at {f:g} Hz is no longer detected without excitation; the line is valid again"
-                self._events.append(Event("hum-gone", sample, time_s, message, {"line_hz": float(f)}))
+            if i == HUM:
+                if not known[at]:
+                    gone = bool(found.news[period, i, at] == NEWS_GONE)
+                    self._events.append(hum_event(self._settings.lines, int(at), sample, time_s, gone=gone))
                 continue
             message, value = reason(found, period, int(i), int(at), f, output)
-            message, details = f"{message}; the line is not valid", {"line_hz": float(f)} | value
+            message, details = (
+                Message("{verdict}; the line is not valid", verdict=message),
+                {"line_hz": float(f)} | value,
+            )
             self._events.append(Event(KINDS[i], sample, time_s, message, details))
+
+
+def hum_event(lines: Lines, line: int, sample: int, time_s: float, *, gone: bool = False) -> Event:
+    """A line contains hum, or does so no longer."""
+    f = float(lines.frequency_hz[line])
+    message = Message("mains hum detected at or near {line_hz:g} Hz; use other lines; the line is not valid", line_hz=f)
+    if gone:
+        message = Message(
+            "mains hum at {line_hz:g} Hz is no longer detected without excitation; the line is valid again", line_hz=f
+        )
+    return Event("hum-gone" if gone else "hum", sample, time_s, message)
+
+
+def hum_events(spans: Sequence[HumSpan], lines: Lines, begins: int) -> list[Event]:
+    """Those of the lines of a recording that is tracked from sample `begins` on."""
+    found = []
+    for span in spans:
+        for sample, gone in ((max(span.first, begins), False), (span.stop, True)):
+            if sample is not None:
+                found.append(hum_event(lines, span.line, sample, sample / lines.rate_hz, gone=gone))
+    return found
 
 
 def _joined(rows: Sequence[NDArray[Any]]) -> NDArray[Any]:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Lines, Stage, StatefulBase, UsageError
-
-Floats = NDArray[np.float64]
 
 _MORE = 1.3  # times the amplitude: its error has a fixed size, unlike noise, and the 63 % bound must cover it
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
-
-Floats = NDArray[np.float64]
 
 PERIODS = 9
 """Periods of silence after an excitation before a tone counts as hum.

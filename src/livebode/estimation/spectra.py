@@ -10,13 +10,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Stage, StatefulBase, UsageError
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.spikes import SpikeGate
 from livebode.kernel import INSTRUCTION_SET_VARIABLE, SlidingDFT, instruction_set, instruction_sets
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _NONE = np.zeros(0, dtype=np.intp)
 _ROW_VALUES_MAX = 1 << 18  # complex numbers of one kernel call: 4 MiB, which fits the cache

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Flags, Floats
 from livebode.core import (
     LEFT_OUT,
     NOT_WHOLE,
@@ -34,9 +35,6 @@ from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows, after
 from livebode.estimation.spectra_watch import DRIVE, SpectraInputStatistics
 from livebode.estimation.stream_estimator import StreamEstimator
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _NONE = np.zeros(0, dtype=np.intp)
 

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from livebode.core import Event, SignalError, Spectra, Stage
 from livebode.estimation.stream_counters import StreamCounters
+from livebode.language import Message
 
 DRIVE = {
-    "not-whole": "a window is incomplete (marked by the drive, or its sums are not finite)",
-    "implausible": "a spectrum is more than 1e8 times larger than all in the period before",
-    "spike": "the drive marks a window with a spike",
+    "not-whole": Message("a window is incomplete (marked by the drive, or its sums are not finite)"),
+    "implausible": Message("a spectrum is more than 1e8 times larger than all in the period before"),
+    "spike": Message("the drive marks a window with a spike"),
 }
 
 
@@ -41,10 +42,16 @@ class SpectraInputStatistics(StreamCounters):
         if not first and (missing or block.gap):
             self.counts["gaps"] += 1
             self.counts["missing"] += missing
-            many = f"spectra of {missing} samples are" if missing else "an unknown number of spectra is"
-            self._report(
-                "gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing
+            message = Message(
+                "an unknown number of spectra is missing before sample {at_sample}", at_sample=block.start
             )
+            if missing:
+                message = Message(
+                    "spectra of {missing_samples} samples are missing before sample {at_sample}",
+                    missing_samples=missing,
+                    at_sample=block.start,
+                )
+            self._report("gap", block, block.start, message, missing_samples=missing)
         if first:
             # A stream that begins with the drive is incomplete at first, which needs no event.
             self._last["not-whole"] = int(block.sample[0]) - block.layout.hop
@@ -59,7 +66,7 @@ class SpectraInputStatistics(StreamCounters):
                 self.counts[kind] += sample.size
                 self._last[kind] = int(sample[-1])
         for number, kind in sorted(begins):
-            self._report(kind, block, number, f"{self._sentences[kind]}; its response is not valid")
+            self._report(kind, block, number, Message("{what}; its response is not valid", what=self._sentences[kind]))
 
     def continues_at(self, start: int) -> bool:
         """Whether this is the sample after the previous spectra."""

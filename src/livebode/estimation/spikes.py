@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
-
-Floats = NDArray[np.float64]
 
 _COMPARED = 3  # the smallest number of periods whose median one spike cannot move
 _REMEMBERED = 9  # periods whose largest differences define the usual difference

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from livebode.core import Block, Emit, Event, Responses, SignalError, Stateful, StatefulBase, ignore
-from livebode.estimation.set_aside import Integers
+from livebode.arrays import Floats, Integers
+from livebode.core import Block, Emit, Event, Responses, SignalError, Stateful, StatefulBase, ignore, same_rate
 from livebode.estimation.settings import Settings
 from livebode.estimation.stream_counters import StreamCounters
 
-Floats = NDArray[np.float64]
 W = TypeVar("W", bound=StreamCounters)
 
 
@@ -102,7 +98,7 @@ def signals_of(block: Block, settings: Settings) -> tuple[Floats, Floats | None]
 
     SignalError if it has no samples, another rate than the lines, or not the channels.
     """
-    if abs(block.rate_hz / settings.lines.rate_hz - 1) > 1e-9:
+    if not same_rate(block.rate_hz, settings.lines.rate_hz):
         raise SignalError(
             "rate-differs",
             f"the block has {block.rate_hz:g} samples per second, but the lines are for {settings.lines.rate_hz:g}",

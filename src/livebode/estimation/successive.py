@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Integers
 from livebode.core import Block, Emit, Responses, Stage, StatefulBase, ignore
-from livebode.estimation.set_aside import Integers
 from livebode.estimation.tracker import Tracker
 
 

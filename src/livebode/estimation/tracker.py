@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Integers
 from livebode.core import Block, Emit, Event, Responses, Stage, hand_over, ignore
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.repeating import RepeatingErrors
 from livebode.estimation.ripple import RippleSpeed, ripple_power
-from livebode.estimation.set_aside import NOTHING, Integers, contains, positions
+from livebode.estimation.set_aside import NOTHING, contains, positions
 from livebode.estimation.settings import Settings
-from livebode.estimation.spectra import LineSpectra, SpectraRows
+from livebode.estimation.silence_search import HumSpan
+from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
 from livebode.estimation.stream_estimator import StreamEstimator, signals_of
 from livebode.estimation.watch import InputStatistics
@@ -98,6 +100,11 @@ class Tracker(StreamEstimator[InputStatistics]):
         """Numbers of further samples to exclude as spikes; no effect where no channel is checked."""
         self._spectra.known_spikes = samples
 
+    def know_hum(self, spans: Sequence[HumSpan]) -> None:
+        """Where the silences of a whole recording show hum: windows that overlap a span do not count at its line."""
+        if self._repeating is not None:
+            self._repeating.know_hum(spans)
+
     def leave_out(self, samples: NDArray[np.int64]) -> None:
         """Numbers of samples, ascending: no window that contains one of them counts."""
         self._spectra.left_out = samples
@@ -133,7 +140,7 @@ class Tracker(StreamEstimator[InputStatistics]):
             if self._speed is not None:
                 self._speed.restart()
             if self._repeating is not None:
-                self._repeating.restart(block.start)
+                self._repeating.restart(block.start, block.origin_s + block.start / block.rate_hz)
         rows = self._spectra.process(channels)
         self._watch.take(block, rows)
         centre = np.empty((2, len(rows.sample)))
@@ -141,7 +148,8 @@ class Tracker(StreamEstimator[InputStatistics]):
         centre[1] = self._centre.at(schedule, rows.sample - block.start)
         repeating = None
         if self._repeating is not None:
-            repeating = self._repeating.process(channels, self._judged(rows, block), schedule, block)
+            at = positions(self._aside, block.start, block.stop)
+            repeating = self._repeating.process(channels, rows, schedule, block, at)
         place = (rows.sample + 1) % s.lines.window
         ripple = None
         if self._speed is not None and schedule is not None:
@@ -152,13 +160,6 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._end = block.stop - 1, block.origin_s + (block.stop - 1) / block.rate_hz
         hand_over(self._events, emit)
         return responses
-
-    def _judged(self, rows: SpectraRows, block: Block) -> SpectraRows:
-        """Without the samples that are set aside."""
-        if not len(self._aside):
-            return rows
-        at = positions(self._aside, block.start, block.stop)
-        return replace(rows, left_out=np.union1d(rows.left_out, at)) if at.size else rows
 
     def finish(self, emit: Emit = ignore, /) -> Responses | None:
         """An empty batch, None where no samples came; reports even and odd distortion, if the lines show them."""

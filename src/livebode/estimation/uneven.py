@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.arrays import Complex, Floats
 
 _ONE, _X, _U, _UU, _XU = range(5)  # rows of the sums; the last three for a trend
 _TABLE = 32  # powers of e^(jφ) that one factor covers

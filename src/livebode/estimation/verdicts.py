@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Flags, Floats
 from livebode.core import Lines, QuantityKind
 from livebode.estimation.distortion import Distortion, reached
 from livebode.estimation.estimators import Role
@@ -24,10 +25,9 @@ from livebode.kernel import (
     Tones,
     judge_periods,
 )
+from livebode.language import Message
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Reason = tuple[str, dict[str, float]]
+Reason = tuple[Message, dict[str, float]]
 
 KINDS = ("distorted", "hum", "steps")
 HUM = KINDS.index("hum")
@@ -57,17 +57,25 @@ class Verdict:
 
 def reason(found: PeriodVerdicts, period: int, kind: int, at: int, f: float, output: QuantityKind | None) -> Reason:
     """Why the line with this number and frequency is invalid since a period: for a message, and its details."""
-    if kind == HUM:
-        return f"{f:g} Hz is a multiple of the mains frequency: mains hum detected; use other lines", {}
     if KINDS[kind] == "steps":
         counts = float(found.steps[period, at])
-        message = f"the output moves only {counts:.2g} steps of its sensor at {f:g} Hz: increase the excitation"
-        hint = "; if the output is a velocity, declare it in source.kinds" * (output == "other")
-        return message + hint, {"steps": counts}
+        message = Message(
+            "the output moves only {steps:.2g} steps of its sensor at {line_hz:g} Hz: increase the excitation",
+            steps=counts,
+            line_hz=f,
+        )
+        if output == "other":
+            message = Message("{few}; if the output is a velocity, declare it in source.kinds", few=message)
+        return message, {"steps": counts}
     numerator, denominator = found.pair[period, :, at]
     share = float(found.distortion[period + 1, at] / np.abs(numerator / denominator))
-    why = "friction, backlash or sensor steps; increase the excitation, or move the axis"
-    return f"distortion may be {share:.0%} of the response at {f:g} Hz ({why})", {"share": share}
+    message = Message(
+        "distortion may be {percent:.0f}% of the response at {line_hz:g} Hz (friction, backlash or sensor steps; "
+        "increase the excitation, or move the axis)",
+        percent=100 * share,
+        line_hz=f,
+    )
+    return message, {"share": share}
 
 
 class Judge:

@@ -7,11 +7,12 @@ import numpy as np
 from livebode.core import Block, Event, SignalError, Stage
 from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.stream_counters import StreamCounters
+from livebode.language import Message
 
 _KINDS = {
-    "non-finite": "a sample is not finite",
-    "implausible": "a sample is more than 1e8 times larger than all in the period before",
-    "spike": "a sample differs strongly from the previous periods and is excluded",
+    "non-finite": Message("a sample is not finite"),
+    "implausible": Message("a sample is more than 1e8 times larger than all in the period before"),
+    "spike": Message("a sample differs strongly from the previous periods and is excluded"),
 }
 
 
@@ -42,10 +43,16 @@ class InputStatistics(StreamCounters):
         if gap:
             self.counts["gaps"] += 1
             self.counts["missing"] += missing
-            many = f"{missing} samples are" if missing else "an unknown number of samples is"
-            self._exclude(
-                "gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing
+            message = Message(
+                "an unknown number of samples is missing before sample {at_sample}", at_sample=block.start
             )
+            if missing:
+                message = Message(
+                    "{missing_samples} samples are missing before sample {at_sample}",
+                    missing_samples=missing,
+                    at_sample=block.start,
+                )
+            self._exclude("gap", block, block.start, message, missing_samples=missing)
         return first or gap
 
     def take(self, block: Block, rows: SpectraRows) -> None:
@@ -64,5 +71,9 @@ class InputStatistics(StreamCounters):
             self._exclude(kind, block, sample, _KINDS[kind])
 
     def _exclude(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
-        message = f"{what}; responses are invalid until a window of {self._window} samples is complete again"
+        message = Message(
+            "{what}; responses are invalid until a window of {window} samples is complete again",
+            what=what,
+            window=self._window,
+        )
         self._report(kind, block, sample, message, **details)

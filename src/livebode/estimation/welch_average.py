@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Lines, Stage, StatefulBase
 from livebode.estimation.quotient import Quotient, triangular
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 WINDOWS = 8
 """Windows in the samples of one response."""
 
 
 class WelchAverage(StatefulBase):
-    """H1 or the joint estimate from Hann windows that overlap by half; see `livebode.estimation.welch` for its bias.
+    """H1 or the joint estimate from Hann windows that overlap by half; see `livebode.estimation._welch` for its bias.
 
     Parameters
     ----------

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.excitation.medians import medians
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.arrays import Complex, Floats
+from livebode.excitation._medians import medians
 
 
 def cut(x: Floats, period: int) -> Floats:

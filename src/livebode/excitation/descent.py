@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.fast_length import fast_length
-from livebode.core.installing import needing
+from livebode.arrays import Complex, Floats
+from livebode.core import fast_length, needing
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Bins = NDArray[np.int64]
 
 # p, each started from the previous result, and samples for one period of the highest line: the low norms find the

@@ -9,8 +9,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import SignalError
-from livebode.core.mains import meets_mains
+from livebode.core import SignalError, meets_mains
 from livebode.excitation.significance import BinClasses
 
 # Of the strongest line, 26 dB: distortion of a good drive is below, and designed lines are above.

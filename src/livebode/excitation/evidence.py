@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.excitation.blocks import cut, grouped, spectra
-
-Floats = NDArray[np.float64]
 
 # A resonance or a slow trajectory is similar from one period to the next, but not from one end of the recording to the
 # other. So neighbouring periods are averaged to at most this many stretches, which are then compared.

@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.mains import MAINS_HZ, meets_mains
+from livebode.arrays import Floats
+from livebode.core import MAINS_HZ, meets_mains
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.doubtful import with_lines_beside
 from livebode.excitation.significance import BinClasses, find_lines
-
-Floats = NDArray[np.float64]
 
 _MAINS_DRIFT = 2e-3  # of its frequency
 _NEAR_BINS = 0.1  # the period is a multiple of the hum's, otherwise the recording would not repeat after it
@@ -42,11 +41,13 @@ def without_mains(calm: Floats, period: int, rate_hz: float, step: float) -> int
     """
     found = with_lines_beside(find_lines(spectra(cut(calm, period)), step=step), rate_hz / period)
     bins = np.flatnonzero(found.excited)
+    if not bins.size:
+        return period
     level, resolution_hz = found.amplitude[bins], rate_hz / period
     at_mains = [(mains_hz, _at_harmonics(bins, resolution_hz, mains_hz)) for mains_hz in MAINS_HZ]
     for shorter in (divisor for divisor in range(1, period) if period % divisor == 0):
         on = bins % (period // shorter) == 0
-        if on.all() and bins.size:
+        if on.all():
             return shorter
         hum = [hz for hz, at in at_mains if at[~on].all() and np.min(bins[~on]) * resolution_hz < hz * _BELOW_ORDER]
         if on.any() and hum and _weaker(level[~on], level[on]):
@@ -57,6 +58,8 @@ def without_mains(calm: Floats, period: int, rate_hz: float, step: float) -> int
 def separate_hum(found: BinClasses, resolution_hz: float) -> BinClasses:
     """Count weak lines at harmonics of the mains as distortion, if all lines, or those beside, are much stronger."""
     bins = np.flatnonzero(found.excited)
+    if not bins.size:
+        return found
     level = found.amplitude[bins]
     for mains_hz in MAINS_HZ:
         at = _at_harmonics(bins, resolution_hz, mains_hz)

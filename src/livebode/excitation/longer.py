@@ -5,14 +5,12 @@ from __future__ import annotations
 from math import gcd
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.doubtful import with_lines_beside
 from livebode.excitation.repetition import LAG_MIN, ROUNDING
 from livebode.excitation.significance import find_lines
-
-Floats = NDArray[np.float64]
 
 _SIGMAS = 5.0
 _OFF_MIN = 0.1  # samples: two clocks, one for the excitation and one for the recorder, differ by less

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
+from livebode.arrays import Floats
 from livebode.core import UsageError
 from livebode.excitation.descent import PEAK, VALLEY, Stages, descend, descend_together, period, samples_for
 
-Floats = NDArray[np.float64]
 Bins = NDArray[np.int64]
 
 # Samples for one period of the highest line when a peak is judged: off by 3e-4 at most.

@@ -8,8 +8,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import GridError, Lines, UsageError
-from livebode.core.lines import WINDOW_MAX, check_window
+from livebode.core import WINDOW_MAX, GridError, Lines, UsageError, check_window
 
 _GROUP_MIN = 2
 _DRAWS = 100

@@ -5,20 +5,17 @@ from __future__ import annotations
 from math import gcd
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import SignalError
-from livebode.core.errors.signal import ANY_EXCITATION
+from livebode.arrays import Floats
+from livebode.core import ANY_EXCITATION, SignalError
+from livebode.excitation._extent import extent
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.evidence import log_chance
-from livebode.excitation.extent import extent
 from livebode.excitation.hum import without_mains
 from livebode.excitation.longer import longer_period
 from livebode.excitation.prepare import clipped, whitened
 from livebode.excitation.repetition import LAG_MIN, ROUNDING, best_lag, difference
 from livebode.excitation.significance import FALSE_ALARM, find_lines
-
-Floats = NDArray[np.float64]
 
 # Largest number of neighbouring lags on either side that are tried. The autocorrelation of a slow signal is flat over
 # more samples only where noise makes the period uncertain anyway.

@@ -5,12 +5,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from livebode.core import Block, SignalError, UsageError
-from livebode.core.fast_length import fast_length
-
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
+from livebode.core import Block, SignalError, UsageError, fast_length
 
 # A spike is clipped above four times the 99.5 % quantile of the samples. Periodic excitations have crest factors up to
 # about 5, so their own peaks are not clipped, and a few spikes are less than 0.5 % of the samples.

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core.fast_length import fast_length
-
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
+from livebode.core import fast_length
 
 # The rounding of an FFT autocorrelation, with room; a line 60 dB below the rest is still 1e-6.
 ROUNDING = 1e-10

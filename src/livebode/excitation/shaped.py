@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Floats
 from livebode.core import UsageError
-
-Floats = NDArray[np.float64]
 
 
 def equal_snr(response: ArrayLike, noise: ArrayLike = 1.0) -> Floats:

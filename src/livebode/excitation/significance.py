@@ -7,11 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Flags, Floats
 from livebode.excitation.blocks import grouped
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 FALSE_ALARM = 1e-3  # probability that any bin of a recording is classified as a line by chance, all bins together
 FLOOR_DB = 60.0  # below the strongest line: a converter's rounding and the harmonics of a good drive

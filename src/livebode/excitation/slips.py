@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
 
 _PERIODS_MIN = 6
 _REMEMBERED = 16  # periods in the expected one: a drifting clock is followed and does not count as jumps

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from livebode.core import GridError, Lines, UsageError, counted
-from livebode.core.lines import WINDOW_MAX
-from livebode.excitation.multisine import each, multisine
-
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
+from livebode.core import WINDOW_MAX, GridError, Lines, UsageError, counted
+from livebode.excitation._multisine import each, multisine
 
 
 def stepped_sine(lines: Lines, amplitude: ArrayLike = 1.0, *, periods: int = 4) -> Floats:

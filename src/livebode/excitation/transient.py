@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core.distributions import normal_quantile
+from livebode.arrays import Flags, Floats
+from livebode.core import normal_quantile
+from livebode.excitation._medians import medians
 from livebode.excitation.blocks import spectra
-from livebode.excitation.medians import medians
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
 
 FALSE_ALARM = 1e-3  # probability that any period of a recording is marked by chance
 # With fewer periods there is no majority of steady ones.

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from math import ceil, inf, log, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import UsageError
 from livebode.experiment_design.machine import Machine
 from livebode.experiment_design.waveform import Waveform
-
-Floats = NDArray[np.float64]
 
 HOLDING_95 = sqrt(log(20))
 """Sigmas of a bound that covers 95 % of complex errors: 1 − exp(−c²) = 0.95."""

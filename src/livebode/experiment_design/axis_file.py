@@ -8,7 +8,7 @@ from typing import Any
 import tomli_w
 
 from livebode.core import Lines
-from livebode.estimation.settings import DETECTION_LINES_MIN
+from livebode.estimation import DETECTION_LINES_MIN
 from livebode.experiment_design.design import Design
 
 

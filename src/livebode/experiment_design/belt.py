@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.experiment_design.machine import STANDSTILL, Extremes, Machine, OperatingPoint, Quantity, check_noise
 from livebode.simulation import BeltAxis, Sampled, SimulatedAxis
-
-Floats = NDArray[np.float64]
 
 _PLACES = 9
 _STANDSTILL_S = 2.0  # of the simulation that finds the effect of the noise alone
@@ -43,7 +42,7 @@ def belt_machine(axis: BeltAxis) -> Machine:
     places = [_place(quiet, float(x), _extremes(observed, nearest == i, float(x))) for i, x in enumerate(at_m)]
     return Machine(
         places=tuple(places),
-        loop=axis.drive.loop(),
+        loop=axis.drive.loop(velocity_differenced=axis.sensor.velocity_differenced),
         rate_hz=axis.drive.rate_hz,
         noise=axis.sensor.noise_rad_per_s,
         stroke_s=seconds / 2 if moves else None,

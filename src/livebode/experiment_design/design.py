@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from livebode.experiment_design.accuracy import Floats, LineAccuracy
+from livebode.arrays import Floats
+from livebode.experiment_design._peaks import Peak, worst
+from livebode.experiment_design.accuracy import LineAccuracy
 from livebode.experiment_design.encoder import encoder_counts
 from livebode.experiment_design.limits import MachineLimits
 from livebode.experiment_design.machine import UNITS, Machine
-from livebode.experiment_design.peaks import Peak, worst
 from livebode.experiment_design.spec import ExperimentSpec
 from livebode.experiment_design.waveform import Waveform
 

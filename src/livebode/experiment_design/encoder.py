@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.experiment_design.machine import Machine
 from livebode.experiment_design.waveform import Waveform
-
-Floats = NDArray[np.float64]
 
 COUNTS_MIN = 0.5
 """Amplitude below which a line alone does not move an encoder at standstill from one count to the next."""

@@ -7,16 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from livebode.core import counted
+from livebode.experiment_design._peaks import Peak, worst
 from livebode.experiment_design.design import Choice, Design
 from livebode.experiment_design.encoder import encoder_words
 from livebode.experiment_design.grid import LineChoice
 from livebode.experiment_design.limits import MachineLimits
-from livebode.experiment_design.machine import UNITS, Quantity
+from livebode.experiment_design.machine import UNITS, Machine, Quantity
 from livebode.experiment_design.mains import mains_words
-from livebode.experiment_design.peaks import Peak, worst
 
 _LISTED_MAX = 4  # amplitudes
 _LONG_S = 3600.0
+_PER_LOOP = 2000  # frequencies at which the loop is computed
+_BELOW = 0.1  # |L|: 20 dB below one
 
 
 def explained(design: Design, found: LineChoice, amplitude_why: str, recording_why: str) -> tuple[Choice, ...]:
@@ -38,6 +40,8 @@ def explained(design: Design, found: LineChoice, amplitude_why: str, recording_w
         ),
     ]
     rows += [_limit_row(peak, design.limits) for peak in worst(design.peaks).values()]
+    if machine.loop.feedback is not None:
+        rows.insert(1, _for_tuning(machine, float(f[-1])))
     if machine.noise > 0:
         reason = f"at {f[weakest]:g} Hz after {counted(design.windows, 'window')}; σ = {machine.noise:g}"
         rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", reason))
@@ -49,6 +53,20 @@ def explained(design: Design, found: LineChoice, amplitude_why: str, recording_w
     hop_why = "a divisor of the window near a twentieth" if even else "a twentieth; no divisor of the window is near it"
     rows.append(Choice("hop", f"{design.hop} samples", hop_why))
     return tuple(rows)
+
+
+def _for_tuning(machine: Machine, highest_hz: float) -> Choice:
+    """Whether the lines reach to where the described loop is 20 dB below one at every place."""
+    low, high = machine.band_hz or (machine.rate_hz / 2e4, machine.rate_hz / 2)
+    f = np.geomspace(low, high, _PER_LOOP)
+    feedback = machine.loop.feedback_at(f)
+    size = np.max([np.abs(place.plant.response(f) * feedback) for place in machine.places], axis=0)
+    loud = np.flatnonzero(size[:-1] >= _BELOW)
+    last = float(f[loud[-1] + 1] if loud.size else f[0])
+    why = "|L| of the described loop is 20 dB below one above it; `livebode tune` knows no mode above the lines"
+    if last <= highest_hz:
+        return Choice("for tuning", f"{highest_hz:g} Hz suffices", f"the lines reach {last:.4g} Hz: {why}")
+    return Choice("for tuning", f"lines to {last:.4g} Hz", why)
 
 
 def _listed_hz(frequencies: Sequence[float]) -> str:

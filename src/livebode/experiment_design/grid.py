@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor, gcd, lcm, log2
 
 import numpy as np
 
-from livebode.core import GridError, Lines, counted
-from livebode.core.lines import WINDOW_MAX, check_window
-from livebode.core.mains import meets_mains
-from livebode.estimation.settings import default_hop
-from livebode.excitation import check_band, chirp_lines, odd_bins, odd_lines, stepped_lines
-from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
+from livebode.core import WINDOW_MAX, GridError, Lines, check_window, counted, meets_mains
+from livebode.estimation import default_hop
+from livebode.excitation import ORDER_MAX, ORDER_MIN, check_band, chirp_lines, odd_bins, odd_lines, stepped_lines
 from livebode.experiment_design.spec import ExperimentSpec
 
 _PERIODS = 4  # of each line of a stepped sine: the first of them is its transient
@@ -51,11 +48,11 @@ def grid(spec: ExperimentSpec, rate_hz: float) -> LineChoice:
     """
     found = _found(spec, rate_hz)
     if len(found.lines) > _LINES_MAX:
-        raise _too_many(spec, found.lines)
+        raise _too_many(spec, found.lines, rate_hz)
     return found
 
 
-def _too_many(spec: ExperimentSpec, lines: Lines) -> GridError:
+def _too_many(spec: ExperimentSpec, lines: Lines, rate_hz: float) -> GridError:
     """The error with the order, or the resolution, that gives few enough lines."""
     f, many = lines.frequency_hz, len(lines)
     facts: dict[str, float] = {}
@@ -64,6 +61,9 @@ def _too_many(spec: ExperimentSpec, lines: Lines) -> GridError:
         facts["order_max"], fewer = order, f"take order {order}"
     else:  # the period of a PRBS is rounded up to a power of two
         finest_hz = ceil(1000 * (2 if spec.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)) / 1000
+        # The window may be longer than the resolution requires, which gives more lines.
+        while spec.lines is None and len(_found(_coarser(spec, finest_hz), rate_hz).lines) > _LINES_MAX:
+            finest_hz = round(finest_hz + 0.001, 3)
         facts["resolution_hz_min"], fewer = finest_hz, f"take lines {finest_hz:g} Hz or more apart"
     return GridError(
         "too-many-lines",
@@ -73,6 +73,10 @@ def _too_many(spec: ExperimentSpec, lines: Lines) -> GridError:
         lines_max=_LINES_MAX,
         **facts,
     )
+
+
+def _coarser(spec: ExperimentSpec, resolution_hz: float) -> ExperimentSpec:
+    return replace(spec, resolution_hz=resolution_hz, window=None)
 
 
 def _found(spec: ExperimentSpec, rate_hz: float) -> LineChoice:

@@ -9,8 +9,8 @@ from typing import Annotated
 from annotated_types import Gt
 
 from livebode.core import DesignError, UsageError
+from livebode.experiment_design._peaks import Peak
 from livebode.experiment_design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
-from livebode.experiment_design.peaks import Peak
 
 _Above0 = Annotated[float, Gt(0)]
 

@@ -9,10 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Loop, Model, UsageError
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Quantity = Literal["torque", "speed", "travel", "following error"]
 QUANTITIES: tuple[Quantity, ...] = ("torque", "speed", "travel", "following error")
 UNITS: Mapping[Quantity, str] = {"torque": "N m", "speed": "m/s", "travel": "m", "following error": "m"}

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from livebode.core import Lines
-from livebode.core.mains import meets_mains
+from livebode.core import Lines, meets_mains
 
 
 def mains_words(lines: Lines, mains_hz: Sequence[float], avoided: Sequence[int]) -> str:

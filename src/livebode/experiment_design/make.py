@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import DesignError, Lines, UsageError
 from livebode.excitation import Phases, chirp, equal_snr, multisine, prbs, stepped_sine
 from livebode.experiment_design.grid import LineChoice
 from livebode.experiment_design.machine import Machine
 from livebode.experiment_design.spec import ExperimentSpec
 from livebode.experiment_design.waveform import Waveform
-
-Floats = NDArray[np.float64]
 
 REACHED = 1e-9
 

@@ -6,15 +6,24 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from livebode.core import DesignError, GridError, Loop, Responses, SignalError, UsageError
-from livebode.core.controllers import integral
-from livebode.core.model import Algebra, Gain, Model, as_model
+from livebode.arrays import Complex, Floats
+from livebode.core import (
+    Algebra,
+    DesignError,
+    Gain,
+    GridError,
+    Loop,
+    Model,
+    Responses,
+    SignalError,
+    UsageError,
+    as_model,
+    integral,
+)
 from livebode.experiment_design.machine import STANDSTILL, Extremes, Machine, OperatingPoint, within
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Output = Literal["velocity", "position"]
 
 

@@ -9,11 +9,8 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from annotated_types import Ge, Le, Len
 
-from livebode.core import UsageError
-from livebode.core.mains import MAINS_HZ
-from livebode.excitation import Phases
-from livebode.excitation.chirp import Sweep
-from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
+from livebode.core import MAINS_HZ, UsageError
+from livebode.excitation import ORDER_MAX, ORDER_MIN, Phases, Sweep
 from livebode.experiment_design.spec_checks import (
     ACCURACY_MIN,
     AMPLITUDE_MAX,

@@ -7,13 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import DesignError, Lines, UsageError
 from livebode.excitation import quantised
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _CHANGED_MAX = 0.5  # of a line's amplitude: beyond it, rounding dominates the line
 

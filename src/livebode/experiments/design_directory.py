@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from livebode.core import ConfigError, OutputError, UsageError
+from livebode.core import ConfigError, OutputError, UsageError, remove_empty, remove_files
 from livebode.experiment_design import FORMATS
 
 MARK, AXIS, SCHEMA = "design.json", "axis.toml", "axis.schema.json"
@@ -50,14 +50,17 @@ def check_free(directory: Path, force: bool) -> None:
             "choose another directory, or replace it with force",
             path=str(directory),
         )
-    if directory.is_symlink() or not (directory / MARK).is_file():
+    own = set() if directory.is_symlink() else _left_by(directory)
+    if not own:
         raise OutputError(
             "not-replaceable",
             f"{str(directory)!r} is not the directory of an earlier design",
             "choose another directory",
             path=str(directory),
         )
-    if others := sorted({path.name for path in directory.iterdir()} - _left_by(directory / MARK)):
+    if others := sorted(
+        path.name for path in directory.iterdir() if path.name not in own or path.is_symlink() or not path.is_file()
+    ):
         raise OutputError(
             "not-replaceable",
             f"{str(directory)!r} also contains {others[0]!r}, which is not from a design",
@@ -67,8 +70,23 @@ def check_free(directory: Path, force: bool) -> None:
         )
 
 
-def _left_by(mark: Path) -> set[str]:
+def remove_design(directory: Path) -> None:
+    """Remove the files of an earlier design, and the directory if it is then empty; OSError if it is not."""
+    remove_files(directory, sorted(_left_by(directory), key=lambda name: name == MARK))
+    remove_empty(directory)
+
+
+def _left_by(directory: Path) -> set[str]:
+    """The files that design.json lists; none if it is not that of a design."""
+    mark = directory / MARK
+    if mark.is_symlink() or not mark.is_file():
+        return set()
     try:
-        return set(json.loads(mark.read_text(encoding="utf-8"))["files"])
+        listed = json.loads(mark.read_text(encoding="utf-8"))["files"]
+        names = {name for name in listed if isinstance(name, str)}
     except (OSError, ValueError, KeyError, TypeError):
         return set()
+    excitations = names - {MARK, AXIS, SCHEMA}
+    one = len({Path(name).stem for name in excitations}) == 1
+    plain = all(Path(name).suffix in (*FORMATS, ".png") and Path(name).name == name for name in excitations)
+    return names if one and plain and len(names - excitations) == 3 else set()

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from livebode.configuration.schema import axis_schema
-from livebode.core import UsageError
-from livebode.core.files import whole_directory
-from livebode.core.installing import install_command
-from livebode.core.writing import writing
+from livebode.configuration import axis_schema
+from livebode.core import UsageError, install_command, whole_directory, writing
 from livebode.experiment_design import FORMATS, Design, axis_text, choose, write
-from livebode.experiments.design_directory import AXIS, MARK, SCHEMA, check_free, check_names
+from livebode.experiments.design_directory import AXIS, MARK, SCHEMA, check_free, check_names, remove_design
 from livebode.experiments.experiment import Experiment
 from livebode.records import to_json
 from livebode.structured_text import PERIOD_MAX
@@ -80,7 +76,7 @@ def design_experiment(
     design = choose(experiment.spec(), experiment.machine(), experiment.machine_limits())
     lines = design.waveform.lines
     left_out = {} if kinds else _without(lines.window)
-    with writing(directory), whole_directory(directory, shutil.rmtree) as partial:
+    with writing(directory), whole_directory(directory, remove_design) as partial:
         for kind in kinds or (kind for kind in FORMATS if kind not in left_out):
             write(partial / f"{name}{kind}", design.waveform, name)
         configuration = axis_text(

@@ -10,15 +10,13 @@ from typing import Any, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from livebode.configuration.axis import nearest
-from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.toml_file import read_table, shortened
+from livebode.configuration import LoopSection, nearest, read_table, shortened
 from livebode.core import ConfigError, nearest_name
 from livebode.experiment_design import ExperimentSpec, Machine, MachineLimits, belt_machine
 from livebode.experiments.measure_section import MeasureSection
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
-from livebode.sources.live.settings import SourceSettings
+from livebode.sources.live import SourceSettings
 
 T = TypeVar("T")
 
@@ -186,7 +184,8 @@ class Experiment(BaseModel):
                     "delay_ticks": drive.delay_ticks}  # fmt: skip
         position = {"gain": drive.position_gain_per_s, "rate_hz": drive.position_rate_hz,
                     "rate_divider": drive.position_ticks}  # fmt: skip
-        return {"velocity": velocity, "position": position}
+        differenced = {"velocity_differenced": True} if axis.sensor.velocity_differenced else {}
+        return {**differenced, "velocity": velocity, "position": position}
 
     def motion_table(self, window_s: float) -> dict[str, Any]:
         """[motion] of the axis.toml for a moving belt axis: a chunk is a stroke, at least two windows."""

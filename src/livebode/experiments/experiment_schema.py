@@ -8,12 +8,11 @@ from typing import Annotated, Any, get_type_hints
 from annotated_types import MinLen
 from pydantic import BaseModel, ConfigDict, create_model
 
-from livebode.configuration.schema import Schema, schema_of
-from livebode.experiment_design import ExperimentSpec, MachineLimits
-from livebode.experiment_design.spec_checks import KIND_OF_KEY
+from livebode.configuration import Schema, schema_of
+from livebode.experiment_design import KIND_OF_KEY, ExperimentSpec, MachineLimits
 from livebode.experiments.experiment import BELT, SIGNALS, Experiment
 from livebode.experiments.matrix_experiment import MACHINES, Drives, MatrixExperiment
-from livebode.mimo.design import MatrixLimits, MatrixSpec
+from livebode.mimo import MatrixLimits, MatrixSpec
 
 _CONFIG = ConfigDict(extra="forbid")
 

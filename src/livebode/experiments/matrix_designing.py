@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,15 +9,13 @@ from typing import Any
 
 import tomli_w
 
-from livebode.configuration.schema import axis_schema
-from livebode.core import UsageError
-from livebode.core.files import whole_directory
-from livebode.core.writing import writing
-from livebode.experiment_design.axis_file import lines_text
-from livebode.experiments.design_directory import AXIS, MARK, SCHEMA, check_free, check_names
+from livebode.configuration import axis_schema
+from livebode.core import UsageError, whole_directory, writing
+from livebode.experiment_design import lines_text
+from livebode.experiments.design_directory import AXIS, MARK, SCHEMA, check_free, check_names, remove_design
 from livebode.experiments.matrix_experiment import MatrixExperiment
 from livebode.experiments.matrix_files import MATRIX_FORMATS
-from livebode.mimo.design import MatrixDesign, choose_matrix
+from livebode.mimo import MatrixDesign, choose_matrix
 from livebode.records import to_json
 
 Picture = Callable[[MatrixDesign, Path], None]
@@ -70,7 +67,7 @@ def design_matrix(
     check_free(directory, force)
     design = choose_matrix(experiment.spec(), experiment.machine(), experiment.machine_limits())
     text = matrix_axis_text(design, experiment.log, experiment.loop_tables(design.machine))
-    with writing(directory), whole_directory(directory, shutil.rmtree) as partial:
+    with writing(directory), whole_directory(directory, remove_design) as partial:
         for kind in kinds:
             MATRIX_FORMATS[kind](partial / f"{name}{kind}", design, name)
         (partial / AXIS).write_text(text, encoding="utf-8")

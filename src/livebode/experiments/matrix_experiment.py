@@ -10,11 +10,11 @@ from typing import Annotated, Any, TypeVar
 from annotated_types import Gt
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from livebode.configuration.toml_file import read_table
+from livebode.configuration import read_table
 from livebode.core import ConfigError, nearest_name
 from livebode.experiments.experiment import made_of
 from livebode.experiments.measured_matrix import MeasuredMatrixSection, loop_of, measured_machine
-from livebode.mimo.design import MatrixLimits, MatrixMachine, MatrixSpec, MechanismMachine
+from livebode.mimo import MatrixLimits, MatrixMachine, MatrixSpec, MechanismMachine
 from livebode.simulation import CoreXY, CoreXYLoop, Gantry, GantryLoop, ModalLoop, ModalMachine, MotorLoop
 
 T = TypeVar("T")

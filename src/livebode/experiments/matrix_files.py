@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core.installing import needing
-from livebode.experiment_design.files.c_names import identifier
-from livebode.experiment_design.files.facts import as_lines
-from livebode.mimo.design import MatrixDesign
+from livebode.core import needing
+from livebode.experiment_design import as_lines, identifier
+from livebode.mimo import MatrixDesign
 from livebode.version import __version__
 
 _PER_ROW = 4

@@ -7,13 +7,10 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from livebode.analysis.averaged import mean_of
-from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.recorded import recorded_configuration
+from livebode.analysis import mean_of
+from livebode.configuration import LoopSection, recorded_configuration
 from livebode.core import ConfigError, read_unit, split_plant_unit
-from livebode.experiment_design import Machine, MeasuredResponse, measured_machine
-from livebode.experiment_design.machine import MOTION_KEYS
-from livebode.experiment_design.measured import Output
+from livebode.experiment_design import MOTION_KEYS, Machine, MeasuredResponse, Output, measured_machine
 from livebode.records import RunRecord
 
 Number = Annotated[float, Field(strict=True)]  # true is not a number

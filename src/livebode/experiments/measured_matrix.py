@@ -9,11 +9,9 @@ import numpy as np
 from annotated_types import Gt
 from pydantic import BaseModel, ConfigDict
 
-from livebode.configuration.loop_section import ControllerSection
-from livebode.configuration.recorded import recorded_configuration, without_null
+from livebode.configuration import ControllerSection, recorded_configuration, without_null
 from livebode.core import ConfigError, Model, split_plant_unit
-from livebode.mimo import MatrixLoop
-from livebode.mimo.design import MeasuredMachine
+from livebode.mimo import MatrixLoop, MeasuredMachine
 from livebode.records import RunRecord
 
 _Positive = Annotated[float, Gt(0)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from livebode.core import RecordError, Responses
 from livebode.export.result import WriteResult
-from livebode.kernel import Words, write_rows
+from livebode.tables import Words, write_rows
 
 Column = NDArray[Any] | Sequence[str]
 """Numbers, or text."""

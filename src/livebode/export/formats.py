@@ -2,50 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Literal, TypeVar
 
-from livebode.core import MatrixResponses, OutputError, Responses
-from livebode.core.files import whole_file
-from livebode.core.writing import writing
-from livebode.export.delimited import write_csv
-from livebode.export.labelled import write_netcdf
-from livebode.export.matlab import write_mat
-from livebode.export.matrix_delimited import write_matrix_csv
-from livebode.export.matrix_labelled import write_matrix_netcdf
-from livebode.export.matrix_matlab import write_matrix_mat
-from livebode.export.matrix_universal import write_matrix_uff
-from livebode.export.parameters import write_parameters_csv, write_parameters_mat
-from livebode.export.result import WriteResult
-from livebode.export.universal import write_uff
-from livebode.tables import Table
+from livebode.core import OutputError, whole_file, writing
+from livebode.plugins import named
 
-FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], WriteResult]] = {
-    "csv": write_csv,
-    "mat": write_mat,
-    "netcdf": write_netcdf,
-    "uff": write_uff,
+
+@dataclass(frozen=True)
+class Export:
+    """A format; what it can contain is written by what is named as "module:name".
+
+    Attributes
+    ----------
+    ending
+        Of its files.
+    responses
+        Called with the path, an iterable of `Responses` and the run's summary.
+    matrices
+        The same with `MatrixResponses`.
+    parameters
+        Called with the path and a table of fitted parameters.
+    model
+        Called with the path and an `LpvModel`: the model over the position.
+
+    Each returns a `WriteResult`.
+    """
+
+    ending: str
+    responses: str = ""
+    matrices: str = ""
+    parameters: str = ""
+    model: str = ""
+
+
+def _own(function: str) -> str:
+    return f"livebode.export.{function}"
+
+
+EXPORTS: Mapping[str, Export] = {
+    "csv": Export(
+        ".csv",
+        _own("delimited:write_csv"),
+        _own("matrix_delimited:write_matrix_csv"),
+        _own("parameters:write_parameters_csv"),
+    ),
+    "mat": Export(
+        ".mat",
+        _own("matlab:write_mat"),
+        _own("matrix_matlab:write_matrix_mat"),
+        _own("parameters:write_parameters_mat"),
+        _own("lpv:write_lpv_mat"),
+    ),
+    "netcdf": Export(
+        ".nc",
+        _own("labelled:write_netcdf"),
+        _own("matrix_labelled:write_matrix_netcdf"),
+        model=_own("lpv:write_lpv_netcdf"),
+    ),
+    "uff": Export(".uff", _own("universal:write_uff"), _own("matrix_universal:write_matrix_uff")),
+    "json": Export(".json", model=_own("lpv:write_lpv_json")),
+    "c": Export(".h", model=_own("lpv:write_lpv_c")),
 }
-"""Functions that write responses, by the name of the format."""
+"""livebode's formats by name."""
+Content = Literal["responses", "matrices", "parameters", "model"]
 
-MATRIX_FORMATS: Mapping[str, Callable[[Path, Iterable[MatrixResponses], Mapping[str, Any]], WriteResult]] = {
-    "csv": write_matrix_csv,
-    "mat": write_matrix_mat,
-    "netcdf": write_matrix_netcdf,
-    "uff": write_matrix_uff,
-}
-"""Functions that write matrices of responses, by the name of the format."""
 
-TABLES: Mapping[str, Callable[[Path, Iterable[Table]], WriteResult]] = {
-    "csv": write_parameters_csv,
-    "mat": write_parameters_mat,
-}
-"""Functions that write parameters, by the name of the format."""
+def writers(content: Content) -> Mapping[str, str]:
+    """The formats that can contain this, by name, each with "module:name" of what writes it."""
+    return {name: writer for name, export in named("exports").items() if (writer := getattr(export, content))}
 
-ENDINGS: Mapping[str, str] = {
-    "csv": ".csv", "mat": ".mat", "netcdf": ".nc", "uff": ".uff", "json": ".json", "c": ".h",
-}  # fmt: skip
 
 Done = TypeVar("Done")
 
@@ -68,16 +96,17 @@ def save(path: Path, write: Callable[[Path], Done], *, force: bool = False) -> D
         If the path exists and must not be replaced or is not a file, or the disk reports an error. Nothing is written
         then, and an existing file is unchanged.
     """
-    _check_free(path, force)
+    check_free(path, force=force)
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as partial:
             written = write(partial)
-            _check_free(path, force)
+            check_free(path, force=force)
     return written
 
 
-def _check_free(path: Path, force: bool) -> None:
+def check_free(path: Path, *, force: bool) -> None:
+    """OutputError if a file must not be written there: a directory, or a file that may not be replaced."""
     if path.is_dir():
         raise OutputError("is-directory", f"{str(path)!r} is a directory", "choose the path of a file", path=str(path))
     if not force and (path.exists() or path.is_symlink()):

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import Parameters, UsageError
-from livebode.core.installing import needing
+from livebode.arrays import Floats
+from livebode.core import Parameters, UsageError, needing
 from livebode.export.matlab import VARIABLE
 from livebode.export.result import WriteResult
-
-Floats = NDArray[np.float64]
 
 _STATES = ("motor angle", "motor speed", "load", "load speed")
 
@@ -185,12 +181,3 @@ def write_lpv_c(path: Path, model: LpvModel) -> WriteResult:
         encoding="utf-8",
     )
     return WriteResult(model.position.size)
-
-
-MODELS: Mapping[str, Callable[[Path, LpvModel], WriteResult]] = {
-    "json": write_lpv_json,
-    "mat": write_lpv_mat,
-    "netcdf": write_lpv_netcdf,
-    "c": write_lpv_c,
-}
-"""Functions that write a model over the position, by the name of the format."""

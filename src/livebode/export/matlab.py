@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import Responses
-from livebode.core.installing import needing
+from livebode.core import Responses, needing
 from livebode.export.result import WriteResult, whole
 
 VARIABLE = "livebode"

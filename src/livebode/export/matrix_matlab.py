@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import REASONS, MatrixResponses
-from livebode.core.installing import needing
+from livebode.core import REASONS, MatrixResponses, needing
 from livebode.export.matlab import VARIABLE
 from livebode.export.result import WriteResult, whole
 

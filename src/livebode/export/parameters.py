@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.core import OutputError, RecordError
-from livebode.core.installing import needing
+from livebode.core import OutputError, RecordError, needing
 from livebode.export.delimited import write_columns, write_header
 from livebode.export.matlab import VARIABLE
 from livebode.export.result import VALUES_MAX, WriteResult

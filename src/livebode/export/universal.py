@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Response, Responses, SignalError
-from livebode.core.installing import not_installed
+from livebode.core import Response, Responses, SignalError, not_installed
 from livebode.export.result import WriteResult
 
 _LABEL, _ID = 20, 80  # longest unit and line of text in the format

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Responses
 
-Floats = NDArray[np.float64]
 Starts = NDArray[np.int64]
 
 _DISTORTION_DOF = 4.0  # as in the mean of a run

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
 from livebode.fitting.modal import chain_of, scan
 from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, delay, free_friction
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.language import Message
 
 _INERTIA = (1e-9, 1e7)
 _MASS = (1e-6, 1e9)
@@ -120,7 +118,7 @@ class Rigid(Chain):
     ('J', 'B', 'delay')
     """
 
-    name = "rigid"
+    name = Message("rigid")
     frictions = ("B",)
 
     @property
@@ -155,7 +153,7 @@ class TwoMass(Chain):
     """
 
     inertia_ratio: float | None = None
-    name = "two-mass"
+    name = Message("two-mass")
     frictions = ("B", "BL")
 
     def __post_init__(self) -> None:

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from livebode.core import FitError, GridError, Parameters, Response, Responses, UsageError, counted
-from livebode.core.parameters import OK
+from livebode.arrays import Complex, Floats
+from livebode.core import OK, FitError, GridError, Parameters, Response, Responses, UsageError, counted
 from livebode.fitting.fitter import measured_of
 from livebode.fitting.mean import mean_response
 from livebode.fitting.partial_fractions import PartialFractions
@@ -22,9 +22,7 @@ from livebode.fitting.problem import Measured
 from livebode.fitting.rows import EPSILON_MAX, NO_FIT, NO_RESPONSE, NOT_CONVERGED, NOT_SEEN, SENTENCES
 from livebode.fitting.separable import Outputs, Separated, whole_covariance
 from livebode.fitting.weighing import chi_squared, squares
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.language import Message
 
 POLE_MODELS = ("modal", "rational")
 _UNCERTAIN = 0.5  # of a frequency
@@ -126,7 +124,7 @@ class CommonPoles:
     def about_bounds(self) -> str:
         """What the bounds cover, as text."""
         if self.complete:
-            return "the residuals are white over the lines; ± covers 95 %"
+            return Message("the residuals are white over the lines; ± covers 95 %")
         return (
             f"the residuals of {', '.join(self.patterned)} follow a pattern over the lines, which further poles do "
             "not explain; ± is not a 95 % bound"
@@ -275,7 +273,7 @@ def outputs_of(
     """Lines of all outputs inside of a band."""
     lines = batches[0].lines
     for name, one in zip(names, batches):
-        if one.lines.rate_hz != lines.rate_hz or not np.array_equal(one.lines.frequency_hz, lines.frequency_hz):
+        if not lines.alike(one.lines):
             raise GridError(
                 "not-alike",
                 f"{name!r} and {names[0]!r} have different lines or rates, so their poles cannot be fitted together",

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.parameters import OK
+from livebode.arrays import Complex, Floats
+from livebode.core import OK
 from livebode.fitting.extended import BEYOND, LAG, MODE, RESIDUAL, START_DAMPING, Extended
 from livebode.fitting.physical import DELAY, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FittedRows, fit_rows
 from livebode.fitting.weighing import misfit, weights
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _TAKEN = 3  # at most
 _FRICTION_PRICE = 2.5  # required decrease of −2·ln(likelihood): 1.6 sigma, because every machine has some

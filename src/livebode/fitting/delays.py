@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Stage, StatefulBase
-from livebode.core.parameters import OK
+from livebode.arrays import Floats
+from livebode.core import OK, Stage, StatefulBase
 from livebode.fitting.physical import DELAY
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FRICTION, FittedRows, fit_rows
 from livebode.fitting.weighing import misfit
-
-Floats = NDArray[np.float64]
 
 SHOWN = 10.0
 """Decrease of −2·ln(likelihood) from which a delay is fitted: 3.2 sigma of the delay, by chance once in 640 fits."""

@@ -8,12 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Lines, Responses, Stage, StatefulBase
-from livebode.core.distributions import sum_exceeded
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
+from livebode.arrays import Complex, Flags, Floats
+from livebode.core import Lines, Responses, Stage, StatefulBase, sum_exceeded
 
 FALSE_ALARM = 0.01
 """Probability that a record of a machine that does not drift is reported, all lines together."""

@@ -7,13 +7,11 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel
 from livebode.fitting.polynomials import plus, times
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.language import Message
 
 LAG, RESIDUAL, MODE = "lag", "residual compliance", "further mode"
 BEYOND = 3.0
@@ -25,12 +23,12 @@ START_DAMPING = 0.03
 _BEYOND_DAMPING = 0.05
 _SHOWN = 0.1  # of |G| at the highest line
 WORDS = {
-    "delay": "a delay",
-    "B": "viscous friction at the motor (B)",
-    "BL": "viscous friction at the load (BL)",
-    LAG: "a lag",
-    RESIDUAL: "the compliance of modes above the band",
-    MODE: "a further mode",
+    "delay": Message("a delay"),
+    "B": Message("viscous friction at the motor (B)"),
+    "BL": Message("viscous friction at the load (BL)"),
+    LAG: Message("a lag"),
+    RESIDUAL: Message("the compliance of modes above the band"),
+    MODE: Message("a further mode"),
 }
 """Effects that a model may lack."""
 
@@ -65,7 +63,8 @@ class Extended(PhysicalModel):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        return f"{self.base.name} with {' and '.join(WORDS[extra] for extra in self.extras)}"
+        extras = Message.conjunction(WORDS[extra] for extra in self.extras)
+        return Message("{model} with {extras}", model=self.base.name, extras=extras)
 
     @property
     def frictions(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -80,7 +79,7 @@ class Extended(PhysicalModel):
             MODE: (
                 Parameter("mode", "Hz", 1.5 * self.top_hz, 1e-4, 1e6),
                 Parameter("mode_damping", "", START_DAMPING, 1e-6, 2.0),
-                Parameter("mode_gain", "rad/s² per unit of input", 0.0, least, inf),
+                Parameter("mode_gain", Message("rad/s² per unit of input"), 0.0, least, inf),
             ),
         }
         return (*self.base.parameters, *(p for extra in self.extras for p in own[extra]))

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import (
+    OK,
     Emit,
     Event,
     FitError,
@@ -21,7 +23,6 @@ from livebode.core import (
     StatefulBase,
     ignore,
 )
-from livebode.core.parameters import OK
 from livebode.fitting.delays import DelayChoice
 from livebode.fitting.models import model_named
 from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
@@ -29,9 +30,6 @@ from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, FittedRows
 from livebode.fitting.tasks import FitTask
 from livebode.fitting.weighing import epsilon_for, squares
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _GROUP = 16  # rows that share a start and an ε, however they arrive
 _MEMORY = 64  # rows that ε is taken from
@@ -97,7 +95,7 @@ class Fitter(StatefulBase):
             self.model, EvaluationGrid(np.ones(1), 1.0, hold), self._fixed, self._free
         )  # rejected before anything starts
         self._lines: Lines | None = None
-        self._word = NO_RESPONSE
+        self._word: str = NO_RESPONSE
         self._seen = 0
         self._start: Floats | None = None
         self._next: Floats | None = None

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.fitting.problem import Measured, Problem, Solution
 from livebode.fitting.weighing import lacks_more_than, own_epsilon, weights
-
-Floats = NDArray[np.float64]
 
 _FROM = 0.03
 _EXPLAINED = 0.5

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex, Floats
 from livebode.core import FitError
 from livebode.fitting.transfer import Transfer, roots
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _AT_ONE = 1e-6  # a pole this near to z = 1 is an integrator
 _AROUND = 1.5

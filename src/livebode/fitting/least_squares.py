@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
 
 Normal = Callable[[Floats], tuple[Any, ...]]
 """From parameters (problems, n): cost (problems,), gradient (problems, n), Gauss–Newton matrix (problems, n, n), and

@@ -8,12 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Response, Responses, SignalError
 from livebode.fitting.drift import DriftTest
 from livebode.fitting.line_verdicts import LineVerdicts
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _DISTORTION_DOF = 4.0  # of detection lines for a distortion: four, if they are all on one side of a line
 
@@ -27,7 +25,7 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
         Ĝ = Σ Gᵢ·wᵢ / Σ wᵢ = Σ Yᵢ/Wᵢ / Σ Uᵢ/Wᵢ,
 
     which is eq. (2) of Nevaranta 2016 over all windows, with eᵢ = (Gᵢ − Ĝ)·wᵢ / mean(w) the error of one. Responses
-    without a weight (runs of earlier versions, other quantities than the plant) have equal weights, with that bias.
+    without a weight (other quantities than the plant) have equal weights, with that bias.
 
     Windows that overlap share noise. Of two windows of N samples that start d apart the errors of white noise correlate
     as ρ = max(0, 1 − d/N), so that n responses are equivalent to m = n² / Σᵢⱼ ρᵢⱼ windows without overlap, and

@@ -5,13 +5,10 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.transfer import Transfer
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 QUALITY = 10.0
 """Of the scanned resonances; Table I of Nevaranta 2016 has it."""

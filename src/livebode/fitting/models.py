@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from livebode.core import UsageError
-from livebode.fitting.chains import Rigid, TwoMass
 from livebode.fitting.physical import PhysicalModel
-from livebode.fitting.three_mass import ThreeMass
-from livebode.fitting.unknown_gain import TwoMassGain
+from livebode.plugins import loaded, named
 
-MODELS: dict[str, type[PhysicalModel]] = {m.name: m for m in (Rigid, TwoMass, ThreeMass, TwoMassGain)}
+MODELS: Mapping[str, str] = {
+    "rigid": "livebode.fitting.chains:Rigid",
+    "two-mass": "livebode.fitting.chains:TwoMass",
+    "three-mass": "livebode.fitting.three_mass:ThreeMass",
+    "two-mass-gain": "livebode.fitting.unknown_gain:TwoMassGain",
+}
+"""livebode's models by name, each with "module:name" of its class, a `PhysicalModel`."""
 
 
 def model_named(name: str, **options: Any) -> PhysicalModel:
@@ -26,17 +31,19 @@ def model_named(name: str, **options: Any) -> PhysicalModel:
     >>> model_named("two-mass", radius_m=0.019).names[:4]
     ('Js', 'mL', 'Keff', 'bs')
     """
-    if name not in MODELS:
+    models = named("models")
+    if name not in models:
         raise UsageError(
             "unknown-name",
             f"there is no model {name!r}",
-            f"choose {', '.join(MODELS)}",
+            f"choose {', '.join(models)}",
             argument="model",
             value=name,
-            allowed=list(MODELS),
+            allowed=list(models),
         )
     given = {key: value for key, value in options.items() if value is not None}
-    known = getattr(MODELS[name], "__dataclass_fields__", {})
+    model: type[PhysicalModel] = loaded(models[name])
+    known = getattr(model, "__dataclass_fields__", {})
     for key in given:
         if key not in known:
             raise UsageError(
@@ -47,4 +54,4 @@ def model_named(name: str, **options: Any) -> PhysicalModel:
                 value=given[key],
                 model=name,
             )
-    return MODELS[name](**given)
+    return model(**given)

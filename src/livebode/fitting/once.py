@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import FitError, Parameters, Response, Responses
-from livebode.core.installing import not_installed
+from livebode.core import FitError, Parameters, Response, Responses, not_installed
 from livebode.fitting.competing import Allowed, Competitor, compete, competitor, mixed, positive
 from livebode.fitting.extended import WORDS
 from livebode.fitting.fitter import Fitter
@@ -20,6 +19,7 @@ from livebode.fitting.patterns import correlation, covariance, follows_pattern
 from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import NO_FIT, SENTENCES, fit_rows
+from livebode.language import Message
 
 _ROUNDING = 1e-9
 
@@ -117,17 +117,26 @@ class Fit:
         words = []
         if self.taken:
             asked = self.model if self.asked is None else self.asked
-            lacking = " and ".join(dict.fromkeys(WORDS.get(name, name) for name in self.taken))
-            words.append(f"the {asked.name} model alone is incomplete: the lines show {lacking}, fitted with it")
+            lacking = Message.conjunction(dict.fromkeys(WORDS.get(name, name) for name in self.taken))
+            words.append(
+                Message(
+                    "the {model} model alone is incomplete: the lines show {lacking}, fitted with it",
+                    model=asked.name,
+                    lacking=lacking,
+                )
+            )
         if self.correlation is None:
-            words.append("± covers 95 %")
+            words.append(Message("± covers 95 %"))
         else:
             words.append(
-                "model incomplete: its error follows a pattern over the lines (correlation of neighbours "
-                f"{self.correlation:.2f}), and no competing model explains it; ± covers it as far as the lines show "
-                "it, but is not a 95 % bound"
+                Message(
+                    "model incomplete: its error follows a pattern over the lines (correlation of neighbours "
+                    "{correlation:.2f}), and no competing model explains it; ± covers it as far as the lines show it, "
+                    "but is not a 95 % bound",
+                    correlation=self.correlation,
+                )
             )
-        return "; ".join(words)
+        return words[0] if len(words) == 1 else Message("{model}; {bounds}", model=words[0], bounds=words[1])
 
     @property
     def epsilon(self) -> float:

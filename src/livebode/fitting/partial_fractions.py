@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.transfer import Transfer, roots
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _STEP = 1e-6  # of a frequency, for slopes
 
@@ -85,20 +82,19 @@ class PartialFractions:
     def __init__(self, structure: Structure, grid: EvaluationGrid, unit: float) -> None:
         self.structure, self.grid, self.unit = structure, grid, unit
         self._s = np.asarray(2j * np.pi * grid.frequency_hz, dtype=np.complex128)
+        self._z = np.exp(self._s / grid.rate_hz)
+        self._fixed: tuple[float, list[Complex]] | None = None  # columns that depend on the delay alone
 
     def columns(self, theta: Floats, delay_s: float) -> Complex:
         """Shape (lines, linear)."""
-        of, unit = self.structure, self.unit
+        of = self.structure
         pairs = of.pairs_of(theta)
         parts = [self.pairs(pairs[:, 0], pairs[:, 1], delay_s).reshape(2 * of.pairs, self._s.size)]
         if of.single:
             parts.append(self.real(theta[2 * of.pairs : 2 * of.pairs + 1], delay_s))
-        parts += [
-            self._at(Transfer.of([unit**order], [1.0] + [0.0] * order), delay_s)[np.newaxis]
-            for order in range(1, of.integrators + 1)
-        ]
-        parts += [(self._direct(order) * np.exp(-self._s * delay_s))[np.newaxis] for order in range(of.direct)]
-        return np.concatenate(parts).T
+        if self._fixed is None or self._fixed[0] != delay_s:
+            self._fixed = delay_s, self._integrators_and_direct(delay_s)
+        return np.concatenate(parts + self._fixed[1]).T
 
     def moves(self, theta: Floats, delay_s: float) -> tuple[Complex, Complex]:
         """Derivatives of the columns by the parameters of their own poles, by central differences.
@@ -126,7 +122,7 @@ class PartialFractions:
         """Both columns of pairs (...), shape (..., 2, lines)."""
         none, one, unit = np.zeros_like(a1), np.ones_like(a1), self.unit
         above = [np.stack(part, axis=-1) for part in ((none, unit * one), (unit**2 * one, none))]
-        below = [np.stack([part, part], axis=-1) for part in (one, a1, a0)]
+        below = [part[..., np.newaxis] for part in (one, a1, a0)]
         return self._at(Transfer.of(above, below), delay_s)
 
     def real(self, a: Floats, delay_s: float = 0.0) -> Complex:
@@ -136,7 +132,15 @@ class PartialFractions:
     def _at(self, transfer: Transfer, delay_s: float) -> Complex:
         if self.grid.hold == "none":
             return np.asarray(transfer.response(self._s) * np.exp(-self._s * delay_s))
-        return transfer.sampled(np.exp(self._s / self.grid.rate_hz), self.grid.rate_hz, delay_s)
+        return transfer.sampled(self._z, self.grid.rate_hz, delay_s)
+
+    def _integrators_and_direct(self, delay_s: float) -> list[Complex]:
+        of, late = self.structure, np.exp(-self._s * delay_s)
+        integrators = [
+            self._at(Transfer.of([self.unit**order], [1.0] + [0.0] * order), delay_s)[np.newaxis]
+            for order in range(1, of.integrators + 1)
+        ]
+        return integrators + [(self._direct(order) * late)[np.newaxis] for order in range(of.direct)]
 
     def _direct(self, order: int) -> Complex:
         """Term 0 or 1."""

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FittedRows
 from livebode.fitting.weighing import misfit, weights
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 LACKS = 10.0
 """Decrease of −2·ln(likelihood) by an ε from which noise alone does not explain the residuals."""

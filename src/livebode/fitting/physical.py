@@ -9,13 +9,12 @@ from math import inf, isfinite
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Lines, UsageError
 from livebode.fitting.transfer import Transfer, roots
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Hold = Literal["zero-order", "none"]
 
 DELAY = "delay"

@@ -5,12 +5,9 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.fitting.partial_fractions import Structure
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 class PoleQuantities:

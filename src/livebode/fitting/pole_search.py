@@ -7,13 +7,11 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.fitting.partial_fractions import PartialFractions, Structure, poles_of
 from livebode.fitting.separable import Outputs, Separated, left_over, solve, stacked
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Kind = Literal["modal", "rational"]
 
 ORDER_MAX = {"modal": 20, "rational": 40}

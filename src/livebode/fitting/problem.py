@@ -9,13 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import RowArrays, UsageError, nearest_name
 from livebode.fitting.least_squares import Minimum, minimise
 from livebode.fitting.native import native_model
 from livebode.fitting.physical import EvaluationGrid, PhysicalModel
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _STEP = 1e-7
 _ENOUGH = 1e-4  # of chi²: a step of 1 % of sigma, after which the remaining error is far smaller

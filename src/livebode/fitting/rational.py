@@ -7,15 +7,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import FitError, Parameters, Response, Responses, UsageError
-from livebode.core.parameters import OK
+from livebode.arrays import Complex, Floats
+from livebode.core import OK, FitError, Parameters, Response, Responses, UsageError
 from livebode.fitting.fitter import measured_of
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import NO_RESPONSE, NOT_SEEN
 from livebode.fitting.weighing import chi_squared, own_epsilon, squares, weights
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Method = Literal["levy", "sanathanan-koerner", "maximum likelihood"]
 
 _ROUNDS = 20

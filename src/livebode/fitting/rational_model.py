@@ -6,15 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from livebode.core import Parameters
-from livebode.core.installing import not_installed
+from livebode.arrays import Complex, Floats
+from livebode.core import Parameters, not_installed
 from livebode.fitting.hold import to_continuous
 from livebode.fitting.transfer import Transfer
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Response, Responses, SignalError
-from livebode.core.distributions import f_exceeded, sum_exceeded
+from livebode.arrays import Complex, Flags, Floats
+from livebode.core import Response, Responses, SignalError, f_exceeded, sum_exceeded
 from livebode.fitting.mean import RunningMean
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 BY_CHANCE = 0.01
 """Probability that recordings which differ by noise alone are reported as different, all lines together."""

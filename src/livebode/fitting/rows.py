@@ -7,33 +7,38 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.parameters import OK
+from livebode.arrays import Complex, Floats
+from livebode.core import OK
 from livebode.fitting.friction import held_by_friction
 from livebode.fitting.problem import Measured, Problem, Solution
 from livebode.fitting.weighing import chi_squared, lacks_more_than, own_epsilon, squares, weights
 from livebode.kernel import FitModel, FitRows, fit
+from livebode.language import Message
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-
-NO_RESPONSE = "no response"
-NOT_CONVERGED = "not converged"
-BOUND = "bound hit"
-NOT_SEEN = "not seen"
-NO_FIT = "model does not fit"
-FRICTION = "friction"
+NO_RESPONSE = Message("no response")
+NOT_CONVERGED = Message("not converged")
+BOUND = Message("bound hit")
+NOT_SEEN = Message("not seen")
+NO_FIT = Message("model does not fit")
+FRICTION = Message("friction")
 
 SENTENCES = {
-    OK: "the fit is valid",
-    NO_RESPONSE: "too few lines are valid for the model's free parameters",
-    NOT_CONVERGED: "the fit did not converge; the lines may not determine the model's parameters",
-    BOUND: "a parameter ended at its bound; the lines do not determine it",
-    NOT_SEEN: "the lines do not determine the model: a parameter is uncertain by more than half; take lines "
-    "around the resonance and the antiresonance, or fix parameters that are known",
-    NO_FIT: "the model differs from the response by more than half of it: the machine needs another model, or there is "
-    "no response",
-    FRICTION: "friction stops the machine and explains most of the model's error; move the axis, increase the "
-    "excitation, or free the model's viscous friction",
+    OK: Message("the fit is valid"),
+    NO_RESPONSE: Message("too few lines are valid for the model's free parameters"),
+    NOT_CONVERGED: Message("the fit did not converge; the lines may not determine the model's parameters"),
+    BOUND: Message("a parameter ended at its bound; the lines do not determine it"),
+    NOT_SEEN: Message(
+        "the lines do not determine the model: a parameter is uncertain by more than half; take lines around "
+        "the resonance and the antiresonance, or fix parameters that are known"
+    ),
+    NO_FIT: Message(
+        "the model differs from the response by more than half of it: the machine needs another model, or "
+        "there is no response"
+    ),
+    FRICTION: Message(
+        "friction stops the machine and explains most of the model's error; move the axis, increase the "
+        "excitation, or free the model's viscous friction"
+    ),
 }
 """The meaning of each status as text."""
 
@@ -261,7 +266,7 @@ def covariance(measured: Measured, found: Solution, eps: Floats, noise_dof: Floa
         unit = np.eye(matrix.shape[-1])
         finite = np.isfinite(scaled).all(axis=(1, 2))
         inverse = np.linalg.inv(np.where(finite[:, np.newaxis, np.newaxis], scaled, unit) + _ROUNDING * unit)
-        held = finite & (np.abs(inverse).max(axis=(1, 2)) < _CONDITION_MAX)
+        held = finite & (np.abs(inverse).max(axis=(1, 2), initial=0.0) < _CONDITION_MAX)
         inverse[~held] = np.nan
         inverse /= scale[:, :, np.newaxis] * scale[:, np.newaxis]
     return np.asarray(inverse @ scattered @ inverse)

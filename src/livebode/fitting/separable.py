@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.installing import needing
+from livebode.arrays import Complex, Floats
+from livebode.core import needing
 from livebode.fitting.partial_fractions import PartialFractions, Structure
 from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.problem import Measured, Solution
 from livebode.fitting.rows import covariance
 from livebode.fitting.weighing import epsilon_for, misfit_by, squares, weights
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _FIRST_EPSILON = 0.1
 _SAME = 0.01

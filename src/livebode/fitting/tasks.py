@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Responses
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FittedRows, fit_rows
-
-Floats = NDArray[np.float64]
 
 
 class FitTask(NamedTuple):

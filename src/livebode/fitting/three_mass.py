@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.fitting.chains import Chain
 from livebode.fitting.modal import chain_of, scan
 from livebode.fitting.physical import EvaluationGrid, Parameter, delay
 from livebode.fitting.polynomials import plus, times
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.language import Message
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +26,7 @@ class ThreeMass(Chain):
     ('Js', 'J2', 'J3', 'K1', 'K2', 'b1', 'b2', 'delay')
     """
 
-    name = "three-mass"
+    name = Message("three-mass")
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]

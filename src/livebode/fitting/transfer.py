@@ -6,19 +6,20 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex, Floats
 from livebode.core import FitError
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _APART = 1e-5  # poles nearer to each other than this share of their size are moved apart
 _TINY = 1e-300
 
 
 class Transfer(NamedTuple):
-    """N(s)/(s^integrators · D(s)): coefficients from the highest power on, shape (..., degree + 1)."""
+    """N(s)/(s^integrators · D(s)): coefficients from the highest power on, shape (..., degree + 1).
+
+    The shapes of both are broadcast, so that several numerators may share a denominator.
+    """
 
     numerator: Floats
     denominator: Floats
@@ -74,14 +75,16 @@ class Transfer(NamedTuple):
         if self.denominator.shape[-1] > 1:
             poles = self.poles()
             poles[poles == 0] = _TINY**0.1  # a pole that friction hardly moves: equivalent to an integrator
-            residues = (self._residues(poles) / poles)[..., np.newaxis]
+            weights = (self._residues(poles) / poles)[..., np.newaxis, :]
             poles = poles[..., np.newaxis] * tick
             end: Any = np.expm1(poles)
-            held = end
-            if late is not None:
+            sampled = 1 / ((z - 1)[..., np.newaxis, :] - end)
+            if late is None:
+                weights = weights * end[..., np.newaxis, :, 0]
+            else:
                 soon = np.expm1(poles * (1 - late))
-                held = soon + (end - soon) / z[..., np.newaxis, :]
-            found = np.sum(residues * held / ((z - 1)[..., np.newaxis, :] - end), axis=-2)
+                sampled *= soon + (end - soon) / z[..., np.newaxis, :]
+            found = (weights @ sampled)[..., 0, :]
         for order, weight in enumerate(self._at_rest(), 1):
             found = found + weight[..., np.newaxis] * _integrated(order, z, tick, late)
         if np.any(whole):

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.kernel import BeltGrid, belt_response
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 INERTIA, LOAD, STIFFNESS, DAMPING = range(4)
 """Order of the parameters, all as seen from the motor's shaft: Js and mL·r², kg m²; Keff·r², N m/rad; bs·r², N m s."""
@@ -18,7 +15,7 @@ def sampled(parameters: Floats, z: Complex, rate_hz: float) -> Complex:
     """Sampled response of (14) from torque to motor velocity, exact behind a zero-order hold, rad/s per N m.
 
     (14) is α/s + β·s/(s² + 2δ·s + ω²) with α = 1/(Js + m), β = 1/Js − α, m = mL·r²: a rigid body and one resonance.
-    `livebode.kernel.belt_twin` has its equation behind a zero-order hold.
+    `tests/twins/belt.py` has its equation behind a zero-order hold.
 
     Parameters
     ----------

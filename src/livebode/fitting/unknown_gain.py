@@ -7,14 +7,12 @@ from math import pi
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
 from livebode.fitting.modal import QUALITY, scan
 from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, delay
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.language import Message
 
 _HZ = (1e-4, 1e6)
 _RATIO = (1e-6, 2.0)
@@ -39,7 +37,7 @@ class TwoMassGain(PhysicalModel):
     """
 
     output: Literal["velocity", "position"] = "velocity"
-    name = "two-mass-gain"
+    name = Message("two-mass-gain")
 
     def __post_init__(self) -> None:
         if self.output not in ("velocity", "position"):
@@ -55,7 +53,7 @@ class TwoMassGain(PhysicalModel):
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
         return (
-            Parameter("gain", "rad/s² per unit of input", 1.0, 1e-12, 1e12),
+            Parameter("gain", Message("rad/s² per unit of input"), 1.0, 1e-12, 1e12),
             Parameter("antiresonance", "Hz", 10.0, *_HZ),
             Parameter("resonance", "Hz", 20.0, *_HZ),
             Parameter("antiresonance_damping", "", 0.05, *_RATIO),

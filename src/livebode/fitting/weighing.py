@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.fitting.problem import Measured
 from livebode.kernel import fit_epsilon
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _MANY = 1e9  # degrees of freedom of a sigma that is known
 

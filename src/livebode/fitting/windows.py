@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.fitting import two_masses
 from livebode.fitting.least_squares import minimise
 from livebode.kernel import BeltGrid, BeltRows, belt_each
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _SCANNED = 10
 _QUALITY = 10.0  # of the scanned resonances; Table I has it

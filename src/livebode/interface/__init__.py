@@ -3,3 +3,7 @@
 The names are those of `livebode` itself, which loads each module when its name is first used: a run needs no
 simulation.
 """
+
+from livebode.on_first_use import on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

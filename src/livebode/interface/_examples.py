@@ -12,8 +12,7 @@ from livebode.excitation import multisine
 from livebode.interface._run import Run
 from livebode.runtime import Destination, run
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
-from livebode.tables import Table
-from livebode.tables.parquet_writer import write_parquet
+from livebode.tables import Table, write_parquet
 
 _RATE_HZ, _WINDOW, _HOP = 4000.0, 400, 100
 _RUN_IN_S = 0.5  # until the response to the excitation repeats

@@ -9,8 +9,7 @@ from typing import Any
 
 from livebode.core import ConfigError
 from livebode.experiment_design import Design, choose
-from livebode.experiments.designing import design_experiment
-from livebode.experiments.experiment import Experiment
+from livebode.experiments import Experiment, design_experiment
 
 
 def design(

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, partial
 from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
-from livebode.analysis.averaged import Averaged, averaged
-from livebode.analysis.fits import fit_averaged
-from livebode.analysis.loop_report import loop_report
-from livebode.configuration.axis import Axis
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.machine_section import MachineSection
-from livebode.configuration.recorded import recorded_configuration, recorded_loop
+from livebode.analysis import Averaged, averaged, fit_averaged, loop_report
+from livebode.configuration import Axis, FitSection, MachineSection, recorded_configuration, recorded_loop
 from livebode.core import (
     Event,
     Lines,
@@ -24,13 +19,16 @@ from livebode.core import (
     PlotKind,
     Response,
     Responses,
+    UsageError,
     counted,
+    moment,
+    moments_by,
     plot_responses,
 )
-from livebode.core.clock import moment, moments_by
 from livebode.fitting import Fit
 from livebode.locations import Url, local_copy, location, shared_copy
 from livebode.margins import Margins
+from livebode.plugins import loaded, named
 from livebode.records import PARAMETERS, RunRecord
 from livebode.tables import Table
 
@@ -271,6 +269,27 @@ class Run:
         if loop is None:
             loop = recorded_loop(self._record.summary).build(self.lines.rate_hz)
         return loop_report(fit or self.fit(), self._averaged.words, responses, loop).margins
+
+    def analysis(self, name: str) -> Callable[..., Any]:
+        """The analysis of this name that a plug-in adds, to be called with its options (docs/how-to/plugin.md).
+
+        Raises
+        ------
+        UsageError
+            If no installed plug-in has it.
+        """
+        analyses = named("analyses")
+        if name not in analyses:
+            known = f"choose {', '.join(analyses)}" if analyses else "install the plug-in that has it"
+            raise UsageError(
+                "unknown-name",
+                f"there is no analysis {name!r}",
+                known,
+                argument="name",
+                value=name,
+                allowed=list(analyses),
+            )
+        return partial(loaded(analyses[name].function), self)
 
     def _section(self, given: Mapping[str, Any]) -> FitSection:
         data = {"source": {"log": str(self.path)}, "signals": {"output": "y"}}

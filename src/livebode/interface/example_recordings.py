@@ -5,7 +5,7 @@ The same files on every call: each recording has a fixed seed.
 
 from __future__ import annotations
 
-import shutil
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import resources
@@ -15,13 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import Block, Lines, OutputError
-from livebode.core.files import whole_directory, whole_files
-from livebode.core.writing import writing
+from livebode.core import Block, Lines, OutputError, remove_empty, whole_directory, whole_files, writing
 from livebode.excitation import chirp, multisine
-from livebode.export.delimited import write_columns, write_header
-from livebode.interface._example_hall import write_hall
+from livebode.export import write_columns, write_header
 from livebode.mimo import MatrixExcitation
+from livebode.plugins import named
 from livebode.simulation import (
     BeltAxis,
     Drive,
@@ -36,8 +34,7 @@ from livebode.simulation import (
     StrokeSequence,
     TensionLoss,
 )
-from livebode.tables import Table
-from livebode.tables.parquet_writer import write_parquet
+from livebode.tables import Table, write_parquet
 
 _RATE_HZ, _WINDOW = 4000.0, 400
 _SENSOR = Sensor(noise_rad_per_s=0.1)
@@ -51,8 +48,8 @@ _SIGNALS = ("w", "u", "velocity")
 class Example:
     """Recordings of one kind, their configurations, and the commands to begin with.
 
-    `recordings` are functions that simulate, by name of their files; `configurations` names of files; `lakes` functions
-    that write a directory, by its name.
+    `recordings` are functions that simulate, by name of their files; `configurations` names of files in the directory
+    example_files of `package`; `lakes` functions that write a directory, by its name.
     """
 
     about: str
@@ -60,6 +57,7 @@ class Example:
     configurations: tuple[str, ...]
     commands: tuple[str, ...]
     lakes: dict[str, Callable[[Path], None]] = field(default_factory=dict)
+    package: str = "livebode.interface"
 
     @property
     def files(self) -> list[str]:
@@ -176,16 +174,6 @@ EXAMPLES = {
         ("moving.toml",),
         ("livebode run moving.toml",),
     ),
-    "archive": Example(
-        "three recordings as an archive, one of which is of another kind",
-        {"standstill.csv": _standstill(1), "standstill-2.csv": _standstill(2), "chirp.csv": _single_chirp},
-        ("archive.toml", "archive-recipe.toml"),
-        (
-            "livebode archive run archive.toml",
-            "livebode archive list archive.toml",
-            "livebode archive list archive.toml --quarantined",
-        ),
-    ),
     "chirp": Example(
         "a single chirp, which does not repeat",
         {"chirp.csv": _single_chirp},
@@ -266,15 +254,8 @@ EXAMPLES = {
             "livebode tune runs/gantry-tune --entry velocity1/u1",
         ),
     ),
-    "hall": Example(
-        "a year of a hall with eight axes, as the lake of an archive",
-        {},
-        (),
-        ("livebode archive trend hall Keff", "livebode archive report hall"),
-        {"hall": write_hall},
-    ),
 }
-"""The examples by name."""
+"""livebode's own examples by name; those of plug-ins are of the same form (the group `examples`)."""
 
 
 def write_examples(names: list[str], folder: Path, *, force: bool = False) -> list[Path]:
@@ -283,11 +264,11 @@ def write_examples(names: list[str], folder: Path, *, force: bool = False) -> li
     Parameters
     ----------
     names
-        Of `EXAMPLES`.
+        Of examples of the plug-in group `examples`.
     folder
         Created if it is missing.
     force
-        Replace files with other content. A file that has this content already is left as it is.
+        Replace files with other content. A file that has this content already is left as it is, and a lake always.
 
     Returns
     -------
@@ -299,26 +280,32 @@ def write_examples(names: list[str], folder: Path, *, force: bool = False) -> li
     OutputError
         If one of the files exists with other content, or cannot be written. Nothing is written then.
     """
+    examples = named("examples")
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         with whole_files(folder, "example") as partial:
             for name in names:
-                _write(EXAMPLES[name], partial)
+                _write(examples[name], partial)
             files = [folder / path.name for path in sorted(partial.iterdir())]
             for path in files:
                 _check(path, partial / path.name, force)
         for name in names:
-            files += [_lake(folder / own, write, force) for own, write in EXAMPLES[name].lakes.items()]
+            files += [_lake(folder / own, write) for own, write in examples[name].lakes.items()]
     return files
 
 
-def _lake(path: Path, write: Callable[[Path], None], force: bool) -> Path:
-    """Write a lake; one that is there already is left as it is, because a lake contains the times of its commits."""
-    if path.exists() and not force:
-        if not (path / "runs" / "_delta_log").is_dir():
-            raise _exists(path)
+def _lake(path: Path, write: Callable[[Path], None]) -> Path:
+    """Write a lake; one that is there already is left as it is, because others may have written to it."""
+    if os.path.lexists(path):
+        if not (path / "tables" / "runs" / "_delta_log").is_dir():
+            raise OutputError(
+                "exists",
+                f"{str(path)!r} exists already, and is not a lake",
+                "choose another directory",
+                path=str(path),
+            )
         return path
-    with whole_directory(path, shutil.rmtree) as partial:
+    with whole_directory(path, remove_empty) as partial:
         write(partial)
     return path
 
@@ -330,7 +317,7 @@ def _write(example: Example, folder: Path) -> None:
         else:
             write_parquet(folder / name, simulate())
     for name in example.configurations:
-        text = (resources.files("livebode.interface") / "example_files" / name).read_text("utf-8")
+        text = (resources.files(example.package) / "example_files" / name).read_text("utf-8")
         (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 

@@ -1,4 +1,4 @@
-"""Two masses joined by a belt, behind a zero-order hold, in C; `livebode.kernel.belt_twin` defines them.
+"""Two masses joined by a belt, behind a zero-order hold, in C; `tests/twins/belt.py` defines them.
 
 Parameters are natural logarithms of what the motor's shaft sees: its inertia and that of the load, kg m²; stiffness,
 N m/rad; damping, N m s.
@@ -9,12 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from livebode.arrays import Complex, Floats
 from livebode.kernel import _native
-
-Floats = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 
 class BeltGrid(NamedTuple):

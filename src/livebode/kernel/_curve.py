@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from livebode.arrays import Floats
 from livebode.kernel import _native
-
-Floats = npt.NDArray[np.float64]
 
 
 class CurveShape(NamedTuple):

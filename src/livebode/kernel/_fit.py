@@ -1,23 +1,15 @@
-"""Drive models fitted to rows of responses, in C; `livebode.kernel.fit_twin` defines it."""
+"""Drive models fitted to rows of responses, in C; `tests/twins/fit.py` defines it."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from livebode.arrays import Complex, Flags, Floats, Integers
 from livebode.kernel import _native
 
-Floats = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Flags = npt.NDArray[np.bool_]
-Integers = npt.NDArray[np.int64]
-
 RIGID, TWO_MASS, TWO_MASS_GAIN = range(3)
-FITTED, NO_RESPONSE, NOT_CONVERGED, AT_BOUND, NOT_SEEN, NO_MODEL, FRICTION = range(7)
-"""Status of a row: fitted; too few lines; no minimum; a parameter at its bound; one uncertain by more than half; an
-error of the model above half of |G|; one above 3 %, of which a viscous friction explains more than half."""
 
 
 class FitModel(NamedTuple):
@@ -74,14 +66,16 @@ class FitRows(NamedTuple):
 
 
 class FitFound(NamedTuple):
-    """Results; values, covariance and epsilon are NaN where the status is not FITTED.
+    """Results; values, covariance and epsilon are NaN where the status is not 0.
 
     Attributes
     ----------
     values, covariance
         Shape (rows, parameters) and (rows, parameters, parameters).
     status
-        Shape (rows,).
+        Shape (rows,): 0 fitted; 1 too few lines; 2 no minimum; 3 a parameter at its bound; 4 one uncertain by more
+        than half; 5 an error of the model above half of |G|; 6 one above 3 %, of which a viscous friction explains more
+        than half.
     epsilon, chi2, dof
         Shape (rows,); chi2 by sigma alone.
     response

@@ -5,16 +5,16 @@ from typing import Final
 
 from livebode.kernel import _native
 
-VARIABLE: Final = "LIVEBODE_INSTRUCTION_SET"
+INSTRUCTION_SET_VARIABLE: Final = "LIVEBODE_INSTRUCTION_SET"
 # In the order of lb_instruction_set; 0 is "the best".
 NAMES: Final = ("best", "baseline", "avx2", "avx512")
 
 
-def chosen() -> int:
+def chosen_instruction_set() -> int:
     """The number of the set that a new SlidingDFT or line stage uses: that of the environment, by default the best."""
-    name = os.environ.get(VARIABLE, "best")
+    name = os.environ.get(INSTRUCTION_SET_VARIABLE, "best")
     if name not in NAMES:
-        raise ValueError(f"{VARIABLE}={name!r} is not one of {', '.join(NAMES)}")
+        raise ValueError(f"{INSTRUCTION_SET_VARIABLE}={name!r} is not one of {', '.join(NAMES)}")
     return NAMES.index(name)
 
 
@@ -34,7 +34,7 @@ def instruction_set() -> str:
     ValueError
         The environment names an unknown instruction set.
     """
-    return NAMES[chosen() or _native.best_instruction_set()]
+    return NAMES[chosen_instruction_set() or _native.best_instruction_set()]
 
 
 def instruction_sets() -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""From spectra at lines to frequency responses with their scatter, in C; `livebode.kernel.line_twin` defines it.
+"""From spectra at lines to frequency responses with their scatter, in C; `tests/twins/lines.py` defines it.
 
 Numerator and denominator of an estimate are the spectra of the output and of another signal, each times
 conj(reference). Windows one period apart are one series: every place in the period has moments of its own.
@@ -9,14 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from livebode.arrays import Complex, Flags, Floats, Integers
 from livebode.kernel import _native
-
-Floats = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Flags = npt.NDArray[np.bool_]
-Integers = npt.NDArray[np.int64]
 
 MEANS, SCATTER = 10, 4
 NOISE_SCATTER, NOISE_MOVING, NOISE_LARGER = range(3)

@@ -1,4 +1,4 @@
-"""From spectra of several experiments to matrices of responses, in C; `livebode.kernel.matrix_twin` defines it.
+"""From spectra of several experiments to matrices of responses, in C; `tests/twins/matrices.py` defines it.
 
 Windows of one place in the experiments are `places` rows apart, in a ring of rows.
 """
@@ -8,14 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from livebode.arrays import Complex, Flags, Floats, Integers
 from livebode.kernel import _native
-
-Floats = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Flags = npt.NDArray[np.bool_]
-Integers = npt.NDArray[np.int64]
 
 
 class MatrixStage(NamedTuple):

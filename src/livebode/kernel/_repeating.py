@@ -1,4 +1,4 @@
-"""Verdicts on lines from whole periods of the signals, in C; `livebode.estimation.repeating_twin` defines them."""
+"""Verdicts on lines from whole periods of the signals, in C; `tests/twins/repeating.py` defines them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from livebode.arrays import Complex, Flags, Floats, Integers
 from livebode.kernel import _native
 
-Floats = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Flags = npt.NDArray[np.bool_]
 Bytes = npt.NDArray[np.uint8]
-Integers = npt.NDArray[np.int64]
 
 REASONS = 3
 """Reasons against a line: distortion, mains hum, steps of the output's sensor."""

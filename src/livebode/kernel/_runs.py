@@ -1,4 +1,4 @@
-"""Integers in runs of a Parquet file, in C; `livebode.kernel.runs_twin` defines them."""
+"""Integers in runs of a Parquet file, in C; `tests/twins/runs.py` defines them."""
 
 from __future__ import annotations
 

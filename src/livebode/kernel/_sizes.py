@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from livebode.arrays import Floats
 from livebode.kernel import _instructions, _native
-
-Floats = npt.NDArray[np.float64]
 
 
 def largest_sizes(samples: Floats, begun: int, window: int) -> Floats:
@@ -34,5 +32,5 @@ def largest_sizes(samples: Floats, begun: int, window: int) -> Floats:
     found = np.empty((signals, 1 + max(0, -((begun - count) // window))))
     if count > 1 and samples.strides[1] != samples.itemsize:
         samples = np.ascontiguousarray(samples)
-    _native.largest_sizes(samples, begun, window, _instructions.chosen(), found)
+    _native.largest_sizes(samples, begun, window, _instructions.chosen_instruction_set(), found)
     return found

@@ -72,7 +72,7 @@ class SlidingDFT(_native.Engine):
             self._dtype == np.float64,
             number,
             self._damping,
-            _instructions.chosen(),
+            _instructions.chosen_instruction_set(),
         )
 
     @property

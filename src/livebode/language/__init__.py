@@ -4,26 +4,6 @@ The English sentences are the keys. Translators edit `catalogues/*.po`; ``make c
 files that Python and the page read at run time. Terminal, log, record and JSON output are always English.
 """
 
-from livebode.language.catalogue import ENGLISH, Catalogue, available, catalogue
-from livebode.language.negotiation import for_page, negotiated
-from livebode.language.recognition import recognised
-from livebode.language.translation import current_language, date, in_language, listed, marked, number, numerals, tr, trn
+from livebode.on_first_use import on_first_use
 
-__all__ = [
-    "ENGLISH",
-    "Catalogue",
-    "available",
-    "catalogue",
-    "current_language",
-    "date",
-    "for_page",
-    "in_language",
-    "listed",
-    "marked",
-    "negotiated",
-    "number",
-    "numerals",
-    "recognised",
-    "tr",
-    "trn",
-]
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from functools import cache
 
-from livebode.language.catalogue import ENGLISH, available, catalogue
+from livebode.language._catalogue import ENGLISH, available, catalogue
 
 _HEADER_LETTERS = 500
 _PREFERENCES_MAX = 32
@@ -43,7 +43,7 @@ def negotiated(asked: str, configured: str | None, accepted: str) -> str:
 
 
 @cache
-def for_page(code: str) -> bytes:
+def catalogue_for_page(code: str) -> bytes:
     """The catalogue as JSON, with the names of all languages."""
     found = asdict(catalogue(code)) | {"languages": available()}
     return json.dumps(found, ensure_ascii=False).encode()

@@ -10,7 +10,7 @@ from datetime import datetime
 from numbers import Real
 from typing import Any
 
-from livebode.language.catalogue import ENGLISH, Catalogue, catalogue
+from livebode.language._catalogue import ENGLISH, Catalogue, catalogue
 
 _USED: ContextVar[Catalogue] = ContextVar("language of report and page", default=ENGLISH)
 
@@ -58,19 +58,14 @@ def trn(one: str, many: str, number: int, /, **values: Any) -> str:
     return _FORMATTER.vformat(current_language().form(one, many, number), (), values | {"n": number})
 
 
-def marked(text: str) -> str:
-    """The English text itself, which is translated where it is shown (`recognised`)."""
-    return text
-
-
 def number(value: Any, spec: str = "") -> str:
     """A number in the format `spec`, with the decimal sign of the language."""
     return numerals(format(value, spec))
 
 
-def numerals(text: str) -> str:
-    """A formatted English number with the decimal sign and the separator of the language."""
-    language = current_language()
+def numerals(text: str, language: Catalogue | None = None) -> str:
+    """A formatted English number with the decimal sign and the separator of the language, by default that in use."""
+    language = language or current_language()
     return text.translate({ord("."): language.decimal, ord(","): language.group})
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import logging
 import os
-import shutil
 import tempfile
 import threading
 import weakref
@@ -15,8 +14,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from livebode.core import LivebodeError, LocationError
-from livebode.core.writing import why
+from livebode.core import LivebodeError, LocationError, remove_created, why
 from livebode.locations.storage import in_pieces, opened, reporting
 from livebode.locations.url import Url, location
 
@@ -128,7 +126,7 @@ def temporary_place(url: Url) -> Path:
 
 def remove_temporary(path: Path) -> None:
     """Remove what is there, and the directory that it is in."""
-    shutil.rmtree(path.parent, ignore_errors=True)
+    remove_created(path.parent)
     _present.pop(str(path.parent), None)
 
 

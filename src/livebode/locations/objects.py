@@ -6,8 +6,7 @@ import os
 import secrets
 from pathlib import Path
 
-from livebode.core import LocationError, files
-from livebode.core.writing import writing
+from livebode.core import LocationError, files, remove_created, writing
 from livebode.locations.storage import make_parent, opened, reporting
 from livebode.locations.url import Url, location
 
@@ -80,4 +79,4 @@ def _write_here(path: Path, data: bytes, new: bool) -> None:
         except FileExistsError:
             raise LocationError("exists", f"{path} exists already", "choose another path", path=str(path)) from None
         finally:
-            complete.unlink()
+            remove_created(complete)

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from livebode.core import LivebodeError, LocationError
-from livebode.core.installing import not_installed
+from livebode.core import LivebodeError, LocationError, not_installed
 from livebode.locations.url import Url
 
 _logger = logging.getLogger(__name__)

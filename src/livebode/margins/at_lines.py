@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Loop, Responses
-
-Floats = NDArray[np.float64]
 
 
 def peak_sensitivity_at_lines(responses: Responses, loop: Loop, c: float = 2.0) -> tuple[Floats, Floats, Floats]:

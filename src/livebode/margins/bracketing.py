@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
+
 Function = Callable[[Floats], Floats]
 
 _STEPS_MAX = 200  # each halves a bracket: enough for any two numbers that are not 1e60 apart

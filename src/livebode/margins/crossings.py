@@ -8,11 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.margins.bracketing import find_minima, find_roots
 from livebode.margins.open_loop import OpenLoop
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 BANDWIDTH = 10 ** (-3 / 20)
 """|T| at the bandwidth: 3 dB down."""

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.kernel import FeedbackSeries
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _DEGREE = 15
 _PIECES, _PIECES_MAX = 128, 4096

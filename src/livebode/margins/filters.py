@@ -8,8 +8,7 @@ from math import atan, pi, sqrt, tan
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import UsageError
-from livebode.core.model import Algebra
+from livebode.core import Algebra, UsageError
 
 Polynomial = tuple[float, float, float]
 

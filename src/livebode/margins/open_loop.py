@@ -9,15 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import FitError, Loop, Model
-from livebode.fitting import EvaluationGrid, PhysicalModel
-from livebode.fitting.native import described
-from livebode.fitting.physical import Hold
+from livebode.fitting import EvaluationGrid, Hold, PhysicalModel, described
 from livebode.kernel import FeedbackSeries, FitModel, MarginGrid
 from livebode.margins.feedback import series_of
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _LOWEST = 1e-7  # of the rate: far below every corner of a drive's controllers
 _PER_DECADE_OUTSIDE, _PER_DECADE = 30, 150

@@ -7,16 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Parameters, UsageError
 from livebode.kernel import MarginGrid, fit_margins
+from livebode.margins._margins import EXTRAPOLATED, INTERPOLATED, NAMES, NONE, UNSTABLE, Margins
 from livebode.margins.crossings import Crossings, crossings, nearest_to_minus_one
-from livebode.margins.margins import EXTRAPOLATED, INTERPOLATED, NAMES, NONE, UNSTABLE, Margins
 from livebode.margins.open_loop import OpenLoop
 from livebode.margins.slopes import FittedValues, Slopes, moved, peak_moved, slopes
 from livebode.margins.stability import stable
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _DB = 20 / np.log(10)
 _ROWS = 64  # evaluated at once: some 2 MB a grid

@@ -7,11 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.margins.crossings import Crossings
 from livebode.margins.open_loop import OpenLoop
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _STEP = 1e-5
 _PEAK_STEP = 1e-3

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
+from livebode.arrays import Complex, Floats
 
 
 def stable(open_loop: Complex, frequency_hz: Floats, unstable_poles: NDArray[np.int64] | int = 0) -> NDArray[np.bool_]:

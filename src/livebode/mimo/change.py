@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import FitError, GridError, MatrixResponses, widened
-from livebode.core.installing import needing
+from livebode.arrays import Complex, Floats
+from livebode.core import FitError, GridError, MatrixResponses, needing, widened
+from livebode.language import Message
+from livebode.mimo.line_correlation import INDEPENDENT, LineCorrelation, RowSteps
 from livebode.mimo.mean import mean_matrix
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 ALPHA = 0.01
 """Probability of a change reported where there is none."""
@@ -45,9 +44,13 @@ class EntryChange:
     @property
     def sentence(self) -> str:
         """As text."""
-        return (
-            f"response {self.output}/{self.input} changed at {self.frequency_hz:g} Hz by {100 * self.share:.3g} ± "
-            f"{100 * self.bound:.2g} %"
+        return Message(
+            "response {output}/{input} changed at {line_hz:g} Hz by {percent:.3g} ± {bound:.2g} %",
+            output=self.output,
+            input=self.input,
+            line_hz=self.frequency_hz,
+            percent=100 * self.share,
+            bound=100 * self.bound,
         )
 
 
@@ -82,21 +85,27 @@ class MatrixChange:
         """The result as text."""
         if self.changed:
             return self.entries[0].sentence
-        return (
-            f"no entry changed by more than chance explains ({self.lines} lines, false alarms {100 * self.alpha:g} %)"
+        return Message(
+            "no entry changed by more than chance explains ({lines} lines, false alarms {false_percent:g} %)",
+            lines=self.lines,
+            false_percent=100 * self.alpha,
         )
 
 
-def compare_matrices(before: MatrixResponses, after: MatrixResponses, alpha: float = ALPHA) -> MatrixChange:
+def compare_matrices(
+    before: MatrixResponses, after: MatrixResponses, alpha: float = ALPHA, *, steps: RowSteps | None = None
+) -> MatrixChange:
     """Whether the matrix of a machine changed, over all entries and lines at once.
 
     Wilks' Λ = |d·N̂|/|d·N̂ + D·S⁻¹·D*| of the difference D at each line, N̂ the noise of both and S their spread. For
     Gaussian noise −ln Λ is a sum of −ln of Beta variables (Gupta, Ann. Math. Statist. 36(1), 1965, for real ones;
     Beta(d − j + 1, inputs) for complex ones). It is summed over the lines, and its tail is that of the gamma
-    distribution with the same first three cumulants. False alarms therefore have the rate `alpha` at any number of
-    repetitions. Where noise and spread both differ between the two, d is Welch's approximation.
+    distribution with the same first three cumulants, which contain how far the errors of the lines are alike
+    (`RowSteps`). False alarms therefore have the rate `alpha` at any number of repetitions. Where noise and spread both
+    differ between the two, d is Welch's approximation.
 
-    Delay, bias: none. Noise is taken as independent from line to line, and the two matrices as of different samples.
+    Delay, bias: none. The two matrices are taken as of different samples. With too few rows to see how far lines are
+    alike, half of the noise of each is taken as common to all, so that only large changes are reported.
 
     Parameters
     ----------
@@ -104,6 +113,8 @@ def compare_matrices(before: MatrixResponses, after: MatrixResponses, alpha: flo
         Of the same signals and lines; the mean of the rows of each that share no window (`mean_matrix`).
     alpha
         Rate of false alarms of a comparison.
+    steps
+        By which errors of the lines are alike. Default: those of both.
 
     Raises
     ------
@@ -117,7 +128,9 @@ def compare_matrices(before: MatrixResponses, after: MatrixResponses, alpha: flo
     >>> compare_matrices(responses, responses).sentence
     'no entry changed by more than chance explains (7 lines, false alarms 1 %)'
     """
-    pair = MatrixPair.of(mean_matrix(before), mean_matrix(after))
+    if steps is None:
+        steps = RowSteps.of(before).joined(RowSteps.of(after))
+    pair = MatrixPair.of(mean_matrix(before), mean_matrix(after), steps)
     entries = sorted(pair.entries(), key=lambda one: one.probability)
     return MatrixChange(pair.probability, alpha, len(pair.frequency_hz), tuple(entries))
 
@@ -136,6 +149,10 @@ class MatrixPair:
         Complex degrees of freedom of the noise.
     size
         |response before|, shape of `difference`.
+    use
+        Which lines these are, of all.
+    steps
+        By which errors of the lines are alike, in units of the noise and spread before.
     """
 
     outputs: tuple[str, ...]
@@ -146,13 +163,16 @@ class MatrixPair:
     spread: Complex
     dof: float
     size: Floats
+    use: NDArray[np.bool_]
+    steps: RowSteps
+    before: MatrixResponses
 
     @classmethod
-    def of(cls, before: MatrixResponses, after: MatrixResponses) -> MatrixPair:
+    def of(cls, before: MatrixResponses, after: MatrixResponses, steps: RowSteps) -> MatrixPair:
         """Of two matrices of one row each."""
         same = (before.outputs, before.inputs) == (after.outputs, after.inputs)
         a, b = before.lines, after.lines
-        if not same or a.rate_hz != b.rate_hz or not np.array_equal(a.frequency_hz, b.frequency_hz):
+        if not same or not a.alike(b):
             raise GridError(
                 "not-alike",
                 "the matrices have different lines or signals, so their entries cannot be compared",
@@ -180,7 +200,7 @@ class MatrixPair:
         difference = after.value[0, use] - before.value[0, use]
         return cls(
             before.outputs, before.inputs, before.frequency_hz[use], difference, noises[0] + noises[1], spread, dof,
-            np.abs(before.value[0, use]),
+            np.abs(before.value[0, use]), use, steps, before,
         )  # fmt: skip
 
     @property
@@ -191,8 +211,12 @@ class MatrixPair:
     @property
     def probability(self) -> float:
         """That chance alone gives as large a difference."""
-        lines = len(self.frequency_hz)
-        return tail(float(self.statistic.sum()), lines, len(self.outputs), len(self.inputs), self.dof)
+        lines, alike = len(self.frequency_hz), self._alike(self.steps, slice(None), slice(None))
+        return tail(float(self.statistic.sum()), lines, len(self.outputs), len(self.inputs), self.dof, alike)
+
+    def _alike(self, steps: RowSteps, outputs: slice, inputs: slice) -> LineCorrelation:
+        noise, spread = self.before.noise[0, self.use], self.before.spread[0, self.use]
+        return steps.correlation(self.use, noise[:, outputs, outputs], spread[:, inputs, inputs])
 
     @property
     def sigma(self) -> Floats:
@@ -209,7 +233,8 @@ class MatrixPair:
                 part = (slice(None), slice(o, o + 1), slice(i, i + 1))
                 noise, spread = self.noise[:, o : o + 1, o : o + 1], self.spread[:, i : i + 1, i : i + 1]
                 total = float(_wilks(self.difference[part], noise, spread, self.dof).sum())
-                chance = tail(total, len(self.frequency_hz), 1, 1, self.dof)
+                alike = self._alike(self.steps.entry(o, i), slice(o, o + 1), slice(i, i + 1))
+                chance = tail(total, len(self.frequency_hz), 1, 1, self.dof, alike)
                 off = np.abs(self.difference[:, o, i])
                 at = int(np.argmax(off / radius[:, o, i]))
                 size = self.size[at, o, i]
@@ -242,7 +267,9 @@ def _wilks(difference: Complex, noise: Complex, spread: Complex, dof: float) -> 
     return np.asarray(np.linalg.slogdet(unit)[1])
 
 
-def tail(total: float, lines: int, outputs: int, inputs: int, dof: float) -> float:
+def tail(
+    total: float, lines: int, outputs: int, inputs: int, dof: float, alike: LineCorrelation = INDEPENDENT
+) -> float:
     """Probability that −ln Λ summed over the lines exceeds this by chance.
 
     >>> round(tail(2.0, 1, 1, 1, 10.0), 6) == round(float(np.exp(-20.0)), 6)
@@ -255,6 +282,7 @@ def tail(total: float, lines: int, outputs: int, inputs: int, dof: float) -> flo
     mean, variance, third = (
         lines * float(np.sum((-1) ** n * (polygamma(n, low) - polygamma(n, low + inputs)) * -1)) for n in range(3)
     )
+    variance, third = alike.second * variance, alike.third * third
     shape = 4 * variance**3 / third**2
     scale = third / (2 * variance)
     begin = mean - shape * scale

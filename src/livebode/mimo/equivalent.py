@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from livebode.core import MatrixResponses, Responses
 from livebode.mimo.settings import MatrixLoop
-
-Complex = NDArray[np.complex128]
 
 
 def equivalent_plant(responses: MatrixResponses, loop: MatrixLoop, output: str, input: str) -> Responses:

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
+from livebode.arrays import Complex, Flags, Floats
 
 _SURE = 3.0
 """An input moves by itself where the smallest singular value is this many times what noise alone has."""
@@ -43,7 +41,7 @@ class Windows:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class MatrixEstimate:
     """As in MatrixResponses."""
 
     value: Complex
@@ -55,7 +53,7 @@ class Estimate:
     reason: NDArray[np.int8]
 
 
-def estimate(windows: Windows, average: bool, condition_max: float) -> Estimate:
+def estimate(windows: Windows, average: bool, condition_max: float) -> MatrixEstimate:
     """Q = S_yr·S_dr⁻¹ over the experiments, with the noise of y − Q·d between their repetitions.
 
     The error of Q is V·P for noise V in the windows of y − Q·d, where P = R*·S_dr⁻¹. Its covariance is the Kronecker
@@ -92,7 +90,7 @@ def estimate(windows: Windows, average: bool, condition_max: float) -> Estimate:
         coherence = signal / (signal + own)
     spread = _star(solution) @ solution * of_one[:, None, None, None]
     spread = np.swapaxes(spread, 2, 3)  # E δ_i·conj(δ_j) is that of the rows of P
-    return Estimate(value, noise, spread, dof, coherence, condition, reason)
+    return MatrixEstimate(value, noise, spread, dof, coherence, condition, reason)
 
 
 def _mean(spectra: Complex, used: NDArray[np.int64]) -> Complex:

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Lines, UsageError
-from livebode.excitation import Phases, multisine
-from livebode.excitation.multisine import each
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.excitation import Phases, each, multisine
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import MatrixResponses
-from livebode.core.distributions import normal_quantile
-from livebode.core.installing import needing
+from livebode.arrays import Floats
+from livebode.core import MatrixResponses, needing, normal_quantile
+from livebode.language import Message
 from livebode.mimo.change import ALPHA, MatrixChange, compare_matrices
 from livebode.mimo.gantry_fit import INERTIA, MASS, MOMENT, PARAMETERS, GantryFit, fit_gantry
+from livebode.mimo.line_correlation import RowSteps
 from livebode.simulation import Gantry
 
-Floats = NDArray[np.float64]
-
-CART_PLACE = "cart's place"
+CART_PLACE = Message("cart's place")
 _CAUSES_MAX = 3
 
 
@@ -46,15 +44,23 @@ class Cause:
     explained: float
 
     @property
-    def sentence(self) -> str:
+    def sentence(self) -> Message:
         """As text."""
         if self.part == CART_PLACE:
-            return f"the cart is {abs(self.amount):.3g} ± {self.bound:.2g} m from its specified place"
-        way = "less" if self.amount < 0 else "more"
-        if self.before > 0:
-            share, bound = 100 * abs(self.amount) / self.before, 100 * self.bound / self.before
-            return f"{self.part} is {share:.3g} ± {bound:.2g} % {way} than in the baseline"
-        return f"{self.part} is {abs(self.amount):.3g} ± {self.bound:.2g} {self.unit} {way} than in the baseline"
+            return Message(
+                "the cart is {distance:.3g} ± {bound:.2g} m from its specified place",
+                distance=abs(self.amount),
+                bound=self.bound,
+            )
+        scale, unit = (100 / self.before, "%") if self.before > 0 else (1.0, self.unit)
+        return Message(
+            "{part} is {size:.3g} ± {bound:.2g} {unit} {way} than in the baseline",
+            part=self.part,
+            size=scale * abs(self.amount),
+            bound=scale * self.bound,
+            unit=unit,
+            way=Message("less") if self.amount < 0 else Message("more"),
+        )
 
 
 @dataclass(frozen=True)
@@ -99,12 +105,13 @@ class GantryChange:
     @property
     def sentences(self) -> list[str]:
         """The result as text."""
-        found = [cause.sentence for cause in self.causes]
+        found: list[str] = [cause.sentence for cause in self.causes]
         if self.moved and len(found) == 1:
-            return [f"{found[0]}: compare at the same place, or specify the place of the cart"]
+            return [Message("{change}: compare at the same place, or specify the place of the cart", change=found[0])]
         if self.entries is not None and self.entries.changed:
             found.append(self.entries.sentence)
-        return found or [f"no parameter of the gantry changed (false alarms {100 * self.alpha:g} %)"]
+        percent = 100 * self.alpha
+        return found or [Message("no parameter of the gantry changed (false alarms {percent:g} %)", percent=percent)]
 
 
 def compare_gantries(
@@ -114,6 +121,7 @@ def compare_gantries(
     *,
     cart_m: tuple[float, float] | None = None,
     alpha: float = ALPHA,
+    steps: RowSteps | None = None,
 ) -> GantryChange:
     """Which part of a gantry changed: its parameters are fitted to both matrices and their difference is explained.
 
@@ -136,6 +144,8 @@ def compare_gantries(
         Places of the cart before and after, if they differ; by default both are that of the description.
     alpha
         Rate of false alarms of a comparison.
+    steps
+        As in `compare_matrices`.
 
     Raises
     ------
@@ -151,7 +161,7 @@ def compare_gantries(
     """
     places = cart_m or (description.cart_m, description.cart_m)
     same = places[0] == places[1]
-    entries = compare_matrices(before, after, alpha) if same else None
+    entries = compare_matrices(before, after, alpha, steps=steps) if same else None
     first = fit_gantry(before, description)
     second = fit_gantry(after, description)
     kilograms = description.cart_kg
@@ -220,9 +230,9 @@ def _directions(known: _Known, amount: float = 0.0) -> Iterator[tuple[str, Float
     for i, (name, _) in enumerate(PARAMETERS):
         if i not in (MASS, MOMENT, INERTIA):
             yield name, _vector({i: 1.0})
-    yield "beam's mass", _vector({MASS: 1.0})
-    yield "beam's inertia", _vector({INERTIA: 1.0})
-    yield "cart's mass", _vector({MASS: 1.0, MOMENT: place, INERTIA: place**2})
+    yield Message("beam's mass"), _vector({MASS: 1.0})
+    yield Message("beam's inertia"), _vector({INERTIA: 1.0})
+    yield Message("cart's mass"), _vector({MASS: 1.0, MOMENT: place, INERTIA: place**2})
     yield CART_PLACE, _vector({MOMENT: kilograms, INERTIA: kilograms * (2 * place + amount)})
 
 

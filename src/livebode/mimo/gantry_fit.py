@@ -5,30 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import MatrixResponses, UsageError
-from livebode.core.distributions import normal_quantile
-from livebode.core.installing import needing
+from livebode.arrays import Complex, Floats
+from livebode.core import MatrixResponses, UsageError, needing, normal_quantile
+from livebode.language import Message
 from livebode.mimo.least_squares import minimise
 from livebode.mimo.whitening import Weighted
 from livebode.simulation import Gantry
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-
 PARAMETERS = (
-    ("motor inertia", "kg m²"),
-    ("motor friction", "N m s"),
-    ("left belt's stiffness", "N/m"),
-    ("left belt's damping", "N s/m"),
-    ("right belt's stiffness", "N/m"),
-    ("right belt's damping", "N s/m"),
+    (Message("motor inertia"), "kg m²"),
+    (Message("motor friction"), "N m s"),
+    (Message("left belt's stiffness"), "N/m"),
+    (Message("left belt's damping"), "N s/m"),
+    (Message("right belt's stiffness"), "N/m"),
+    (Message("right belt's damping"), "N s/m"),
     ("mass of beam and cart", "kg"),
     ("moment of the cart", "kg m"),
     ("yaw inertia", "kg m²"),
-    ("yaw stiffness", "N m"),
-    ("yaw damping", "N m s"),
+    (Message("yaw stiffness"), "N m"),
+    (Message("yaw damping"), "N m s"),
 )
 """What the two torques and the two speeds determine, and units. The moment of the cart is its mass times its place, the
 yaw inertia that of the beam plus mass times square of the place."""

@@ -6,14 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core.distributions import normal_quantile
-from livebode.core.installing import needing
+from livebode.arrays import Complex, Floats
+from livebode.core import needing, normal_quantile
 from livebode.mimo.whitening import Weighted, stacked
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Model = Callable[[Floats], Complex]
 """At parameters: the response (lines, entries), or its slopes (lines, entries, parameters)."""
 

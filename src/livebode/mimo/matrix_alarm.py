@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from livebode.core import Event, MatrixResponses
-from livebode.core.clock import moment
+from livebode.core import Event, MatrixResponses, moment
+from livebode.language import Message
 from livebode.mimo.change import EntryChange, MatrixPair
 from livebode.mimo.gantry_change import CART_PLACE, Cause
 
@@ -75,12 +75,25 @@ class MatrixAlarm:
 
     def event(self, kind: str, since: dict[str, Any]) -> Event:
         """The change or its correction, first seen there."""
-        begin = f"Since {moment(since['since_s'])}" if kind == "change" else "In the newest matrix"
         entry = self.entry
-        parts = [_with_article(cause.sentence) for cause in self.causes]
-        reference = "" if parts else " from the baseline"
-        size = f"{100 * entry.share:.3g} ± {100 * entry.bound:.2g} % at {entry.frequency_hz:g} Hz"
-        parts.append(f"the response {_name(entry)} differs{reference} by {size}")
+        changes = [_change_of(cause) for cause in self.causes]
+        facts = {
+            "response": _name(entry),
+            "percent": 100 * entry.share,
+            "bound": 100 * entry.bound,
+            "line_hz": entry.frequency_hz,
+        }
+        if changes:
+            by = Message("the response {response} differs by {percent:.3g} ± {bound:.2g} % at {line_hz:g} Hz", **facts)
+        else:
+            by = Message(
+                "the response {response} differs from the baseline by {percent:.3g} ± {bound:.2g} % at {line_hz:g} Hz",
+                **facts,
+            )
+        changes.append(by)
+        message = Message("In the newest matrix {differences}.", differences=changes)
+        if kind == "change":
+            message = Message("Since {since} {differences}.", since=moment(since["since_s"]), differences=changes)
         details = {
             "what": "matrix",
             "entry": _name(entry),
@@ -91,13 +104,13 @@ class MatrixAlarm:
             "changes": [_change(one) for one in self.causes],
             "probability": self.probability,
         }
-        return Event(kind, self.sample, self.time_s, f"{begin} {'; '.join(parts)}.", details | since)
+        return Event(kind, self.sample, self.time_s, message, details | since)
 
 
 def cleared(one: MatrixResponses) -> Event:
     """This matrix agrees with the baseline again."""
     time_s = float(one.time_s[0])
-    message = f"At {moment(time_s)} the responses agree with the baseline again."
+    message = Message("At {time} the responses agree with the baseline again.", time=moment(time_s))
     return Event("change-cleared", int(one.sample[0]), time_s, message, {"what": "matrix"})
 
 
@@ -118,5 +131,6 @@ def _name(entry: EntryChange) -> str:
     return f"{entry.output}/{entry.input}"
 
 
-def _with_article(sentence: str) -> str:
-    return sentence if sentence.startswith("the ") else f"the {sentence}"
+def _change_of(cause: Cause) -> Message:
+    """The change of a part, whose name has no article; that of the place names the cart."""
+    return cause.sentence if cause.part == CART_PLACE else Message("the {change}", change=cause.sentence)

@@ -6,16 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.fitting.pole_search import Kind, possible, reduced_structures
-from livebode.fitting.separable import Outputs, Separated, pole_price, solve
+from livebode.fitting import Kind, Outputs, Separated, pole_price, possible, reduced_structures, solve
 from livebode.mimo.least_squares import MatrixMinimum
 from livebode.mimo.refinement import refined
 from livebode.mimo.whitening import Weighted
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Fitted = tuple[Separated, MatrixMinimum]
 
 _ROUNDS = 2

@@ -7,17 +7,12 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import FitError, MatrixResponses, Parameters, Responses
-from livebode.fitting.common_poles import CommonPoles, assembled, check_model, outputs_of
-from livebode.fitting.physical import Hold
-from livebode.fitting.pole_search import Kind, search
-from livebode.fitting.separable import Separated
+from livebode.fitting import CommonPoles, Hold, Kind, Separated, assembled, check_model, outputs_of, search
 from livebode.mimo.mode_choice import chosen
 from livebode.mimo.refinement import refined
 from livebode.mimo.whitening import Weighted
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from livebode.core import Event, FitError, MatrixResponses, Stage, StatefulBase,
 from livebode.mimo.change import MatrixPair, tail
 from livebode.mimo.gantry_change import Cause, compare_gantries
 from livebode.mimo.gantry_fit import fit_gantry
+from livebode.mimo.line_correlation import RowSteps
 from livebode.mimo.matrix_alarm import MatrixAlarm, cleared
 from livebode.mimo.mean import mean_matrix
 from livebode.simulation import Gantry
@@ -75,7 +76,7 @@ class MatrixMonitor(StatefulBase):
                 argument="false_alarm_interval_s",
                 value=false_alarm_interval_s,
             )
-        self._baseline = mean_matrix(baseline)
+        self._baseline, self._steps = mean_matrix(baseline), RowSteps.of(baseline)
         self.false_alarm_interval_s, self._description = false_alarm_interval_s, description
         self._check_baseline()
         self._judged, self._judged_samples, self._changes, self._cleared = -1, 0, 0, 0
@@ -132,7 +133,7 @@ class MatrixMonitor(StatefulBase):
         return bool((responses.valid[row] & self._baseline.valid[0]).all(axis=1).any())
 
     def _judge(self, one: MatrixResponses) -> list[Event]:
-        pair = MatrixPair.of(self._baseline, one)
+        pair = MatrixPair.of(self._baseline, one, self._steps)
         samples, sample = int(one.sample[0] - one.first[0] + 1), int(one.sample[0])
         self._judged, self._judged_samples = sample, self._judged_samples + samples
         if not pair.probability < samples / one.lines.rate_hz / self.false_alarm_interval_s:
@@ -161,7 +162,7 @@ class MatrixMonitor(StatefulBase):
         if self._description is None:
             return ()
         try:
-            return compare_gantries(self._baseline, one, self._description).causes
+            return compare_gantries(self._baseline, one, self._description, steps=self._steps).causes
         except FitError:
             return ()  # The noise of one matrix has too few degrees of freedom; the entry is named.
 

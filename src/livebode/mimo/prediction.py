@@ -6,15 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
-from livebode.excitation.multisine import each
+from livebode.excitation import each
 from livebode.mimo.excitation import MatrixExcitation
 from livebode.mimo.settings import MatrixLoop
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Plant = Callable[[Floats], Complex]
 """Response matrix (lines, outputs, inputs) at frequencies in Hz."""
 

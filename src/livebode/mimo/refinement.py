@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.fitting.partial_fractions import PartialFractions, Structure
-from livebode.fitting.separable import Outputs, Separated
+from livebode.arrays import Complex, Floats
+from livebode.fitting import Outputs, PartialFractions, Separated, Structure
 from livebode.mimo.least_squares import MatrixMinimum, minimise
 from livebode.mimo.whitening import Weighted
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _TICK_STEP = 1e-4  # of a tick, for the slope by a delay
 

@@ -10,9 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import CHANNELS_MAX, Lines, Loop, Model, UsageError
-from livebode.core.model import as_model
-from livebode.estimation.settings import nearest_hop
+from livebode.core import CHANNELS_MAX, Lines, Loop, Model, UsageError, as_model
+from livebode.estimation import nearest_hop
 
 Logged = Literal["before", "after"]
 Method = Literal["direct", "joint", "indirect"]

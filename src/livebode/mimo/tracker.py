@@ -7,10 +7,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Emit, Event, MatrixResponses, SignalError, Stage, StatefulBase, hand_over, ignore
-from livebode.estimation.set_aside import NOTHING, Integers, contains
-from livebode.estimation.spectra import LineSpectra, SpectraRows
-from livebode.estimation.watch import InputStatistics
+from livebode.arrays import Complex, Flags, Integers
+from livebode.core import (
+    Block,
+    Emit,
+    Event,
+    MatrixResponses,
+    SignalError,
+    Stage,
+    StatefulBase,
+    hand_over,
+    ignore,
+    same_rate,
+)
+from livebode.estimation import NOTHING, InputStatistics, LineSpectra, SpectraRows, contains
 from livebode.kernel import (
     MatrixHistory,
     MatrixRows,
@@ -19,11 +29,8 @@ from livebode.kernel import (
     chosen_instruction_set,
     process_matrices,
 )
-from livebode.mimo.estimate import Estimate, Windows, estimate, separates
+from livebode.mimo.estimate import MatrixEstimate, Windows, estimate, separates
 from livebode.mimo.settings import MatrixSettings
-
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 _AT_ONCE = 128
 """Rows that are computed at once; the ring of windows has room for them."""
@@ -125,7 +132,7 @@ class MatrixTracker(StatefulBase):
         s = self.settings
         if not len(block):
             raise SignalError("empty", "the block is empty", "leave it out")
-        if abs(block.rate_hz / s.lines.rate_hz - 1) > 1e-9:
+        if not same_rate(block.rate_hz, s.lines.rate_hz):
             raise SignalError(
                 "rate-differs",
                 f"the block has {block.rate_hz:g} samples per second, but the lines are for {s.lines.rate_hz:g}",
@@ -165,7 +172,7 @@ class MatrixTracker(StatefulBase):
             units=(),
         )
 
-    def _estimate(self, rows: SpectraRows, settled: NDArray[np.intp]) -> tuple[Estimate, NDArray[np.int64]]:
+    def _estimate(self, rows: SpectraRows, settled: NDArray[np.intp]) -> tuple[MatrixEstimate, NDArray[np.int64]]:
         """Matrices of some rows, and how many repetitions each has."""
         stage, history = self._matrices, MatrixHistory(self._past, self._complete, self._work)
         found = MatrixRows.empty(stage, len(settled))
@@ -182,7 +189,7 @@ class MatrixTracker(StatefulBase):
                 self._replace(some, reason[part], unsure)
             self._next = (self._next + len(place)) % len(self._complete)
         values = found.value, found.noise, found.spread, found.dof, found.coherence, found.condition
-        own = Estimate(*values, reason)
+        own = MatrixEstimate(*values, reason)
         return (self._through_loop(own) if self.settings.estimator == "indirect" else own), found.complete
 
     def _excited_apart(self, sample: NDArray[np.int64], complete: NDArray[np.int64]) -> Flags:
@@ -214,7 +221,7 @@ class MatrixTracker(StatefulBase):
                 getattr(found, name)[which] = getattr(exact, name)[unsure[at]]
             reason[which] = exact.reason[unsure[at]]
 
-    def _exact(self, at: NDArray[np.intp], complete: NDArray[np.int64]) -> Estimate:
+    def _exact(self, at: NDArray[np.intp], complete: NDArray[np.int64]) -> MatrixEstimate:
         """The estimate with singular values of rows, counted from the next place in the ring."""
         s, stage = self.settings, self._matrices
         spectra = self._windows(at, s.memory)
@@ -233,7 +240,7 @@ class MatrixTracker(StatefulBase):
         past = self._past[(self._next + at[:, np.newaxis, np.newaxis] - back) % len(self._complete)]
         return np.asarray((past[:, :, :, :, 0] + 1j * past[:, :, :, :, 1]).transpose(0, 4, 1, 3, 2))
 
-    def _through_loop(self, found: Estimate) -> Estimate:
+    def _through_loop(self, found: MatrixEstimate) -> MatrixEstimate:
         """G = T·(E − F·T)⁻¹, and dG = (1 + G·F)·dT·(E − F·T)⁻¹; invalid unless all columns of T are valid."""
         s = self.settings
         worst = np.broadcast_to(found.reason.max(axis=2, keepdims=True), found.reason.shape).copy()
@@ -247,4 +254,4 @@ class MatrixTracker(StatefulBase):
         closed = np.eye(len(s.output)) + value @ feedback
         noise = closed @ found.noise @ np.swapaxes(closed, 2, 3).conj()
         spread = np.swapaxes(inverse, 2, 3) @ found.spread @ inverse.conj()
-        return Estimate(value, noise, spread, found.dof, found.coherence, found.condition, worst)
+        return MatrixEstimate(value, noise, spread, found.dof, found.coherence, found.condition, worst)

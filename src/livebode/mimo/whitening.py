@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import FitError, MatrixResponses
 from livebode.mimo.mean import mean_matrix
 from livebode.mimo.row_scatter import row_scatter
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _ROUNDING = 1e-12
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
 
 _BATCHES = (2, 4, 8)
 STRETCH = 24  # windows, over which the deviations from the baseline are estimated
@@ -65,6 +64,16 @@ def accuracy(score: Floats, information: Floats, smallest: Floats, off: Floats |
     rest = np.where(known, (sums / np.where(known, total, 1.0)) ** 2 - 1 / np.where(known, total, np.inf), 0.0)
     scatter = np.hypot(np.sqrt(np.maximum(_mean(rest), 0.0)), _OFF * off)
     return ChangeAccuracy(inflation, scatter, np.maximum(smallest, _APART * scatter))
+
+
+def scatter_error(information: Floats) -> Floats:
+    """Largest scatter that so many healthy windows may have although they show none, (components,).
+
+    One standard deviation of the estimate: a stretch with the information J shows the square of its scatter with an
+    error of √2/J.
+    """
+    total = _batched(information, STRETCH)
+    return np.asarray((2 * _mean(1 / np.maximum(total, 1e-300) ** 2) / max(len(total), 1)) ** 0.25)
 
 
 def _mean(rows: Floats) -> Floats:

@@ -6,15 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
 from livebode.monitoring.alarms import Alarm
+from livebode.monitoring.change_date import ChangeDate
 from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.naming import NamedChange, ScoredWindows, bound
 from livebode.monitoring.offset import FAR, LocalChange, Offset
-
-Floats = NDArray[np.float64]
 
 _MEMORY = 0.95  # per window, of a change's present size
 _HELD_FROM = 0.25  # of the change when it was identified, or of the smallest if that is less: below, it is disappearing
@@ -30,7 +29,7 @@ class ActiveAlarms(StatefulBase):
     not appear as an additional one (Gauss–Newton). Changes of directions are estimated together.
     """
 
-    _stage = Stage("active-alarms", 1)
+    _stage = Stage("active-alarms", 2)
     _STATE = ("_score", "_information", "_moving")
 
     def __init__(self, machine: LearnedMachine, threshold: float) -> None:
@@ -63,12 +62,12 @@ class ActiveAlarms(StatefulBase):
         self,
         change: NamedChange,
         rival: NamedChange | None,
-        since: tuple[int, float],
+        date: ChangeDate,
         way_m: tuple[float, float],
         seen: ScoredWindows,
     ) -> None:
         """Add an identified change, with the windows since it began: their evidence of changes from the baseline."""
-        alarm = Alarm(change, rival, *since, way_m, change.amount, change.bound, self._threshold)
+        alarm = Alarm(change, rival, date, way_m, change.amount, change.bound, self._threshold)
         alarm.information = 2 * change.evidence / change.amount**2
         alarm.score = change.amount * alarm.information
         if abs(change.amount) > FAR:  # the model does not follow it yet: a linear estimate from the baseline

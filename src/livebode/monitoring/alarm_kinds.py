@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from livebode.core import Event
-from livebode.records.grouped_events import group_of
+from livebode.records import group_of
 
 Priority = Literal["high", "medium", "low"]
 PRIORITIES: tuple[Priority, ...] = ("high", "medium", "low")
@@ -66,6 +66,7 @@ ALARMS = {
     "restart": AlarmKind("medium", "at once", "restart"),
     "backlog": AlarmKind("medium", "reported", "backlog"),
     "record-unclosed": AlarmKind("medium", "reported", "record-unclosed"),
+    "not-monitored": AlarmKind("medium", "reported", "not-monitored", of_response=True),
     "baseline-unknown": AlarmKind("medium", "acknowledged", of_response=True),
     "doubtful": AlarmKind("medium", "acknowledged", of_response=True),
     "roles-doubtful": AlarmKind("medium", "acknowledged", of_response=True),
@@ -77,6 +78,9 @@ ALARMS = {
 }
 """The events that are alarms. docs/how-to/dashboard.md explains the choice."""
 
+UNMONITORED = ("not-monitored", "idle", "monitored-again")
+"""The events that report the beginning and the end of time in which a change would not be found."""
+
 RETURNS = {
     "change-cleared": "",
     "record-resumed": "record-paused",
@@ -84,6 +88,7 @@ RETURNS = {
     "resumed": SOURCE,
     "backlog-cleared": "backlog",
     "record-closed": "record-unclosed",
+    "monitored-again": "not-monitored",
 }
 """The events that report an end, each with the cause of the alarm; empty: as for ``change``."""
 

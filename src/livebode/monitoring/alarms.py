@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import isnan
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
+from livebode.monitoring.change_date import ChangeDate
 from livebode.monitoring.naming import NamedChange, ScoredWindows
 from livebode.monitoring.offset import LocalChange, Offset
-
-Floats = NDArray[np.float64]
 
 
 @dataclass
@@ -23,7 +24,7 @@ class Alarm:
     ----------
     change, rival
         The identified change, and another that explains it nearly as well (None without such a change).
-    since_sample, since_s
+    date
         Beginning of the change.
     way_m
         Range of the cart's positions while it was identified.
@@ -39,8 +40,7 @@ class Alarm:
 
     change: NamedChange
     rival: NamedChange | None
-    since_sample: int
-    since_s: float
+    date: ChangeDate
     way_m: tuple[float, float]
     now: float
     bound: float
@@ -65,7 +65,9 @@ class Alarm:
 
     def row(self) -> list[float]:
         """As numbers, for a snapshot."""
-        rest = [self.since_sample, self.since_s, *self.way_m, self.now, self.bound, self.height, self.announced]
+        earliest_s = np.nan if self.date.earliest_s is None else self.date.earliest_s
+        date = [self.date.since_sample, self.date.since_s, earliest_s, self.date.latest_s]
+        rest = [*date, *self.way_m, self.now, self.bound, self.height, self.announced]
         sums = [self.score, self.information, self.reported, self.reported_bound]
         return [*_numbers(self.change), *_numbers(self.rival), *rest, *sums]
 
@@ -74,8 +76,10 @@ class Alarm:
         """From a snapshot's numbers."""
         change, rival = _change(row[:_NUMBERS]), _change(row[_NUMBERS : 2 * _NUMBERS])
         assert change is not None
-        sample, since_s, low, high, now, bound, height, announced, *sums = (float(n) for n in row[2 * _NUMBERS :])
-        return cls(change, rival, int(sample), since_s, (low, high), now, bound, height, bool(announced), *sums)
+        sample, since_s, earliest_s, latest_s, *rest = (float(n) for n in row[2 * _NUMBERS :])
+        low, high, now, bound, height, announced, *sums = rest
+        date = ChangeDate(int(sample), since_s, None if isnan(earliest_s) else earliest_s, latest_s)
+        return cls(change, rival, date, (low, high), now, bound, height, bool(announced), *sums)
 
 
 _NUMBERS = 6

@@ -11,6 +11,7 @@ from livebode.estimation import Settings
 from livebode.monitoring import baseline_file
 from livebode.monitoring.baseline_file import ROLES
 from livebode.monitoring.baseline_version import BaselineVersion, retained_file
+from livebode.monitoring.learned_torque import LearnedTorque
 from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.rows import PLACES, places
 from livebode.monitoring.table import ScheduleTable
@@ -36,14 +37,16 @@ class Baseline:
         Mean and covariance of lines, and of parameters where there were any.
     machine
         Model of the moving machine; None where the runs have no motion along a schedule, or no two-mass model fits.
+    torque
+        Friction and orders of the axis; None where the runs have no input or too few strokes.
     corrected
         Whether its responses were corrected for the axis's motion.
     runs
         The runs that it was learned from.
-    remark
-        Reason for the missing machine; empty where there is one.
+    remark, torque_remark
+        Reason for the missing machine, and for the missing friction and orders; empty where there is one.
     learned
-        When it was learned, ISO 8601 in UTC; empty where an older livebode wrote it.
+        When it was learned, ISO 8601 in UTC.
     reason
         Why it was learned; empty where nobody stated it.
     history
@@ -66,9 +69,11 @@ class Baseline:
     quantity: str
     tables: tuple[ScheduleTable, ...]
     machine: LearnedMachine | None
+    torque: LearnedTorque | None = None
     corrected: bool = False
     runs: tuple[str, ...] = ()
     remark: str = ""
+    torque_remark: str = ""
     learned: str = ""
     reason: str = ""
     history: tuple[BaselineVersion, ...] = ()
@@ -84,14 +89,16 @@ class Baseline:
         return BaselineVersion(self.id, self.learned, self.runs, self.reason)
 
     def __repr__(self) -> str:
-        f, what = self.lines.frequency_hz, [table.what for table in self.tables]
+        f, tables = self.lines.frequency_hz, [*self.tables, *(self.torque.tables if self.torque is not None else ())]
+        what = [table.what for table in tables]
         learned = " and ".join([*what, "a model of the machine"] if self.machine is not None else what)
         span = f"{counted(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz"
         return f"<Baseline: {learned}, {span}; learned from {counted(len(self.runs), 'run')}>"
 
     def check(self, settings: Settings, corrected: bool = False) -> None:
         """BaselineError where a run with these settings cannot be compared with it."""
-        mine, lines = self.lines, settings.lines
+        mine = self.lines
+        lines = mine if mine.alike(settings.lines) else settings.lines
         signals = signals_of(settings)
         for name, learned, here in (
             ("rate", f"{mine.rate_hz:g} Hz", f"{lines.rate_hz:g} Hz"),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
+import zlib
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -12,10 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import BaselineError, Lines, LivebodeError
-from livebode.core.files import write_whole
-from livebode.core.writing import writing
-from livebode.monitoring.accuracy import ChangeAccuracy
+from livebode.core import BaselineError, Lines, LivebodeError, write_whole, writing
+from livebode.monitoring.amplitude import InputAmplitude
 from livebode.monitoring.baseline_part import BaselinePart
 from livebode.monitoring.baseline_version import BaselineVersion
 from livebode.monitoring.between_runs import BetweenRuns
@@ -23,15 +23,17 @@ from livebode.monitoring.covariates import Covariates
 from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.ripple import Ripple
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.monitoring.table import ScheduleTable
+from livebode.monitoring.table_file import accuracy_of, accuracy_plain, as_list, table_of, table_plain
+from livebode.monitoring.torque_file import torque_of, torque_plain
 from livebode.motion import MovingModel, PositionCurve
 from livebode.version import __version__
 
 ROLES = ("output", "input", "excitation", "schedule")
 
 _FORMAT = "livebode baseline"
-_VERSION = 4
+_VERSION = 5
 _ID_DIGITS = 16
+_CHECKSUM = re.compile(r',\n "crc32": "[0-9a-f]{8}"\n\}\n?\Z')
 _LEARN = "learn one from runs (livebode learn)"
 _COVARIATE_ARRAYS = {"mean": 1, "low": 1, "high": 1, "slope": 2, "covariance": 3}  # and their dimensions
 
@@ -46,7 +48,8 @@ def id_of(baseline: Mapping[str, Any]) -> str:
 
 def save(baseline: Mapping[str, Any], path: Path) -> None:
     """Write the fields of a Baseline, whole or not at all."""
-    text = json.dumps(_plain(baseline), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+    text = json.dumps(_plain(baseline), ensure_ascii=False, allow_nan=False, indent=1)
+    text = f'{text[:-2]},\n "crc32": "{_checksum(text)}"\n}}\n'
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, text.encode())
@@ -62,7 +65,8 @@ def retain(path: Path, copy: Path) -> None:
 def load(path: Path) -> dict[str, Any]:
     """The fields of a Baseline in a file that `save` wrote."""
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        data = json.loads(text)
     except FileNotFoundError:
         raise BaselineError("absent", f"there is no baseline {str(path)!r}", _LEARN, path=str(path)) from None
     except OSError as error:
@@ -72,8 +76,9 @@ def load(path: Path) -> dict[str, Any]:
             "check its permissions",
             path=str(path),
             reason=error.strerror,
+            errno=error.errno,
         ) from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise BaselineError(
             "not-a-baseline", f"{str(path)!r} is not a baseline: {error}", _LEARN, path=str(path), reason=str(error)
         ) from None
@@ -97,7 +102,21 @@ def load(path: Path) -> dict[str, Any]:
             path=str(path),
             version=found,
         )
-    return _fields(BaselinePart(str(path), "", data))
+    part = BaselinePart(str(path), "", data)
+    _check(part, text)
+    return _fields(part)
+
+
+def _check(data: BaselinePart, text: str) -> None:
+    """BaselineError if the checksum, the last key, is not that of the text without it."""
+    end = _CHECKSUM.search(text)
+    given = data.text("crc32")
+    if end is None or given != _checksum(text[: end.start()] + "\n}"):
+        raise data.wrong("crc32", "not the checksum of the file: it was changed after it was learned")
+
+
+def _checksum(text: str) -> str:
+    return f"{zlib.crc32(text.encode()):08x}"
 
 
 def _plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
@@ -113,6 +132,7 @@ def _plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
         "replaces": history[0].id if history else None,
         "history": [asdict(version) for version in history],
         "remark": baseline["remark"],
+        "torque_remark": baseline["torque_remark"],
         **_learned_plain(baseline),
     }
 
@@ -127,8 +147,8 @@ def _learned_plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
         "quantity": baseline["quantity"],
         "corrected": baseline["corrected"],
         "machine": _machine_plain(baseline["machine"]) if baseline["machine"] else None,
-        "tables": [_table_plain(table) for table in baseline["tables"]],
-    }
+        "tables": [table_plain(table) for table in baseline["tables"]],
+    } | ({} if baseline["torque"] is None else {"torque": torque_plain(baseline["torque"])})
 
 
 def _fields(data: BaselinePart) -> dict[str, Any]:
@@ -146,14 +166,14 @@ def _fields(data: BaselinePart) -> dict[str, Any]:
             key="lines",
             reason=error.message,
         ) from None
-    tables = tuple(_table(table) for table in data.parts("tables"))
+    tables = tuple(table_of(table) for table in data.parts("tables"))
     if not tables:
         raise data.wrong("tables", "empty")
     signals = data.part("signals")
     hop = data.whole("hop")
     if hop < 1:
         raise data.wrong("hop", "below 1")
-    fields = {
+    return {
         "lines": lines,
         "hop": hop,
         "signals": {role: signals.value(role) and signals.text(role) for role in ROLES},
@@ -161,16 +181,16 @@ def _fields(data: BaselinePart) -> dict[str, Any]:
         "quantity": data.text("quantity"),
         "tables": tables,
         "machine": None if data.value("machine") is None else _machine(data.part("machine"), lines),
+        # A baseline that was learned from runs without strokes has none.
+        "torque": torque_of(data.part("torque")) if data.has("torque") else None,
         "corrected": data.truth("corrected"),
         "runs": data.texts("runs"),
         "remark": data.text("remark"),
-        "learned": data.text("learned") if data.has("learned") else "",
-        "reason": data.text("reason") if data.has("reason") else "",
-        "history": tuple(map(_version, data.parts("history"))) if data.has("history") else (),
+        "torque_remark": data.text("torque_remark"),
+        "learned": data.text("learned"),
+        "reason": data.text("reason"),
+        "history": tuple(map(_version, data.parts("history"))),
     }
-    if data.has("id") and data.text("id") != id_of(fields):
-        raise data.wrong("id", f"not that of its content, {id_of(fields)}: it was changed after it was learned")
-    return fields
 
 
 def _version(data: BaselinePart) -> BaselineVersion:
@@ -185,17 +205,20 @@ def _machine_plain(machine: LearnedMachine) -> dict[str, Any]:
         "radius_m": model.radius_m,
         "low_m": model.low_m,
         "high_m": model.high_m,
-        "log_stiffness": _list(model.log_stiffness.weights),
-        "log_damping": _list(model.log_damping.weights),
-        "noise_power": _list(machine.noise_power),
-        "quiet_power": _list(machine.quiet_power),
-        "held": _accuracy_plain(machine.held),
-        "free": _accuracy_plain(machine.free),
+        "log_stiffness": as_list(model.log_stiffness.weights),
+        "log_damping": as_list(model.log_damping.weights),
+        "noise_power": as_list(machine.noise_power),
+        "quiet_power": as_list(machine.quiet_power),
+        "held": accuracy_plain(machine.held),
+        "free": accuracy_plain(machine.free),
         "slowest_m_per_s": machine.slowest_m_per_s,
         "fastest_m_per_s": machine.fastest_m_per_s,
         "windows": machine.windows.tolist(),
+        "information": as_list(machine.information),
+        "swing": machine.swing,
+        "amplitude": {name: as_list(getattr(machine.amplitude, name)) for name in InputAmplitude.__dataclass_fields__},
         "delay_s": machine.delay_s,
-        "ripple": {name: _list(getattr(machine.ripple, name)) for name in Ripple.__dataclass_fields__},
+        "ripple": {name: as_list(getattr(machine.ripple, name)) for name in Ripple.__dataclass_fields__},
         "covariates": _covariates_plain(machine.covariates) if len(machine.covariates) else None,
         "between": _between_plain(machine.between) if machine.between is not None else None,
     }
@@ -215,11 +238,14 @@ def _machine(data: BaselinePart, lines: Lines) -> LearnedMachine:
         MovingModel(inertia, load, radius, stiffness, damping),
         noise,
         quiet,
-        _accuracy(data.part("held")),
-        _accuracy(data.part("free")),
+        accuracy_of(data.part("held")),
+        accuracy_of(data.part("free")),
         data.number("slowest_m_per_s"),
         data.number("fastest_m_per_s"),
         data.array("windows", 1, least=0).astype(np.int64),
+        _information(data),
+        _amplitude(data.part("amplitude"), len(lines)),
+        data.number("swing", 0),
         _ripple(data.part("ripple")),
         data.number("delay_s"),
         Covariates() if data.value("covariates") is None else _covariates(data.part("covariates")),
@@ -227,15 +253,33 @@ def _machine(data: BaselinePart, lines: Lines) -> LearnedMachine:
     )
 
 
+def _information(data: BaselinePart) -> NDArray[np.float64]:
+    information = data.array("information", 1, least=0)
+    if information.size != len(DIRECTIONS):
+        raise data.wrong("information", f"not {len(DIRECTIONS)} numbers")
+    return information
+
+
+def _amplitude(data: BaselinePart, lines: int) -> InputAmplitude:
+    amplitude = InputAmplitude(*(data.array(name, 1, least=0) for name in InputAmplitude.__dataclass_fields__))
+    for name in InputAmplitude.__dataclass_fields__:
+        if getattr(amplitude, name).size != lines:
+            raise data.wrong(name, f"not {lines} numbers")
+    return amplitude
+
+
 def _ripple(data: BaselinePart) -> Ripple:
-    ripple = Ripple(*(data.array(name, 1, least=0) for name in Ripple.__dataclass_fields__))
-    if ripple.cycles_per_m.size != ripple.amplitude_n_m.size:
-        raise data.wrong("amplitude_n_m", f"not {ripple.cycles_per_m.size} numbers")
-    return ripple
+    cycles_per_m = data.array("cycles_per_m", 1, least=0)
+    sizes = {"amplitude_n_m": data.array("amplitude_n_m", 1, least=0)}
+    sizes["peak_n_m"] = data.array("peak_n_m", 1, least=0)
+    for name, values in sizes.items():
+        if values.size != cycles_per_m.size:
+            raise data.wrong(name, f"not {cycles_per_m.size} numbers")
+    return Ripple(cycles_per_m, **sizes)
 
 
 def _covariates_plain(covariates: Covariates) -> dict[str, Any]:
-    arrays = {name: _list(getattr(covariates, name)) for name in _COVARIATE_ARRAYS}
+    arrays = {name: as_list(getattr(covariates, name)) for name in _COVARIATE_ARRAYS}
     return {"names": list(covariates.names)} | arrays
 
 
@@ -252,7 +296,7 @@ def _covariates(data: BaselinePart) -> Covariates:
 
 
 def _between_plain(between: BetweenRuns) -> dict[str, Any]:
-    return {"direction": _list(between.direction), "spread": between.spread}
+    return {"direction": as_list(between.direction), "spread": between.spread}
 
 
 def _between(data: BaselinePart) -> BetweenRuns:
@@ -260,55 +304,3 @@ def _between(data: BaselinePart) -> BetweenRuns:
     if direction.size != len(DIRECTIONS) or not direction.any():
         raise data.wrong("direction", f"not {len(DIRECTIONS)} numbers of which one is not 0")
     return BetweenRuns(direction, data.number("spread", 0))
-
-
-def _table_plain(table: ScheduleTable) -> dict[str, Any]:
-    return {
-        "what": table.what,
-        "names": list(table.names),
-        "low": table.low,
-        "step": table.step,
-        "still": table.still,
-        "ways": ["back", "still", "forth"],
-        "mean_re": _list(table.mean.real),
-        "mean_im": _list(table.mean.imag),
-        "covariance": _list(table.covariance),
-        "variance": _list(table.variance),
-        "count": table.count.tolist(),
-        "accuracy": _accuracy_plain(table.accuracy),
-    }
-
-
-def _table(data: BaselinePart) -> ScheduleTable:
-    real, imaginary = data.array("mean_re", 3, known=False), data.array("mean_im", 3, known=False)
-    if real.shape != imaginary.shape:
-        raise data.wrong("mean_im", "not of the shape of mean_re")
-    mean = np.empty(real.shape, dtype=np.complex128)
-    mean.real, mean.imag = real, imaginary
-    return ScheduleTable(
-        data.text("what"),
-        data.texts("names"),
-        data.number("low"),
-        data.number("step"),
-        data.number("still"),
-        mean,
-        data.array("covariance", 5, known=False),
-        data.array("variance", 3, known=False),
-        data.array("count", 2, least=0).astype(np.int64),
-        _accuracy(data.part("accuracy")),
-    )
-
-
-def _accuracy_plain(known: ChangeAccuracy) -> dict[str, Any]:
-    return {name: _list(getattr(known, name)) for name in ChangeAccuracy.__dataclass_fields__}
-
-
-def _accuracy(data: BaselinePart) -> ChangeAccuracy:
-    return ChangeAccuracy(*(data.array(name, 1, least=0, known=False) for name in ChangeAccuracy.__dataclass_fields__))
-
-
-def _list(array: NDArray[Any]) -> Any:
-    """Nested lists, with None for NaN and infinity."""
-    plain = array.astype(object)
-    plain[~np.isfinite(array)] = None
-    return plain.tolist()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import BaselineError, counted
+from livebode.language import recorded
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class BaselinePart:
 
     def texts(self, name: str) -> tuple[str, ...]:
         values = self._typed(name, list, "a list of texts")
+        values = [(recorded(value, "") or None) if isinstance(value, dict) else value for value in values]
         if not all(isinstance(value, str) for value in values):
             raise self.wrong(name, "not a list of texts")
         return tuple(values)
@@ -57,9 +59,10 @@ class BaselinePart:
 
     def array(self, name: str, dimensions: int, least: float = -np.inf, known: bool = True) -> NDArray[np.float64]:
         """An array of numbers not below `least`; without `known` a value may be null, which becomes NaN."""
+        value = self.value(name)
         try:
-            array = np.array(self.value(name), dtype=np.float64)
-        except (TypeError, ValueError):
+            array = np.array(value, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
             raise self.wrong(name, "not an array of numbers") from None
         if array.ndim != dimensions or (known and not np.isfinite(array).all()):
             raise self.wrong(name, f"not an array of numbers in {counted(dimensions, 'dimension')}")
@@ -68,7 +71,7 @@ class BaselinePart:
         return array
 
     def has(self, name: str) -> bool:
-        """Whether there is a value of this name: older files lack some."""
+        """Whether there is a value of this name."""
         return isinstance(self.data, dict) and name in self.data
 
     def value(self, name: str) -> Any:

@@ -15,7 +15,7 @@ class BaselineVersion:
     id
         The first 16 hexadecimal digits of the SHA-256 of what was learned: two files with one id judge alike.
     learned
-        When, ISO 8601 in UTC; empty where an older livebode wrote it.
+        When, ISO 8601 in UTC.
     runs
         The runs that it was learned from.
     reason

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.distributions import f_exceeded, normal_quantile, t_quantile
+from livebode.arrays import Floats
+from livebode.core import f_exceeded, normal_quantile, t_quantile
 from livebode.monitoring.accuracy import STRETCH
 from livebode.monitoring.evidence import Evidence
-
-Floats = NDArray[np.float64]
 
 KNOWN = 0.1  # of the smallest change: standard deviation from which on a run's own offset is known
 _FALSE = 1e-4  # probability of a false direction

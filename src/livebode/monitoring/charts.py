@@ -7,9 +7,8 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
-
-Floats = NDArray[np.float64]
 
 UP, DOWN = 0, 1
 _NOT_A_NUMBER = "score or information of a judged component is not a number"

@@ -8,9 +8,8 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import BaselineError
-
-Floats = NDArray[np.float64]
 
 COVARIATES_MAX = 4
 _MARGIN = 0.1  # of the learned range, beyond which the influence is unknown

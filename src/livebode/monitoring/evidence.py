@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import RowArrays
 
-Floats = NDArray[np.float64]
-
 JUDGED, UNEVEN, SLOW, FAST, PLACE, DISTURBED = "judged", "uneven", "slow", "fast", "place", "disturbed"
-COVARIATE, NO_COVARIATE, UNEXCITED = "covariate", "no covariate", "unexcited"
+COVARIATE, NO_COVARIATE, UNEXCITED, AMPLITUDE = "covariate", "no covariate", "unexcited", "amplitude"
 """Why a window is not judged: accelerating or settling, slower, faster or elsewhere than learned, or disturbed; a
-covariate is outside of the learned range, or has no value; no torque at the lines."""
+covariate is outside of the learned range, or has no value; no torque at the lines, or more than learned at a speed at
+which it may reverse the motion."""
 OFFSET = "offset"
 """Why changes along the direction between runs are not judged: this run's own offset is not known well enough."""
 
@@ -47,6 +47,10 @@ class Evidence(RowArrays):
         Power of an order of 1 N m at the lines, (rows, orders, lines).
     covariate
         Mean of each covariate over the window, NaN where it has no value, (rows, covariates).
+    amplitude
+        Root mean square of the torque at each line, (rows, lines).
+    swing
+        Root mean square of the velocity at all lines, relative to the speed, (rows,).
     """
 
     score: Floats
@@ -64,6 +68,8 @@ class Evidence(RowArrays):
     ripple_information: Floats
     ripple_gain: Floats
     covariate: Floats
+    amplitude: Floats
+    swing: Floats
 
     @property
     def judged(self) -> NDArray[np.bool_]:

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import BaselineError, Block, Lines
-from livebode.monitoring.accuracy import ChangeAccuracy, accuracy
+from livebode.monitoring.accuracy import ChangeAccuracy, accuracy, scatter_error
+from livebode.monitoring.amplitude import InputAmplitude
 from livebode.monitoring.between_runs import KNOWN, between_runs
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
 from livebode.monitoring.evidence import Evidence
@@ -18,13 +20,12 @@ from livebode.monitoring.machine import LearnedMachine, cells
 from livebode.monitoring.machine_fit import joint_step, moved, normal, normal_of, step_of
 from livebode.monitoring.model_evidence import SIGNALS, ModelEvidence, held, missing, wave, way
 from livebode.monitoring.offset import Offset
-from livebode.monitoring.order_search import find_orders
+from livebode.monitoring.order_search import find_orders, peak_torques
 from livebode.monitoring.ripple import Ripple, amplitudes, noise_power
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.stretches import Stretches
-from livebode.motion.fit import MotionFitOptions, WeightedResponses
+from livebode.motion import MotionFitOptions, WeightedResponses
 
-Floats = NDArray[np.float64]
 Run = Callable[[], Iterable[Block]]
 """Each call gives the samples of a run from the first one."""
 
@@ -83,6 +84,9 @@ def learn_machine(
         slowest_m_per_s=slowest,
         fastest_m_per_s=fastest,
         windows=cells(rows.position_m, low, high),
+        information=np.zeros(len(DIRECTIONS)),
+        amplitude=InputAmplitude.unlimited(len(lines)),
+        swing=np.inf,
         covariates=with_range(tuple(covariates), covariate) if covariates else Covariates(),
     )
     machine = _fitted(runs, machine, lines, names, passes=2)
@@ -98,6 +102,9 @@ def learn_machine(
     machine = _with_uncertainty(parts, machine, lines.rate_hz)
     if (between := between_runs(parts, _SMALLEST)) is not None:
         machine, parts = _fitted_separately(runs, replace(machine, between=between), lines, names)
+    if len(machine.ripple):
+        peak_n_m = peak_torques((run() for run in runs), machine, lines, names)
+        machine = replace(machine, ripple=replace(machine.ripple, peak_n_m=peak_n_m))
     return _judged(Evidence.join(parts), machine)
 
 
@@ -241,6 +248,9 @@ def _judged(seen: Evidence, machine: LearnedMachine) -> LearnedMachine:
         machine,
         quiet_power=seen.quiet_power.mean(axis=0),
         held=held.widened(unsure),
-        free=accuracy(score, information, _FURTHER * _SMALLEST).widened(unsure),
+        free=accuracy(score, information, _FURTHER * _SMALLEST).widened(np.hypot(unsure, scatter_error(information))),
         windows=cells(seen.position_m, machine.model.low_m, machine.model.high_m),
+        information=np.einsum("rjj->j", seen.information) / len(seen),
+        amplitude=InputAmplitude.of(seen.amplitude),
+        swing=float(seen.swing.max()),
     )

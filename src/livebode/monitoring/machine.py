@@ -8,15 +8,15 @@ from math import floor
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.monitoring.accuracy import ChangeAccuracy
+from livebode.monitoring.amplitude import InputAmplitude
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
 from livebode.monitoring.ripple import Ripple
 from livebode.motion import MovingModel
 
-Floats = NDArray[np.float64]
-
-_KNOWN_WINDOWS = 5
+KNOWN_WINDOWS = 5
 _CELLS = 28
 _STILL_M = 1e-9  # a travel of zero length has one cell
 
@@ -37,6 +37,12 @@ class LearnedMachine:
         Range of the learned speeds.
     windows
         Number of learned windows in each of 28 cells of the travel.
+    information
+        Mean information of a learned window for a change of each direction, with all others fixed, (4,).
+    amplitude
+        Of the torque at the lines.
+    swing
+        Largest root mean square of the velocity at the lines, relative to the speed.
     ripple
         Torque that repeats with the motor's angle.
     delay_s
@@ -55,6 +61,9 @@ class LearnedMachine:
     slowest_m_per_s: float
     fastest_m_per_s: float
     windows: NDArray[np.int64]
+    information: Floats
+    amplitude: InputAmplitude
+    swing: float
     ripple: Ripple = field(default_factory=Ripple)
     delay_s: float = 0.0
     covariates: Covariates = field(default_factory=Covariates)
@@ -75,7 +84,7 @@ class LearnedMachine:
         low, high = self.model.low_m, self.model.high_m
         margin = (high - low) / _CELLS / 2 + _STILL_M
         inside = (position_m >= low - margin) & (position_m <= high + margin)
-        return np.asarray(inside & (self.windows[_cell(position_m, low, high)] >= _KNOWN_WINDOWS))
+        return np.asarray(inside & (self.windows[_cell(position_m, low, high)] >= KNOWN_WINDOWS))
 
 
 def cells(position_m: Floats, low_m: float, high_m: float) -> NDArray[np.int64]:

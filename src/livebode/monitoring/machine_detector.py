@@ -5,22 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Event, Stage, StatefulBase
 from livebode.monitoring import evidence as word
+from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.active_alarms import ActiveAlarms
 from livebode.monitoring.alarms import Alarm, RecentWindows
+from livebode.monitoring.change_date import ChangeDate, date_of, independent, rows_of
 from livebode.monitoring.charts import Charts
+from livebode.monitoring.detectability import information_needed
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import LearnedMachine
+from livebode.monitoring.monitored_time import WEAK, MonitoredTime
 from livebode.monitoring.naming import NamedChange, ScoredWindows, begin_of, candidates, far, lead
 from livebode.monitoring.offset import Offset
+from livebode.monitoring.passed_places import PassedPlaces
 from livebode.monitoring.run_offset import RunOffset
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import changed, cleared, corrected, far_away, offset_unknown, unknown
-
-Floats = NDArray[np.float64]
 
 CHARTS = 2 * len(DIRECTIONS) + 2
 """Charts that take a step with a window: up and down for each direction, and for stiffness in the cart's cell."""
@@ -58,10 +61,10 @@ class MachineDetector(StatefulBase):
         See `false_alarms.threshold`, for `CHARTS` charts.
     """
 
-    _stage = Stage("machine-detector", 1)
+    _stage = Stage("machine-detector", 2)
     _STATE = (
-        "_first", "_further", "_cells", "standing", "_own", "_recent", "_pending", "_taken", "judged", "_far",
-        "_passed",
+        "_first", "_further", "_cells", "standing", "_own", "_recent", "_pending", "_taken", "_far", "_passed",
+        "_healthy_from", "time", "places",
     )  # fmt: skip
 
     def __init__(self, machine: LearnedMachine, threshold: float) -> None:
@@ -75,10 +78,17 @@ class MachineDetector(StatefulBase):
         self._recent = RecentWindows(_LOOK_WINDOWS)
         self._passed = np.full(size, -1)  # mark of the newest window in each cell
         self._pending, self._taken = -1, 0
+        self._healthy_from = 0  # mark of the first window after the newest change has disappeared
         self._unknown: set[str] = set()
         self._far = False
-        self.judged = 0
-        """Windows judged so far."""
+        self.time = MonitoredTime(DIRECTIONS, machine.information, held, threshold)
+        self.places = PassedPlaces(machine, float(self.time.needed[_STIFFNESS]))
+        self._needed_further = information_needed(machine.information, free, threshold)
+
+    @property
+    def judged(self) -> int:
+        """Windows judged so far, in time that is monitored."""
+        return self.time.judged
 
     @property
     def offset(self) -> Offset:
@@ -93,7 +103,9 @@ class MachineDetector(StatefulBase):
         for i, status in enumerate(seen.status.tolist()):
             if status == word.JUDGED:
                 events += self._window(seen, i, around[i])
-            elif status not in _STAYS and status not in self._unknown:
+                continue
+            events += self.time.step(None, status, int(seen.sample[i]), float(seen.time_s[i]))
+            if status not in _STAYS and status not in self._unknown:
                 self._unknown.add(status)
                 events.append(unknown(self._machine, seen, i))
         self.standing.settle()
@@ -109,7 +121,7 @@ class MachineDetector(StatefulBase):
         if self._pending >= 0:
             self._name(final=True)
         _, sample, time_s = self._recent.moment[-1] if self._recent.moment else (0.0, 0.0, 0.0)
-        return self._new_events(int(sample), time_s, known=False)
+        return self._new_events(int(sample), time_s, known=False) + self.time.finish() + self.places.finish()
 
     def _new_events(self, sample: int, time_s: float, known: bool = True) -> list[Event]:
         """Events of new changes, and corrections of the reported amounts."""
@@ -128,7 +140,6 @@ class MachineDetector(StatefulBase):
     def _window(self, seen: Evidence, i: int, around: Floats) -> list[Event]:
         """Events of a judged window; `around` is its score around the baseline."""
         position_m, sample, time_s = float(seen.position_m[i]), int(seen.sample[i]), float(seen.time_s[i])
-        self.judged += 1
         known = seen.information[i]
         score, information = around - known @ self._reference.logarithms, known
         if not self._own.known:
@@ -136,9 +147,15 @@ class MachineDetector(StatefulBase):
         gone = self.standing.step(score, information, position_m)
         if gone:
             self._reset()
+            self._healthy_from = self._taken
         events = [cleared(alarm, sample, time_s, within_run=self.within_run(alarm)) for alarm in gone]
-        if self.standing.hides(position_m):
+        hidden = self.standing.hides(position_m)
+        share = np.zeros(len(known)) if hidden else self._share(information, position_m)
+        events += self.time.step(share, WEAK, sample, time_s)
+        if hidden:
             return events
+        here = self._machine.cell(position_m)
+        events += self.places.step(here, float(information[_STIFFNESS, _STIFFNESS]), sample, time_s)
         mark, self._taken = self._taken, self._taken + 1
         self._recent.add(around, known, (position_m, float(sample), time_s))
         if not self.standing.alarms:
@@ -152,11 +169,20 @@ class MachineDetector(StatefulBase):
             inflation = self._machine.held.inflation
             score, information = score / inflation, information.diagonal() / inflation
             self._first.step(score, information, mark)
-            here = self._machine.cell(position_m)
             self._passed[here] = mark
             self._cells.step_one(here, float(score[_STIFFNESS]), float(information[_STIFFNESS]), mark)
         self._look()
         return events
+
+    def _share(self, information: Floats, position_m: float) -> Floats:
+        """Information of a window as a share of what a stretch needs; an active change is followed, and needs none."""
+        active = self.standing.directions
+        if not active:
+            return np.asarray(information.diagonal() / self.time.needed)
+        rest = ScoredWindows(np.zeros((1, len(information))), information[np.newaxis], np.array([position_m]))
+        share = rest.without(active).information[0].diagonal() / self._needed_further
+        share[active] = np.inf
+        return np.asarray(share)
 
     @property
     def _reference(self) -> Offset:
@@ -182,7 +208,7 @@ class MachineDetector(StatefulBase):
         moments, standing = self._recent.moment[first:], self.standing.directions
         beyond = self._recent.segment(first, self._reference)
         segment = self._own.segment(beyond).without(standing)
-        known = self._machine.free if standing else self._machine.held
+        known = self._accuracy
         found = candidates(segment, known, self._machine.way_m, local=not standing)
         best = found[0]
         if (several := [] if standing else far(segment, best, known)) and self._gone_around(segment):
@@ -202,12 +228,36 @@ class MachineDetector(StatefulBase):
         self, changes: list[NamedChange], rival: NamedChange | None, segment: ScoredWindows, moments: list[Moment]
     ) -> None:
         """Make these changes active, since the likeliest of them began."""
-        began = begin_of(segment, max(changes, key=lambda change: change.evidence))
+        likeliest = max(changes, key=lambda change: change.evidence)
+        began, date = begin_of(segment, likeliest), self._date(None if len(changes) > 1 else likeliest)
         way = segment.position_m[began:]
         seen = self._own.segment(self._recent.segment(began - len(moments), Offset(self._own.reference)))
-        since = int(moments[began][1]), moments[began][2]
         for change in changes:
-            self.standing.add(change, rival, since, (float(way.min()), float(way.max())), seen)
+            self.standing.add(change, rival, date, (float(way.min()), float(way.max())), seen)
+
+    @property
+    def _accuracy(self) -> ChangeAccuracy:
+        return self._machine.free if self.standing.directions else self._machine.held
+
+    def _date(self, change: NamedChange | None) -> ChangeDate:
+        """When the change began, by all windows that are remembered; None: a change of every direction."""
+        first = max(self._healthy_from - self._taken, -len(self._recent))
+        moments, known = self._recent.moment[first:], self._accuracy
+        seen = self._own.segment(self._recent.segment(first, self._reference)).without(self.standing.directions)
+        if change is None:
+            score, information = independent(seen.score, seen.information)
+            scatter, inflation = np.zeros(len(DIRECTIONS)), float(known.inflation.max())
+        else:
+            share, j = change.share(seen.position_m), change.direction
+            score, information = (
+                (share * seen.score[:, j])[:, np.newaxis],
+                (share**2 * seen.information[:, j, j])[:, np.newaxis],
+            )
+            scatter, inflation = known.scatter[[j]], float(known.inflation[j])
+        time_s = np.array([time_s for _, _, time_s in moments])
+        rows = rows_of(score, information, time_s, scatter, inflation)
+        remembered = self._healthy_from > 0 and first == self._healthy_from - self._taken
+        return date_of(rows, time_s, [int(sample) for _, sample, _ in moments], healthy_before=remembered)
 
     def _gone_around(self, segment: ScoredWindows) -> bool:
         return bool(np.ptp(segment.position_m) >= _LOOK * self._machine.way_m)

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.motion import PositionCurve
-from livebode.motion.model import basis
-
-Floats = NDArray[np.float64]
+from livebode.motion import PositionCurve, basis
 
 _SMOOTH = 1e-4
 _SLOPE_MAX = 0.5  # of a logarithm per half range of a covariate: prior standard deviation

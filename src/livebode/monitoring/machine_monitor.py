@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from livebode.core import Block, Event, Lines, Stage, StatefulBase
+from livebode.language import Message
 from livebode.monitoring.alarms import Alarm
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.false_alarms import threshold
@@ -55,10 +56,10 @@ class MachineMonitor(StatefulBase):
         far = [about_far(alarms[-1])] if self.detector.standing.far else []
         return far + [about(alarm, within_run=self.detector.within_run(alarm)) for alarm in self._announced()]
 
-    def together(self) -> str:
-        """Their present amounts, estimated together, as text; empty where none is known."""
+    def together(self) -> list[Message]:
+        """Their present amounts, estimated together; empty where none is known."""
         if self.detector.standing.far:
-            return ": the machine is so far from the baseline that no amount can be given"
+            return [Message("the machine is so far from the baseline that no amount can be given")]
         return joint(self._announced())
 
     def _announced(self) -> list[Alarm]:

@@ -8,8 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Lines
 from livebode.monitoring import evidence as word
+from livebode.monitoring.amplitude import STRONGER
 from livebode.monitoring.covariates import window_means
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import LearnedMachine
@@ -17,10 +19,7 @@ from livebode.monitoring.offset import Offset
 from livebode.monitoring.ripple import allowed_for
 from livebode.monitoring.sensitivity import DIRECTIONS, Replay
 from livebode.monitoring.stretches import LEAD_S, WindowStretch
-from livebode.motion.orders import shaft_position
-from livebode.motion.replay import without_drift
-
-Floats = NDArray[np.float64]
+from livebode.motion import shaft_position, without_drift
 
 SIGNALS = 3
 """Torque, velocity, position; the covariates follow them."""
@@ -31,6 +30,7 @@ _LEVEL_MEMORY = 0.9  # per window, of the noise's level
 _LEVEL_RISE_MAX = 4.0
 _UNINFORMED = 1e-6  # of the information for a smallest change at one standard deviation: no run is long enough for that
 _STATUS = f"<U{len(word.NO_COVARIATE)}"  # the longest one
+_SWING, _SWING_MARGIN = 0.2, 1.1  # of the speed: a multisine's peak is up to four times its root mean square
 _DISTURBED = 20.0  # the mean of six detection lines exceeds its own level by this factor once in 1e40 windows
 
 
@@ -69,11 +69,20 @@ class ModelEvidence:
         rest = y - without_drift(velocity, y, lines.window)
         windows = slice(begin[0], begin[-1] + lines.window)
         unexplained = rest[windows].reshape(-1, lines.window) @ wave((*lines.bins, *lines.quiet), lines.window)
+        slopes = _without_drift(slopes, lines.window)
         slope = slopes[:, windows].reshape(len(slopes), -1, lines.window) @ wave(lines.bins, lines.window)
         power = unexplained.real**2 + unexplained.imag**2
         quiet = power[:, len(lines) :]
         centre, speed, status = self._way(x, begin, stretch, bad, covariate)
         level = self._levels(quiet, status)
+        amplitude = _rms(u[windows], lines)
+        mean = y[windows].reshape(-1, lines.window).mean(axis=1)
+        swing = np.linalg.norm(_rms(y[windows], lines), axis=1) / np.maximum(np.abs(mean), np.finfo(float).tiny)
+        excess = machine.amplitude.excess(amplitude)
+        reverses = (excess > STRONGER) & (swing > _SWING_MARGIN * max(machine.swing, _SWING))
+        status[(status == word.JUDGED) & reverses] = word.AMPLITUDE
+        # What the model omits grows with the excitation: it is known only relative to the learned amplitude.
+        level = level * excess**2
         weight = 2 / (machine.noise_power * level[:, np.newaxis])
         e = unexplained[:, : len(lines)]
         conjugate = slope.conj()
@@ -104,6 +113,8 @@ class ModelEvidence:
             ripple_information=gram,
             ripple_gain=(np.abs(ripple[0::2]) ** 2 + np.abs(ripple[1::2]) ** 2).swapaxes(0, 1),
             covariate=covariate,
+            amplitude=amplitude,
+            swing=swing,
         )
 
     def _shifted(self, offset: Offset, covariate: Floats) -> tuple[Offset, Floats]:
@@ -123,13 +134,25 @@ class ModelEvidence:
         covariate = window_means(stretch.data[SIGNALS:], begin, self._lines.window)
         return self._way(held(stretch.data[:SIGNALS], bad)[2], begin, stretch, bad, covariate)
 
-    def residual(self, stretch: WindowStretch, offset: Offset) -> tuple[Floats, Floats]:
-        """The measured velocity less the model's, without slow drift, and the shaft's position, (samples,) each."""
+    def residual(self, stretch: WindowStretch, offset: Offset) -> Floats:
+        """Rows over the samples, (2 + 2·orders, samples).
+
+        The measured velocity less the model's, without slow drift; the velocity by cosine and sine of each order of 1
+        N m; and the shaft's position.
+        """
         u, y, x = held(stretch.data[:SIGNALS], missing(stretch.data[:SIGNALS]))
         begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
         offset, _ = self._shifted(offset, window_means(stretch.data[SIGNALS:], begin, self._lines.window))
         rest = y - without_drift(self._replay.plain(u, x, offset), y, self._lines.window)
-        return rest, shaft_position(x, y, self._lines.window, self._lines.rate_hz)
+        shaft_m = shaft_position(x, y, self._lines.window, self._lines.rate_hz)
+        return np.vstack([rest, self._driven(x, shaft_m), shaft_m])
+
+    def _driven(self, x: Floats, shaft_m: Floats) -> Floats:
+        """Velocity by cosine and sine of each order of 1 N m, without drift, (2·orders, samples)."""
+        if not len(self._machine.ripple):
+            return np.zeros((0, x.size))
+        velocity = self._replay.ripple(self._machine.ripple.cycles_per_m, x, shaft_m)
+        return _without_drift(velocity, self._lines.window)
 
     def _ripple(self, x: Floats, y: Floats, windows: slice) -> NDArray[np.complex128]:
         """Spectrum at the lines of the velocity by each order of 1 N m, without drift, (2·orders, windows, lines)."""
@@ -137,10 +160,8 @@ class ModelEvidence:
         if not len(self._machine.ripple):
             return np.zeros((0, (windows.stop - windows.start) // window, len(self._lines)), dtype=np.complex128)
         shaft_m = shaft_position(x, y, window, self._lines.rate_hz)
-        velocity = self._replay.ripple(self._machine.ripple.cycles_per_m, x, shaft_m)
-        still = np.zeros(x.size)
-        rows = np.array([without_drift(row, still, window) for row in velocity])
-        return np.asarray(rows[:, windows].reshape(len(rows), -1, window) @ transform)
+        velocity = self._driven(x, shaft_m)
+        return np.asarray(velocity[:, windows].reshape(len(velocity), -1, window) @ transform)
 
     def _way(
         self, x: Floats, begin: NDArray[np.int64], stretch: WindowStretch, bad: NDArray[np.bool_], covariate: Floats
@@ -179,6 +200,18 @@ class ModelEvidence:
             self.level = max(1.0, _LEVEL_MEMORY * self.level + (1 - _LEVEL_MEMORY) * rise)
             levels[i] = max(self.level, now[i])
         return levels
+
+
+def _rms(samples: Floats, lines: Lines) -> Floats:
+    """Root mean square of each window at each line, (windows, lines)."""
+    spectrum = samples.reshape(-1, lines.window) @ wave(lines.bins, lines.window)
+    return np.asarray(np.sqrt(2) / lines.window * np.abs(spectrum))
+
+
+def _without_drift(velocities: Floats, window: int) -> Floats:
+    """What remains of each in the residual, from which slow drift is removed, (rows, samples)."""
+    still = np.zeros(velocities.shape[1])
+    return np.array([without_drift(velocity, still, window) for velocity in velocities])
 
 
 def missing(data: Floats) -> NDArray[np.bool_]:

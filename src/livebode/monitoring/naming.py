@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.offset import FAR, LocalChange
 from livebode.monitoring.sensitivity import DIRECTIONS
-
-Floats = NDArray[np.float64]
 
 # Standard deviations of a place, and the grid of its centre, as shares of the learned travel.
 _WIDTHS = np.array([0.015, 0.026, 0.045])

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
-
-Floats = NDArray[np.float64]
 
 _ROWS = 31  # fewer scatter so much that rows get too little variance where the noise has risen
 _MEDIAN = 0.4549364  # of chi square with one degree of freedom

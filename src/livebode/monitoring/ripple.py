@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.installing import needing
-
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
+from livebode.core import needing
 
 _COHERENT = 100.0  # windows in which a ripple may add up as if they were one
 
@@ -23,11 +22,19 @@ class Ripple:
     cycles_per_m
         Of each order over the schedule, (orders,): 24 a turn of a pulley of 19 mm are 201 a metre.
     amplitude_n_m
-        Root mean square of the amplitudes of sine and cosine, N m (orders,); 0 where it is not known yet.
+        Root mean square of the amplitudes of sine and cosine at the lines, N m (orders,); 0 where it is not known yet.
+        It contains what the model omits while the order is on a line, so that this is allowed for as well.
+    peak_n_m
+        Amplitude of the torque away from the lines, N m (orders,); 0 where it is not known.
     """
 
     cycles_per_m: Floats = field(default_factory=lambda: np.zeros(0))
     amplitude_n_m: Floats = field(default_factory=lambda: np.zeros(0))
+    peak_n_m: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if not self.peak_n_m.size:
+            object.__setattr__(self, "peak_n_m", np.zeros(self.cycles_per_m.size))
 
     def __len__(self) -> int:
         return self.cycles_per_m.size

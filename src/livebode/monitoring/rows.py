@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Parameters, Responses, RowArrays, Stage, StatefulBase
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

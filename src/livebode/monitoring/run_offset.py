@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
 from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.between_runs import KNOWN, BetweenRuns
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.naming import ScoredWindows
-
-Floats = NDArray[np.float64]
 
 _MEMORY = 600  # windows that have an offset in common: a minute of motion, as a recording to learn from
 _FULL = 0.8  # of the memory: a larger share takes minutes to fill

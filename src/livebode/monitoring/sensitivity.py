@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.ripple import torques
-from livebode.motion import MovingModel
-from livebode.motion.replay import late
-from livebode.simulation.open_belt import Pair, open_belt
-
-Floats = NDArray[np.float64]
+from livebode.motion import MovingModel, late
+from livebode.simulation import Pair, open_belt
 
 DIRECTIONS = ("stiffness", "load", "damping", "inertia")
 """Directions of a change: Keff, mL, bs, Js; each as a small change of its logarithm."""

@@ -6,10 +6,10 @@ from math import exp, expm1, isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import Event
-from livebode.core.clock import moment
+from livebode.arrays import Floats
+from livebode.core import Event, moment
+from livebode.language import Message
 from livebode.monitoring import evidence as word
 from livebode.monitoring.offset import FAR
 from livebode.monitoring.sensitivity import DIRECTIONS
@@ -21,33 +21,42 @@ if TYPE_CHECKING:
     from livebode.monitoring.machine import LearnedMachine
     from livebode.monitoring.naming import NamedChange
 
-Floats = NDArray[np.float64]
 
 WHAT = {
-    "stiffness": "the belt's stiffness",
-    "load": "the moved mass",
-    "damping": "the belt's damping",
-    "inertia": "the motor's inertia",
+    "stiffness": Message("the belt's stiffness"),
+    "load": Message("the moved mass"),
+    "damping": Message("the belt's damping"),
+    "inertia": Message("the motor's inertia"),
 }
+_FAR_AWAY = Message(
+    "This is so far from the baseline that it may be another machine; the amount is approximate until all differences "
+    "are identified."
+)
 
 
 def changed(alarm: Alarm, sample: int, time_s: float, *, within_run: bool = False) -> Event:
     """A change, as known at this sample and time; `within_run`: relative to the earlier part of this run."""
-    amount = _amount(alarm.change, alarm.now, alarm.bound)
-    message = f"Since {moment(alarm.since_s)} {amount} than {_reference(within_run)}"
-    if (rival := alarm.rival) is not None:
-        message += f"; a possible alternative: {_amount(rival, rival.amount, rival.bound)}"
+    change = _change(alarm.change, alarm.now, alarm.bound, within_run)
+    if (rival := alarm.rival) is None:
+        message = Message("Since {since} {change}.", since=alarm.date.text, change=change)
+    else:
+        message = Message(
+            "Since {since} {change}; a possible alternative: {alternative}.",
+            since=alarm.date.text,
+            change=change,
+            alternative=_amount(rival, rival.amount, rival.bound),
+        )
     if alarm.change.place is None and abs(alarm.now) > FAR:
-        message += ". This is so far from the baseline that it may be another machine; the amount is approximate until "
-        message += "all differences are identified"
-    return Event("change", sample, time_s, message + ".", about(alarm, within_run=within_run))
+        message = Message.sentences([message, _FAR_AWAY])
+    return Event("change", sample, time_s, message, about(alarm, within_run=within_run))
 
 
 def far_away(alarm: Alarm, sample: int, time_s: float) -> Event:
     """A change so large that no single change explains it."""
-    message = (
-        f"Since {moment(alarm.since_s)} the machine is so far from the baseline that no single change explains it: it "
-        "may be another machine. Amounts are reported as soon as the model can follow."
+    message = Message(
+        "Since {since} the machine is so far from the baseline that no single change explains it: it may be "
+        "another machine. Amounts are reported as soon as the model can follow.",
+        since=alarm.date.text,
     )
     return Event("change", sample, time_s, message, about_far(alarm))
 
@@ -60,28 +69,28 @@ def about_far(alarm: Alarm) -> dict[str, Any]:
 
 def corrected(alarm: Alarm, reported: float, sample: int, time_s: float, *, within_run: bool = False) -> Event:
     """The corrected amount of a reported change, after another change was identified that seemed part of it."""
-    message = (
-        f"With all changes since then allowed for, {_amount(alarm.change, alarm.now, alarm.bound)} than "
-        f"{_reference(within_run)}, not {_size(reported)} as reported earlier."
+    message = Message(
+        "With all changes since then allowed for, {change}, not {told} as reported earlier.",
+        change=_change(alarm.change, alarm.now, alarm.bound, within_run),
+        told=_size(reported),
     )
     details = about(alarm, within_run=within_run) | {"told_percent": percent(reported)}
     return Event("change-corrected", sample, time_s, message, details)
 
 
-def joint(alarms: list[Alarm]) -> str:
-    """The active changes, estimated together, as half a sentence."""
-    if not alarms:
-        return ""
-    return ": " + "; ".join(_amount(alarm.change, alarm.now, alarm.bound) for alarm in alarms)
+def joint(alarms: list[Alarm]) -> list[Message]:
+    """The active changes, estimated together."""
+    return [_amount(alarm.change, alarm.now, alarm.bound) for alarm in alarms]
 
 
 def cleared(alarm: Alarm, sample: int, time_s: float, *, within_run: bool = False) -> Event:
     """An alarmed change has disappeared."""
-    where = _where(alarm.change)
-    name = WHAT[DIRECTIONS[alarm.change.direction]]
-    message = (
-        f"At {moment(time_s)} {name}{where} is as {_reference(within_run)} again; it had changed since "
-        f"{moment(alarm.since_s)}."
+    message = Message(
+        "At {time} {part} is as {before} again; it had changed since {since}.",
+        time=moment(time_s),
+        part=_part(alarm.change),
+        before=_reference(within_run),
+        since=moment(alarm.date.since_s),
     )
     return Event("change-cleared", sample, time_s, message, about(alarm, within_run=within_run))
 
@@ -91,17 +100,28 @@ def unknown(machine: LearnedMachine, seen: Evidence, row: int) -> Event:
     status, position_m, speed_m_per_s = str(seen.status[row]), seen.position_m[row], seen.speed_m_per_s[row]
     details = {"reason": status, "position_m": float(position_m), "speed_m_per_s": float(speed_m_per_s)}
     if status == word.FAST:
-        message = (
-            f"The baseline covers speeds up to {machine.fastest_m_per_s:.3g} a second, but the axis moves at "
-            f"{abs(speed_m_per_s):.3g}: such motion is not monitored. Add a run with such speeds and learn again."
+        message = Message(
+            "The baseline covers speeds up to {fastest:.3g} a second, but the axis moves at {speed:.3g}: such "
+            "motion is not monitored. Add a run with such speeds and learn again.",
+            fastest=machine.fastest_m_per_s,
+            speed=abs(speed_m_per_s),
+        )
+    elif status == word.AMPLITUDE:
+        ratio = float(machine.amplitude.excess(seen.amplitude[[row]])[0])
+        message = Message(
+            "The excitation is {ratio:.2g} times as strong as in the learned runs, and may reverse the motion at "
+            "{speed:.3g} a second: such motion is not monitored. Add a run with this excitation and learn again.",
+            ratio=ratio,
+            speed=abs(speed_m_per_s),
         )
     elif status in (word.COVARIATE, word.NO_COVARIATE):
         message = _not_covered(machine.covariates, seen.covariate[row])
         details |= dict(zip(machine.covariates.names, seen.covariate[row].tolist()))
     else:
-        message = (
-            f"The baseline does not cover position {position_m:.3g}: the axis is not monitored there. "
-            "Add a run with such positions and learn again."
+        message = Message(
+            "The baseline does not cover position {position:.3g}: the axis is not monitored there. Add a run "
+            "with such positions and learn again.",
+            position=position_m,
         )
     return Event("baseline-unknown", int(seen.sample[row]), float(seen.time_s[row]), message, details)
 
@@ -111,28 +131,37 @@ def offset_unknown(machine: LearnedMachine, error: float, sample: int, time_s: f
     between, smallest = machine.between, machine.held.smallest
     assert between is not None
     along = np.flatnonzero(between.dominant(smallest))
-    what = " and ".join(WHAT[DIRECTIONS[j]] for j in along)
+    what = [WHAT[DIRECTIONS[j]] for j in along]
     size = np.abs(between.direction[along]) * 100
     beyond = ", ".join(f"{3 * between.spread * s:.2g} %" for s in size)
-    message = (
-        f"The learned runs differ from each other in {what}, and the windows of this run determine its own offset only "
-        f"to ± {error * size[0]:.2g} %. Until it is known better, such a change is detected only beyond {beyond} from "
-        "the baseline. Use a stronger excitation, or learn with the cause as a covariate."
+    message = Message(
+        "The learned runs differ from each other in {parts}, and the windows of this run determine its own offset only "
+        "to ± {reachable_percent:.2g} %. Until it is known better, such a change is detected only beyond {beyond} from "
+        "the baseline. Use a stronger excitation, or learn with the cause as a covariate.",
+        parts=Message.conjunction(what),
+        reachable_percent=float(error * size[0]),
+        beyond=beyond,
     )
-    details = {"reason": word.OFFSET, "reachable_percent": float(error * size[0])}
-    return Event("baseline-unknown", sample, time_s, message, details)
+    return Event("baseline-unknown", sample, time_s, message, {"reason": word.OFFSET})
 
 
-def _not_covered(covariates: Covariates, value: Floats) -> str:
+def _not_covered(covariates: Covariates, value: Floats) -> Message:
     """The first covariate without a value, or outside of the learned range."""
     for i, name in enumerate(covariates.names):
         if not isfinite(value[i]):
-            return f"The covariate {name!r} has no value; the machine is not monitored without it. Check that channel."
+            return Message(
+                "The covariate {covariate} has no value; the machine is not monitored without it. Check that channel.",
+                covariate=repr(name),
+            )
     beside = np.maximum(covariates.low - value, value - covariates.high) / covariates.half_range
     i = int(np.argmax(beside))
-    return (
-        f"The baseline covers {covariates.names[i]!r} from {covariates.low[i]:.4g} to {covariates.high[i]:.4g}, but it "
-        f"is {value[i]:.4g}: the machine is not monitored there. Add a run with such values and learn again."
+    return Message(
+        "The baseline covers {covariate} from {learned_low:.4g} to {learned_high:.4g}, but it is {value:.4g}: the "
+        "machine is not monitored there. Add a run with such values and learn again.",
+        covariate=repr(covariates.names[i]),
+        learned_low=covariates.low[i],
+        learned_high=covariates.high[i],
+        value=value[i],
     )
 
 
@@ -143,8 +172,7 @@ def about(alarm: Alarm, *, within_run: bool = False) -> dict[str, Any]:
         "what": DIRECTIONS[alarm.change.direction],
         "amount_percent": percent(alarm.now),
         "bound_percent": bound_percent(alarm.now, alarm.bound),
-        "since_s": alarm.since_s,
-        "since_sample": alarm.since_sample,
+        **alarm.date.plain(),
         "place_m": place.centre_m if place else None,
         "place_width_m": 2.355 * place.width_m if place else None,  # at half its depth
         "named_from_m": alarm.way_m[0],
@@ -163,20 +191,45 @@ def bound_percent(log_amount: float, log_bound: float) -> float:
     return 100 * log_bound * exp(log_amount)
 
 
-def _reference(within_run: bool) -> str:
-    return "before in this run" if within_run else "in the baseline"
+def _reference(within_run: bool) -> Message:
+    return Message("before in this run") if within_run else Message("in the baseline")
 
 
-def _amount(change: NamedChange, amount: float, bound: float) -> str:
-    within = bound_percent(amount, bound)
-    digits = 2 if within < 0.1 else 1
-    size = f"{abs(percent(amount)):.{digits}f} ± {within:.{digits}f} %"
-    return f"{WHAT[DIRECTIONS[change.direction]]}{_where(change)} is {size} {'less' if amount < 0 else 'more'}"
+def less_or_more(amount: float) -> Message:
+    """The direction of a change."""
+    return Message("less") if amount < 0 else Message("more")
 
 
-def _size(amount: float) -> str:
-    return f"{abs(percent(amount)):.1f} % {'less' if amount < 0 else 'more'}"
+def _change(change: NamedChange, amount: float, bound: float, within_run: bool) -> Message:
+    """A change relative to the baseline, or to the earlier part of this run."""
+    return Message(
+        "{part} is {size} % {way} than {reference}",
+        part=_part(change),
+        size=_percent(amount, bound),
+        way=less_or_more(amount),
+        reference=_reference(within_run),
+    )
 
 
-def _where(change: NamedChange) -> str:
-    return f" around position {change.place.centre_m:.3g}" if change.place else ""
+def _amount(change: NamedChange, amount: float, bound: float) -> Message:
+    size, way = _percent(amount, bound), less_or_more(amount)
+    return Message("{part} is {size} % {way}", part=_part(change), size=size, way=way)
+
+
+def _size(amount: float) -> Message:
+    return Message("{size:.1f} % {way}", size=abs(percent(amount)), way=less_or_more(amount))
+
+
+def _percent(amount: float, bound: float) -> Message:
+    """An amount in percent with its bound."""
+    size, within = abs(percent(amount)), bound_percent(amount, bound)
+    if within < 0.1:
+        return Message("{size:.2f} ± {bound:.2f}", size=size, bound=within)
+    return Message("{size:.1f} ± {bound:.1f}", size=size, bound=within)
+
+
+def _part(change: NamedChange) -> Message:
+    part = WHAT[DIRECTIONS[change.direction]]
+    if change.place is None:
+        return part
+    return Message("{part} around position {position:.3g}", part=part, position=change.place.centre_m)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import Block, Stage, StatefulBase
-
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
+from livebode.core import Block, Stage
+from livebode.monitoring.sample_buffer import SampleBuffer
 
 WINDOWS = 10  # of a stretch: the lead is then half of the work, and an alarm at most a second late
 LEAD_S = 0.5  # for a model to reach the machine's state; a Q of 10 at 50 Hz decays in 0.06 s
@@ -32,21 +30,21 @@ class WindowStretch:
     origin_s: float
 
 
-class Stretches(StatefulBase):
+class Stretches(SampleBuffer):
     """Cuts Blocks at places that depend on sample numbers alone; a gap ends a stretch."""
 
     _stage = Stage("stretches", 1)
     _STATE = ("_start", "_stop", "_next", "_settled", "_origin_s")
 
     def __init__(self, names: tuple[str, ...], window: int, rate_hz: float) -> None:
-        self._names, self._window = names, window
+        super().__init__(names)
+        self._window = window
         self._lead = max(round(LEAD_S * rate_hz), 2 * window)
-        self._parts: list[Floats] = []
         self._start, self._stop, self._next, self._settled, self._origin_s = 0, -1, 0, 0, 0.0
 
     def process(self, block: Block) -> list[WindowStretch]:
         """Stretches that this Block completes."""
-        data = block.data[[block.index(name) for name in self._names]]
+        data = self._rows(block)
         done = self.finish() if self._stop >= 0 and (block.gap or block.start != self._stop) else []
         if self._stop < 0:
             self._start = block.start
@@ -78,11 +76,3 @@ class Stretches(StatefulBase):
         keep = max(self._start, last * self._window - self._lead)
         self._parts, self._start = [data[:, keep - self._start :].copy()], keep
         return stretch
-
-    def _state(self) -> dict[str, Any]:
-        data = np.concatenate(self._parts, axis=1) if self._parts else np.zeros((len(self._names), 0))
-        return super()._state() | {"data": data}
-
-    def _load(self, state: dict[str, Any]) -> None:
-        super()._load(state)
-        self._parts = [state["data"]] if state["data"].size else []

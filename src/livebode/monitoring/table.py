@@ -8,14 +8,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.rows import WindowRows
-
-Floats = NDArray[np.float64]
 
 WAYS = 3
 BACK, STILL, FORTH = range(WAYS)
 """Direction of the schedule: the values of a moving machine depend on it."""
+
+FRICTION, ORDERS = SECTIONS = ("friction", "orders")
+"""Tables whose rows are sections of motion; the others have windows."""
+ALL = "all orders of the "
+"""Begins the name of the component of a whole shaft."""
 
 WINDOWS_MIN = 8
 KNOWN = 4.0  # a change is at least this many standard deviations of the mean that it is compared with
@@ -31,7 +35,7 @@ class ScheduleTable:
     Attributes
     ----------
     what
-        "lines" or "parameters".
+        "lines", "parameters", "friction" or "orders".
     names
         Of the columns, (columns,): "20 Hz", or the parameter.
     low, step
@@ -42,13 +46,15 @@ class ScheduleTable:
         (bins, ways, columns); complex for lines. NaN where nothing was learned.
     covariance
         Of the relative deviation, for lines of real and imaginary part (bins, ways, lines, 2, 2), for parameters
-        (bins, ways, 1, parameters, parameters).
+        (bins, ways, 1, parameters, parameters), for friction and orders the variances, (bins, ways, components, 1, 1).
     variance
         Mean of the rows' own estimates of their variance, relative, (bins, ways, columns).
     count
         Windows learned, (bins, ways).
     accuracy
         Of each component: real and imaginary part of each line, or each parameter.
+    unit
+        Of the amplitudes of orders.
     """
 
     what: str
@@ -61,6 +67,7 @@ class ScheduleTable:
     variance: Floats
     count: NDArray[np.int64]
     accuracy: ChangeAccuracy
+    unit: str = ""
 
     def place(self, rows: WindowRows) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """Flat number of the cell (bin and direction) of each row, and whether the cell was learned."""
@@ -94,6 +101,17 @@ class ScheduleTable:
             deviation = relative.real
         own = np.where(np.isfinite(deviation + more), self._weighed[cell], np.inf)
         return deviation, own, np.nan_to_num(more)
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Name of each component: real and imaginary part of a line share it."""
+        return tuple(name for name in self.names for _ in range(2 if self.what == "lines" else 1))
+
+    @property
+    def information(self) -> Floats:
+        """Mean information of a learned row for a change of each component, (components,)."""
+        weight = self.count.ravel() / self.count.sum()
+        return np.asarray(weight @ np.nan_to_num(1 / self._weighed))
 
     @cached_property
     def _weighed(self) -> Floats:

@@ -7,21 +7,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Event, Stage, StatefulBase
+from livebode.language import Message
+from livebode.monitoring import evidence as word
+from livebode.monitoring.change_date import date_of, rows_of
 from livebode.monitoring.charts import Charts
+from livebode.monitoring.evidence import PLACE
 from livebode.monitoring.false_alarms import threshold
+from livebode.monitoring.monitored_time import INVALID, THE_MACHINE, WEAK, MonitoredTime
 from livebode.monitoring.newest_rows import NewestRows
 from livebode.monitoring.noise_level import NoiseLevel
 from livebode.monitoring.rows import WindowRows
-from livebode.monitoring.table import ScheduleTable
+from livebode.monitoring.table import FRICTION, ORDERS, SECTIONS, ScheduleTable
 from livebode.monitoring.table_sentences import cleared, differs, unknown
 
-Floats = NDArray[np.float64]
-
 _LOOK_WINDOWS = 10  # rows between detection and report, so that all changes are visible
+_LOOK_SECTIONS = 2  # the same of friction and orders: the second one is the first that is whole
 _KEPT = 600  # rows, over which the amount of a change is taken at most
 _CONFIDENCE = 1.96
 _CHANGED_FROM = 3.0  # standard deviations, from which on a component counts among what changed
+
+
+_WHOLE = {FRICTION: Message("the friction"), ORDERS: Message("the orders")}
 
 
 class TableMonitor(StatefulBase):
@@ -40,22 +48,29 @@ class TableMonitor(StatefulBase):
         Mean time between false alarms, and between rows, s.
     """
 
-    _stage = Stage("table-monitor", 1)
-    _STATE = ("_charts", "_noise", "_standing", "_seen_in", "judged", "_found", "_told_unknown")
+    _stage = Stage("table-monitor", 2)
+    _STATE = (
+        "_charts", "_noise", "_standing", "_seen_in", "_rows_judged", "_found", "_told_unknown", "_cleared", "time",
+    )  # fmt: skip
 
     def __init__(self, table: ScheduleTable, mean_s: float, step_s: float) -> None:
         self._table = table
         size = table.accuracy.smallest.size
-        self._charts = Charts(table.accuracy.smallest, table.accuracy.allowed, threshold(mean_s, step_s, 2 * size))
+        height = threshold(mean_s, step_s, 2 * size)
+        self._charts = Charts(table.accuracy.smallest, table.accuracy.allowed, height)
+        sections = table.what in SECTIONS
+        self.time = MonitoredTime(
+            table.components, table.information, table.accuracy, height, _WHOLE.get(table.what, THE_MACHINE)
+        )
+        self._look, self._invalid = (_LOOK_SECTIONS, word.SLOW) if sections else (_LOOK_WINDOWS, INVALID)
         self._noise = NoiseLevel(size, 2 if table.what == "lines" else 1)
-        self.judged = 0
-        """Rows judged so far."""
-        self._told_unknown = False
+        self._rows_judged = 0
+        self._told_unknown = self._cleared = False
         self._standing = np.zeros(size, dtype=bool)
         self._seen_in = np.zeros(table.count.size, dtype=bool)
         self._found = -1
         self._newest = np.full(size, np.nan)
-        # Since a sum left zero, of every row: score, information, and schedule, sample, time and cell.
+        # Of the newest rows, since a change was reported: score, information, and schedule, sample, time and cell.
         self._score, self._information = NewestRows(size, _KEPT), NewestRows(size, _KEPT)
         self._moment = NewestRows(4, _KEPT)
 
@@ -66,6 +81,11 @@ class TableMonitor(StatefulBase):
     def _forget(self) -> None:
         for rows in self._rows().values():
             rows.clear()
+
+    @property
+    def judged(self) -> int:
+        """Rows judged so far, in time that is monitored."""
+        return self.time.judged
 
     @property
     def standing(self) -> bool:
@@ -81,57 +101,62 @@ class TableMonitor(StatefulBase):
             self._newest = deviation[judged[-1]]
         variance = np.full(own.shape, np.inf)
         variance[judged] = self._noise.process(deviation[judged], own[judged], more[judged])
+        share = 1 / variance / self.time.needed
         information = 1 / variance / self._table.accuracy.inflation
         score = np.where(information > 0, deviation, 0.0) * information
         events: list[Event] = []
-        for i in np.flatnonzero(rows.ok):
+        for i, ok in enumerate(rows.ok):
             moment = (float(rows.schedule[i]), int(rows.sample[i]), float(rows.time_s[i]))
-            if known[i]:
+            reason = WEAK if ok and known[i] else PLACE if ok else self._invalid
+            events += self.time.step(share[i] if reason == WEAK else None, reason, *moment[1:])
+            if reason == WEAK:
                 events += self._row(score[i], information[i], (*moment, float(cell[i])))
-            elif not self._told_unknown:
+            elif ok and not self._told_unknown:
                 self._told_unknown = True
                 events.append(unknown(*moment))
         return events
 
     def finish(self) -> list[Event]:
-        """An alarm that is not reported yet."""
-        if self._found < 0 or not len(self._moment.array):
-            return []
-        return self._changes()
+        """An alarm that is not reported yet, and the last time that was not monitored."""
+        found = self._changes() if self._found >= 0 and len(self._moment.array) else []
+        return found + self.time.finish()
 
     def _row(self, score: Floats, information: Floats, moment: tuple[float, int, float, float]) -> list[Event]:
-        self.judged += 1
+        self._rows_judged += 1
         if self.standing and not self._seen_in[int(moment[3])]:
             return []
-        self._charts.step(score, information, self.judged)
+        self._charts.step(score, information, self._rows_judged)
         if self.standing:
             if np.any(self._charts.sums[:, self._standing] > 0):
                 return []
             self._standing[:] = False
             self._charts.reset()
+            self._cleared = True
             return [cleared(self._table, moment[1], moment[2])]
-        if self._found < 0 and not self._charts.sums.any():
-            self._forget()
-            return []
         self._score.append(score)
         self._information.append(information)
         self._moment.append(moment)
         if self._found < 0 and self._charts.alarmed:
-            self._found = self.judged
-        return self._changes() if 0 <= self._found <= self.judged - _LOOK_WINDOWS else []
+            self._found = self._rows_judged
+        return self._changes() if 0 <= self._found <= self._rows_judged - self._look else []
 
     def _changes(self) -> list[Event]:
         raised = self._charts.sums >= self._charts.threshold
         scores, informations, moments = self._score.array, self._information.array, self._moment.array
-        first = _began(scores, informations, np.asarray(raised.any(axis=0)))
+        shown = np.asarray(raised.any(axis=0)) if raised.any() else np.ones(raised.shape[1], dtype=bool)
+        first = _began(scores, informations, shown)
         # The window in which the change occurs contains a part of it; the amount is from the windows after it.
         whole = min(first + 1, len(moments) - 1)
-        score, information = scores[whole:].sum(axis=0), informations[whole:].sum(axis=0)
+        known = informations[whole:].any(axis=0)  # else the first row alone shows the component
+        score, information = (
+            np.where(known, rows[whole:].sum(axis=0), rows[first:].sum(axis=0)) for rows in (scores, informations)
+        )
         accuracy = self._table.accuracy
         seen = information > 0
         amount = np.where(seen, score / np.where(seen, information, 1.0), 0.0)
         sigma = np.where(seen, np.hypot(1 / np.sqrt(np.where(seen, information, 1.0)), accuracy.scatter), np.inf)
         changed = (np.abs(amount) >= np.maximum(_CHANGED_FROM * sigma, accuracy.smallest / 2)) | raised.any(axis=0)
+        changed &= seen
         self._standing, self._found = changed, -1
         if not changed.any():  # the sum that raised it decreased again before the report
             self._forget()
@@ -139,7 +164,9 @@ class TableMonitor(StatefulBase):
         moment = moments[first:]
         self._seen_in[:] = False
         self._seen_in[moment[:, 3].astype(int)] = True
-        event = differs(self._table, changed, amount, _CONFIDENCE * sigma, moment)
+        rows = rows_of(scores[:, shown], informations[:, shown], moments[:, 2], accuracy.scatter[shown])
+        date = date_of(rows, moments[:, 2], moments[:, 1].astype(int).tolist(), healthy_before=self._cleared)
+        event = differs(self._table, changed, amount, _CONFIDENCE * sigma, moment, date)
         # A named component without a sum of its own gets one that keeps the alarm active.
         up = np.stack([amount > 0, amount <= 0]) & changed
         self._charts.sums = np.where(up, self._charts.threshold, 0.0)
@@ -163,7 +190,6 @@ def _began(score: Floats, information: Floats, raised: NDArray[np.bool_]) -> int
 
     Over the rows since a moment a component's evidence is S²/(2I), with its amount at its likeliest, S/I.
     """
-    raised = raised if raised.any() else np.ones_like(raised)
     total, known = (np.cumsum(x[::-1, raised], axis=0)[::-1] for x in (score, information))
     evidence = np.where(known > 0, total**2 / (2 * np.where(known > 0, known, 1.0)), 0.0)
     return int(np.argmax(evidence.sum(axis=1)))

@@ -7,34 +7,46 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Event
-from livebode.core.clock import moment as clock_moment
-from livebode.monitoring.table import ScheduleTable
-
-Floats = NDArray[np.float64]
+from livebode.core import moment as clock_moment
+from livebode.language import Message
+from livebode.monitoring.change_date import ChangeDate
+from livebode.monitoring.monitored_time import with_more
+from livebode.monitoring.table import ALL, ORDERS, STILL, ScheduleTable
 
 _NAMED = 4
 
 
-def differs(table: ScheduleTable, changed: NDArray[np.bool_], amount: Floats, bound: Floats, moment: Floats) -> Event:
+def differs(
+    table: ScheduleTable, changed: NDArray[np.bool_], amount: Floats, bound: Floats, moment: Floats, date: ChangeDate
+) -> Event:
     """A change; `moment` is schedule, sample and time of every row since it began."""
     if table.what == "lines":
         amount, bound = _polar(amount, bound)
-    items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in np.flatnonzero(changed)]
-    items.sort(key=lambda item: -abs(item["amount"]) / item["bound"])
-    named = "; ".join(_phrase(item) for item in items[:_NAMED])
-    more = f"; and {len(items) - _NAMED} more" if len(items) > _NAMED else ""
+    at = sorted(np.flatnonzero(changed), key=lambda j: -abs(amount[j]) / bound[j])
+    items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in at]
+    changes = with_more([_phrase(item) for item in items[:_NAMED]], len(items) - _NAMED)
     schedule = moment[:, 0][np.isfinite(moment[:, 0])]
     where = [float(schedule.min()), float(schedule.max())] if schedule.size else None
-    place = f", seen from {where[0]:.3g} to {where[1]:.3g}" if where else ""
     details = {
         "what": table.what,
         "changes": items,
-        "since_s": float(moment[0, 2]),
-        "since_sample": int(moment[0, 1]),
+        **date.plain(),
         "seen_at": where,
     }
-    message = f"Since {clock_moment(moment[0, 2])} the machine differs from the baseline{place}: {named}{more}."
+    if where is None:
+        message = Message(
+            "Since {since} the machine differs from the baseline: {differences}.", since=date.text, differences=changes
+        )
+    else:
+        message = Message(
+            "Since {since} the machine differs from the baseline, seen from {low:.3g} to {high:.3g}: {differences}.",
+            since=date.text,
+            low=where[0],
+            high=where[1],
+            differences=changes,
+        )
     return Event("change", int(moment[-1, 1]), float(moment[-1, 2]), message, details)
 
 
@@ -52,24 +64,32 @@ def _polar(amount: Floats, bound: Floats) -> tuple[Floats, Floats]:
 
 def cleared(table: ScheduleTable, sample: int, time_s: float) -> Event:
     """All changes have disappeared."""
-    message = f"At {clock_moment(time_s)} the {_KIND[table.what]} agree with the baseline again."
+    message = Message("At {time} {parts} with the baseline again.", time=clock_moment(time_s), parts=_KIND[table.what])
     return Event("change-cleared", sample, time_s, message, {"what": table.what})
 
 
 def unknown(schedule: float, sample: int, time_s: float) -> Event:
     """The machine is at a position or moves in a direction that was not learned."""
-    message = (
-        f"The baseline does not cover {schedule:.4g} in this direction: the machine is not monitored there. "
-        "Add a run with such motion and learn again."
+    message = Message(
+        "The baseline does not cover {schedule:.4g} in this direction: the machine is not monitored there. Add "
+        "a run with such motion and learn again.",
+        schedule=schedule,
     )
-    return Event("baseline-unknown", sample, time_s, message, {"reason": "place", "schedule": schedule})
+    return Event("baseline-unknown", sample, time_s, message, {"reason": "place"})
 
 
-_KIND = {"lines": "responses", "parameters": "parameters"}
+_KIND = {
+    "lines": Message("the responses agree"),
+    "parameters": Message("the parameters agree"),
+    "friction": Message("the friction agrees"),
+    "orders": Message("the orders agree"),
+}
 
 
 def _item(table: ScheduleTable, component: int, amount: float, bound: float) -> dict[str, Any]:
-    if table.what == "parameters":
+    if table.what == ORDERS:
+        return _order(table, component, amount, bound)
+    if table.what != "lines":
         return {
             "name": table.names[component],
             "of": "value",
@@ -83,6 +103,29 @@ def _item(table: ScheduleTable, component: int, amount: float, bound: float) -> 
     return {"name": name, "of": "magnitude", "unit": "%", "amount": 100 * amount, "bound": 100 * bound}
 
 
-def _phrase(item: dict[str, Any]) -> str:
-    size = f"{item['amount']:+.1f} ± {item['bound']:.1f} {item['unit']}"
-    return f"{item['name']} {size}" if item["of"] == "value" else f"{item['of']} at {item['name']} {size}"
+def _order(table: ScheduleTable, component: int, amount: float, bound: float) -> dict[str, Any]:
+    """An order, from the deviation of the cube root of the square of its amplitude; or all orders of a shaft."""
+    name, factor = table.names[component], max(1 + amount, 0.0) ** 1.5
+    wide = 1.5 * np.sqrt(max(1 + amount, 0.0)) * bound
+    if name.startswith(ALL):
+        return {"name": name, "of": "value", "unit": "%", "amount": 100 * (factor - 1), "bound": 100 * wide}
+    before = float(table.mean[0, STILL, component].real) ** 1.5
+    return {
+        "name": name, "of": "amplitude", "unit": table.unit, "amount": factor * before, "bound": wide * before,
+        "baseline": before,
+    }  # fmt: skip
+
+
+def _phrase(item: dict[str, Any]) -> Message:
+    name, facts = item["name"], {"amount": item["amount"], "bound": item["bound"]}
+    if item["of"] == "magnitude":
+        return Message("magnitude at {line} {amount:+.1f} ± {bound:.1f} %", line=name, **facts)
+    if item["of"] == "phase":
+        return Message("phase at {line} {amount:+.1f} ± {bound:.1f} °", line=name, **facts)
+    part = name if isinstance(name, Message) else Message(name)
+    if item["of"] == "value":
+        return Message("{part} {amount:+.1f} ± {bound:.1f} %", part=part, **facts)
+    size = Message("{amount:.3g} ± {bound:.2g}", **facts)
+    if item["unit"]:
+        size = Message("{amount:.3g} ± {bound:.2g} {unit}", unit=item["unit"], **facts)
+    return Message("{part} {size}, {before:.3g} in the baseline", part=part, size=size, before=item["baseline"])

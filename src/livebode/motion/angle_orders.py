@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import SignalError, UsageError, widened
+from livebode.arrays import Complex, Floats
+from livebode.core import SignalError, UsageError
 from livebode.kernel import SlidingDFT
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+SLOWEST = 0.05  # of the highest speed, from which on an axis counts as moving
 
 _OVERSAMPLED = 8  # steps in the shortest cycle
 _STEPS_MIN = 64  # a turn
 _MAIN_LOBE = 2.0  # bins on each side that a tone reaches under the Hann window
-_STROKES_MIN = 4  # whose scatter is a bound
-_FALSE = 1e-3  # probability that any order of a shaft is seen by chance
 _GAIN = 0.5  # mean of the Hann window
 _MOST = 400  # orders of a shaft
 
@@ -101,73 +98,6 @@ class AngleWindows:
     slowest: Floats
     fastest: Floats
     sample: NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class ShaftOrders:
-    """The orders of one shaft.
-
-    Attributes
-    ----------
-    shaft
-        Its name, turns and orders.
-    value
-        Complex amplitude of each order, (orders,): the torque is Re(value·exp(j·order·angle)), with the angle of this
-        shaft. NaN where no window shows the order.
-    sigma, dof
-        E|error|² = sigma², and its complex degrees of freedom, (orders,).
-    seen
-        Whether the order differs from zero; by chance, any order of a shaft does once in 1,000 results.
-    strokes, windows
-        Numbers of strokes and windows behind each order, (orders,).
-    meets_hz
-        Line that the order meets in every window, so that it cannot be separated from the line; else NaN.
-    by_strokes
-        Whether sigma is the scatter between strokes. That between the windows of a few strokes does not show a line of
-        the time, if the speed is constant.
-    """
-
-    shaft: Shaft
-    value: Complex
-    sigma: Floats
-    dof: Floats
-    seen: NDArray[np.bool_]
-    strokes: NDArray[np.int64]
-    windows: NDArray[np.int64]
-    meets_hz: Floats
-    by_strokes: bool
-
-    @property
-    def amplitude(self) -> Floats:
-        """Peak values, (orders,)."""
-        return np.abs(self.value)
-
-    @property
-    def phase_deg(self) -> Floats:
-        """Phase of the cosine at angle 0, (orders,)."""
-        return np.degrees(np.angle(self.value))
-
-    def bound(self, c: float = np.sqrt(np.log(20.0))) -> Floats:
-        """Radius around the complex amplitude that covers the true one with probability 1 − exp(−c²); default: 95 %."""
-        return widened(self.sigma, self.dof, float(c))
-
-    def torque(self, angle: Floats) -> Floats:
-        """The sum of the orders that are seen, at angles of this shaft in rad."""
-        k = np.array(self.shaft.orders)[self.seen]
-        return np.asarray((self.value[self.seen] * np.exp(1j * np.multiply.outer(angle, k))).real.sum(axis=-1))
-
-    def plain(self) -> dict[str, Any]:
-        """As plain data, for JSON; bounds of 95 %."""
-        names = ("amplitude", "phase_deg", "bound", "seen", "strokes", "windows", "meets_hz")
-        bound = self.bound()
-        columns = [self.amplitude, self.phase_deg, bound, self.seen, self.strokes, self.windows, self.meets_hz]
-        rows = [dict(zip(names, (one.item() for one in row))) for row in zip(*columns)]
-        return {
-            "shaft": self.shaft.name,
-            "turns": self.shaft.turns,
-            "bounds_from": "strokes" if self.by_strokes else "windows",
-            "orders": [{"order": order} | row for order, row in zip(self.shaft.orders, rows)],
-        }
 
 
 def strokes_of(angle: Floats, speed: Floats, torque: Floats, rate_hz: float, slowest: float) -> list[Stroke]:
@@ -251,64 +181,13 @@ def _means(signal: Floats, when: Floats) -> Floats:
     return np.asarray(np.diff(total) / np.diff(when))
 
 
-def shaft_orders(
-    windows: AngleWindows,
-    shaft: Shaft,
-    value: Complex,
-    extra: Floats,
-    lines_hz: Floats,
-    highest_hz: float,
-    turns: int = 2,
-) -> ShaftOrders:
-    """Mean over all windows in which an order meets no line of the time, with the scatter between strokes.
-
-    An order has the same phase over the angle in every stroke; a line of the time, at a constant frequency, has another
-    one in each, and at another speed it is at another order. With four strokes or more, sigma is therefore the scatter
-    between their means; else that between windows.
-
-    Parameters
-    ----------
-    windows
-        Of `angle_windows`.
-    shaft
-        The same.
-    value
-        Amplitudes, (windows, orders).
-    extra
-        Further standard deviation of the mean, (orders,): of the inertia.
-    lines_hz
-        Frequencies at which the time has lines, such as those of the excitation.
-    highest_hz
-        Windows in which an order is faster are not used: the axis does not move as one mass there.
-    turns
-        Of a window.
-    """
-    orders = np.array(shaft.orders)
-    use, meets = usable_windows(windows, shaft, lines_hz, highest_hz, turns)
-    by_strokes = bool(np.unique(windows.stroke).size >= _STROKES_MIN)
-    many = [_mean(value[use[:, i], i], windows.stroke[use[:, i]], by_strokes) for i in range(orders.size)]
-    mean, variance, dof = (np.array(one) for one in zip(*many))
-    sigma = np.sqrt(variance + extra**2)
-    limit = widened(sigma, dof, float(np.sqrt(np.log(orders.size / _FALSE))))
-    return ShaftOrders(
-        shaft=shaft,
-        value=mean.astype(np.complex128),
-        sigma=sigma,
-        dof=dof,
-        seen=np.abs(mean) > limit,
-        strokes=np.array([np.unique(windows.stroke[use[:, i]]).size for i in range(orders.size)]),
-        windows=use.sum(axis=0),
-        meets_hz=meets,
-        by_strokes=by_strokes,
-    )
-
-
 def usable_windows(
     windows: AngleWindows, shaft: Shaft, lines_hz: Floats, highest_hz: float, turns: int = 2
 ) -> tuple[NDArray[np.bool_], Floats]:
     """Windows in which an order meets no line and is not too fast, (windows, orders), and the line met in all of them.
 
-    The arguments are those of `shaft_orders`. The line is NaN for an order that has a window.
+    `lines_hz` are frequencies at which the time has lines, `highest_hz` that above which the axis does not move as one
+    mass, and `turns` those of a window. The line is NaN for an order that has a window.
     """
     orders = np.array(shaft.orders)
     low, high = (one[:, np.newaxis] * orders for one in (windows.slowest, windows.fastest))
@@ -323,23 +202,3 @@ def usable_windows(
     use = ~met & slow
     meets[use.any(axis=0) | ~slow.any(axis=0)] = np.nan
     return use, meets
-
-
-def _mean(value: Complex, stroke: NDArray[np.int64], by_strokes: bool) -> tuple[complex, float, float]:
-    """Mean, variance of the mean and degrees of freedom; NaN where there are fewer than two groups.
-
-    Windows of a stroke overlap by a half, and count by their number.
-    """
-    if not by_strokes:
-        stroke = np.arange(value.size) // 2  # two neighbours: the others overlap with one of them only
-    groups, at, weight = np.unique(stroke, return_inverse=True, return_counts=True)
-    if groups.size < 2:
-        return complex(np.nan), np.nan, np.nan
-    share = weight / weight.sum()
-    mean = complex(value.mean())
-    each = np.array([value[at == g].mean() for g in range(groups.size)])
-    # E Σ share²·|each − mean|² of groups whose variance falls with their number of windows.
-    expected = 1 - np.sum(share**2)
-    variance = float(np.sum(share**2 * np.abs(each - mean) ** 2)) / expected
-    dof = float(1 / np.sum(share**2) - 1)
-    return mean, variance, max(dof, 1.0)

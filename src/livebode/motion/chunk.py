@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Block, Lines, Stage, StatefulBase
-from livebode.estimation.implausible import PlausibleRange
+from livebode.estimation import PlausibleRange
 from livebode.kernel import SlidingDFT
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

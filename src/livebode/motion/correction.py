@@ -8,9 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, Stage, StatefulBase, hand_over, ignore
-from livebode.estimation import Settings, Tracker
-from livebode.estimation.set_aside import NOTHING, contains
+from livebode.estimation import NOTHING, Settings, Tracker, contains
 from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, RecentSamples
 from livebode.motion.drive import drive_of
@@ -21,9 +21,6 @@ from livebode.motion.residual import Scatter, residual
 from livebode.motion.ripple_watch import RippleMonitor
 from livebode.motion.standstill import StandstillDetector, without
 from livebode.motion.waiting import PendingResponses
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _LEAD_S = 0.5  # before a chunk, for the model to reach the machine's state; a Q of 10 at 50 Hz decays in 0.06 s
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import PID, Cascade, Loop, SimulationError
-from livebode.simulation.settings import Drive
+from livebode.simulation import Drive
 
 
 def drive_of(loop: Loop, rate_hz: float) -> Drive:

@@ -6,17 +6,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import FitError
-from livebode.fitting import two_masses
-from livebode.fitting.least_squares import minimise
-from livebode.fitting.windows import scan
+from livebode.fitting import minimise, scan, two_masses
 from livebode.kernel import BeltGrid, BeltRows, BeltSplines, belt_together
 from livebode.motion.model import MovingModel, PositionCurve, basis
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _SCANNED_ROWS = 24
 _SMOOTH = 1e-3  # of a third difference of the splines' weights, against the weight of all responses

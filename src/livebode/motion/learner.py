@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Responses, Stage, StatefulBase
 from livebode.estimation import Settings
 from livebode.motion.chunk import Chunk
@@ -17,9 +18,6 @@ from livebode.motion.model import MovingModel, PositionCurve
 from livebode.motion.residual import Residual
 from livebode.motion.standstill import turns
 from livebode.motion.steady import FLAT_M, steady_rows
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

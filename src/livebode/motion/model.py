@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Floats
 from livebode.kernel import CurveShape, curve_at, curve_splines
-
-Floats = NDArray[np.float64]
 
 _DEGREE = 3
 _SHOWN = 11

@@ -7,11 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Lines, Stage, StatefulBase
-from livebode.core.distributions import log_sum_exceeded
+from livebode.arrays import Floats
+from livebode.core import Lines, Stage, StatefulBase, log_sum_exceeded
 from livebode.motion.replay import without_drift
-
-Floats = NDArray[np.float64]
 
 _PADDED = 2  # travels: length of the transform over the position
 _FINE = 2.5  # samples of the position in the shortest cycle that is looked for
@@ -19,6 +17,7 @@ _FROM = 0.25  # of a bin, Hz: slower drift is removed
 _BEYOND = 2  # bins above the highest line, whose orders still leak into it
 _FLOOR = 32  # widths of a peak, over which the noise is taken as constant
 _MASKED = 4.5  # widths of a peak, beside a line: the model's error may be there
+_PEAK = 2.0  # widths of a peak on each side, which have its power though its order is known to half of one
 _CAP = 12.0  # of a stroke's power over its noise: a single stroke does not make an order
 _STROKES_MIN = 5
 _FALSE = 1e-4  # probability of a false order
@@ -89,12 +88,55 @@ class OrderSpectrum(StatefulBase):
 
         `gain` gives |G| at frequencies in Hz; with it the torque of each order is also known (`amplitudes`).
         """
-        even = _over_position(residual, position_m, self._step_m)
-        width = self._points / max(even.size, 1)
-        if even.size < _FLOOR or width > self.cycles_per_m.size / _FLOOR:
+        if (stroke := self._stroke(residual, position_m)) is None:
             return
-        window = _blackman_harris(even.size)
-        power = np.abs(np.fft.rfft((even - even.mean()) * window, self._points)) ** 2
+        power, noise, use, frequency_hz, window = stroke
+        ratio = power[use] / noise[use]
+        self._sum[use] += np.minimum(ratio, _CAP)
+        self._whole[use] += ratio
+        self._count += use
+        if gain is not None:
+            # Of a tone of amplitude a, windowed by w and averaged over steps, the power is (a·Σw/2·sinc)².
+            whole = window.sum() / 2 * np.sinc(self.cycles_per_m[use] * self._step_m)
+            self._torque[use] += np.maximum(power[use] - noise[use], 0.0) / (whole * gain(frequency_hz[use])) ** 2
+
+    def explained(self, residual: Floats, driven: Floats, position_m: Floats, orders: Floats) -> Floats:
+        """Evidence of a stroke for the squared amplitude of orders of this spectrum, (2, orders), to be summed.
+
+        With the power P of the residual around an order, N of the noise, and H of the velocity that 1 N m of the order
+        gives: H·(P − N)/N² and H²/N². The ratio of their sums is the squared amplitude, by least squares. Zero where
+        the order is beside a line.
+
+        Parameters
+        ----------
+        residual, position_m
+            As for `add`.
+        driven
+            Velocity by cosine and sine of each order, 1 N m, rad/s, (2·orders, samples).
+        """
+        if (stroke := self._stroke(residual, position_m)) is None:
+            return np.zeros((2, orders.size))
+        power, noise, use, _, window = stroke
+        beside = round(_PEAK * self._points / window.size)
+        around = np.searchsorted(self.cycles_per_m, orders)[:, np.newaxis] + np.arange(-beside, beside + 1)
+        around = around.clip(0, power.size - 1)
+        each = np.array([self._power(row, position_m, window) for row in driven])
+        gain = (each[0::2] + each[1::2])[np.arange(orders.size)[:, np.newaxis], around].sum(axis=1) / 2
+        known, floor = use[around].all(axis=1), noise[around].sum(axis=1)
+        floor = np.where(known, floor, 1.0)
+        above = power[around].sum(axis=1) - floor
+        return np.asarray(np.where(known, [gain * above / floor**2, (gain / floor) ** 2], 0.0))
+
+    def _stroke(
+        self, residual: Floats, position_m: Floats
+    ) -> tuple[Floats, Floats, NDArray[np.bool_], Floats, Floats] | None:
+        """Power, noise, the orders to use, their frequencies, and the window; None of a stroke that is too short."""
+        samples = _over_position(residual, position_m, self._step_m).size
+        width = self._points / max(samples, 1)
+        if samples < _FLOOR or width > self.cycles_per_m.size / _FLOOR:
+            return None
+        window = _blackman_harris(samples)
+        power = self._power(residual, position_m, window)
         block = round(_FLOOR * width)
         blocks = power[: power.size // block * block].reshape(-1, block)
         noise = np.interp(
@@ -105,14 +147,12 @@ class OrderSpectrum(StatefulBase):
         use = (frequency_hz > self._least_hz) & (frequency_hz < self._most_hz) & (noise > 0)
         beside = np.abs(frequency_hz[:, np.newaxis] - self._lines_hz).min(axis=1)
         use &= beside > _MASKED * width * self.cycles_per_m[1] * speed
-        ratio = power[use] / noise[use]
-        self._sum[use] += np.minimum(ratio, _CAP)
-        self._whole[use] += ratio
-        self._count += use
-        if gain is not None:
-            # Of a tone of amplitude a, windowed by w and averaged over steps, the power is (a·Σw/2·sinc)².
-            whole = window.sum() / 2 * np.sinc(self.cycles_per_m[use] * self._step_m)
-            self._torque[use] += np.maximum(power[use] - noise[use], 0.0) / (whole * gain(frequency_hz[use])) ** 2
+        return power, noise, use, frequency_hz, window
+
+    def _power(self, velocity: Floats, position_m: Floats, window: Floats) -> Floats:
+        """Power over the orders of a velocity along a stroke."""
+        even = _over_position(velocity, position_m, self._step_m)
+        return np.asarray(np.abs(np.fft.rfft((even - even.mean()) * window, self._points)) ** 2)
 
     def amplitudes(self, orders: Floats) -> Floats:
         """Root mean square over the strokes of each order's amplitude, N m, (orders,)."""

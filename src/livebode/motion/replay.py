@@ -5,19 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import SimulationError
 from livebode.kernel import BeltCourse, BeltMasses, belt_replay
 from livebode.motion.model import MovingModel
-from livebode.simulation._axis import Engine
-from livebode.simulation._axis import late as _late
-from livebode.simulation.configuration import BeltAxis, engine_settings
-from livebode.simulation.mechanics import Mechanics
-from livebode.simulation.motion import Standstill
-from livebode.simulation.settings import Drive
-
-Floats = NDArray[np.float64]
+from livebode.simulation import BeltAxis, Drive, Engine, Mechanics, Standstill, engine_settings
+from livebode.simulation import late as _late
 
 _PLACE_M = 1.0  # where the small motion is simulated; the spans are set tick by tick
 _INPUTS = 10

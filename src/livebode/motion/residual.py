@@ -6,15 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Block, Channel, Responses, Stage, StatefulBase
 from livebode.estimation import Settings, Tracker
 from livebode.motion.chunk import Chunk
 from livebode.motion.model import MovingModel
 from livebode.motion.replay import by_torque, without_drift
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
 from livebode.estimation import RippleOrder, RippleSpeed, Settings, ripple_power
 from livebode.motion.chunk import Chunk
@@ -15,8 +16,6 @@ from livebode.motion.fit import sampled
 from livebode.motion.model import MovingModel
 from livebode.motion.orders import OrderSpectrum, shaft_position
 from livebode.motion.steady import steady_rows
-
-Floats = NDArray[np.float64]
 
 _SLOWER = 0.5  # of the first stroke's speed: lowest speed of a later one
 _GRID = 64  # frequencies at which the model's gain is computed

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import SignalError
-
-Floats = NDArray[np.float64]
 
 _CONDITION = 1e-10  # of the scaled normal matrix
 _COSINES = 0.4  # times samples^(2/3): cosines of the long-run covariance

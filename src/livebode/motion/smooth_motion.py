@@ -8,9 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Block, SignalError
-
-Floats = NDArray[np.float64]
 
 OutputKind = Literal["position", "velocity"]
 
@@ -22,6 +21,8 @@ _SLOWEST = 0.01  # of the highest speed
 _FINE = 8  # samples of the sharp speed in σ
 _ROUNDED = 2  # samples by which the reach of the kernel differs between two rates
 _SAMPLES_MIN = 2.0  # σ in samples: below it the sampled derivative of the kernel is wrong
+_SHARPEST = 2.01  # the same with a margin for rounding
+_KEPT = 0.2  # of an amplitude, that the sharpest kernel must leave
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,20 @@ class SmoothKernel:
 
     band_hz: float
     rate_hz: float
+
+    @classmethod
+    def sharpest(cls, rate_hz: float) -> SmoothKernel:
+        """With the highest band at this rate."""
+        return cls(float(_HALF_POWER * rate_hz / _SHARPEST), rate_hz)
+
+    @property
+    def most_hz(self) -> float:
+        """Frequency at which the kernel leaves a fifth of an amplitude."""
+        return float(np.sqrt(-2 * np.log(_KEPT)) * self.rate_hz / (2 * np.pi * self.sigma))
+
+    def left(self, frequency_hz: Floats) -> Floats:
+        """What the kernel leaves of an amplitude."""
+        return np.asarray(np.exp(-0.5 * (2 * np.pi * frequency_hz * self.sigma / self.rate_hz) ** 2))
 
     @property
     def sigma(self) -> float:
@@ -84,6 +99,11 @@ class SmoothKernel:
         product = np.fft.rfft(signal - signal[0], size) * np.fft.rfft(kernel, size)
         inner = np.fft.irfft(product, size)[2 * self.reach : signal.size]
         return np.asarray(inner + (signal[0] if derivative == 0 else 0.0))
+
+
+def applied(input: Floats) -> Floats:
+    """The input around each sample, (samples,): a logged input acts from its sample to the next one."""
+    return np.asarray((input + np.concatenate([input[:1], input[:-1]])) / 2)
 
 
 @dataclass(frozen=True, eq=False)

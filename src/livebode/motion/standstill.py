@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Event, Responses, Stage, StatefulBase
 from livebode.estimation import Settings
+from livebode.language import Message
 from livebode.motion.chunk import Chunk
 from livebode.motion.residual import Residual
 from livebode.motion.steady import steady_rows
-
-Floats = NDArray[np.float64]
 
 _UNEXPLAINED = 0.03  # of the output's amplitude at the lines; with dry friction |G| is then off by some 0.7 dB
 _DRAG = 0.01  # of the torque's amplitude at the lines, rms; smaller friction cannot cause the share above
@@ -107,9 +107,10 @@ class StandstillDetector(StatefulBase):
         lines = self._settings.lines
         newest_s = float(tracked.time_s[0]) + (lines.window - 1) / 2 / lines.rate_hz
         time_s = newest_s + (stretch.first - int(tracked.sample[0])) / lines.rate_hz
-        message = (
-            f"dry friction stops the axis at standstill or reversal: {100 * stretch.unexplained:.0f} % of its output "
-            "differs from the response in motion; responses are invalid until it has moved for two windows"
+        message = Message(
+            "dry friction stops the axis at standstill or reversal: {unexplained_percent:.0f} % of its output "
+            "differs from the response in motion; responses are invalid until it has moved for two windows",
+            unexplained_percent=100 * stretch.unexplained,
         )
         self._events.append(Event("held", stretch.first, time_s, message, {"unexplained": stretch.unexplained}))
 

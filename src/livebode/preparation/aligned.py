@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from livebode.core import Block, Channel, Event, counted
+from livebode.core import Block, Channel, Event
 from livebode.estimation import Settings
 from livebode.excitation import Slip, find_slips
+from livebode.language import Message
 from livebode.sources import Log
 
 _PART = 1 << 18  # samples per search
@@ -130,12 +131,17 @@ def slip_event(slips: Sequence[Slip], settings: Settings) -> Event:
     """One Event for all phase slips, at the first of them."""
     first = slips[0]
     missing, again = (sum(max(sign * slip.missing, 0) for slip in slips) for sign in (1, -1))
-    what = " and ".join(
-        f"{counted(many, 'sample')} {word}" for many, word in ((missing, "missing"), (again, "repeated")) if many
+    lacking = (
+        Message("1 sample missing") if missing == 1 else Message("{samples} samples missing", samples=missing),
+        Message("1 sample repeated") if again == 1 else Message("{samples} samples repeated", samples=again),
     )
-    message = (
-        f"the phase of {settings.excitation!r} jumps {counted(len(slips), 'time')}, first at sample {first.sample}: "
-        f"{what} without a gap in the recording; each is realigned and treated as a gap"
+    message = Message(
+        "the phase of {channel} jumps {times}, first at sample {at_sample}: {samples} without a gap in the recording; "
+        "each is realigned and treated as a gap",
+        channel=repr(settings.excitation),
+        times=Message("1 time") if len(slips) == 1 else Message("{times} times", times=len(slips)),
+        at_sample=first.sample,
+        samples=Message.conjunction(one for one, many in zip(lacking, (missing, again)) if many),
     )
     details = {"count": len(slips), "slips": [[slip.sample, slip.missing] for slip in slips[:_LISTED_MAX]]}
     return Event("phase-slips", first.sample, first.sample / settings.lines.rate_hz, message, details)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import NOT_WHOLE, Block, SignalError, Spectra, Stage, StatefulBase, rms
-from livebode.core.errors.signal import ANY_EXCITATION
-from livebode.estimation.stream_estimator import Follower
+from livebode.core import ANY_EXCITATION, NOT_WHOLE, Block, SignalError, Spectra, Stage, StatefulBase, rms
+from livebode.estimation import Follower
 
 # Rounding of a DFT gives 1e-30 of a signal's power at an empty line.
 POWERLESS_SHARE = 1e-20
@@ -197,6 +196,17 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
             f"{', '.join(spoiled)}",
             "choose a shorter window, or check the recording with `livebode inspect`",
             reason="samples-spoiled",
+            responses=responses,
+            window=window,
+        )
+    if responses and tracker.settings.estimator == "lpm":
+        name = tracker.settings.channel(tracker.settings.method.reference)
+        raise SignalError(
+            "no-valid-response",
+            f"none of {responses} responses is valid: the power of {name!r} is at single tones, or as smooth over "
+            "frequency as a transient, from which 'lpm' cannot tell it",
+            "record an excitation that repeats, or noise or a chirp that has power in a whole band",
+            reason="not-separable",
             responses=responses,
             window=window,
         )

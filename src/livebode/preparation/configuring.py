@@ -10,9 +10,10 @@ import tomli_w
 
 from livebode.configuration import Axis
 from livebode.core import Lines, LivebodeError, counted
-from livebode.estimation.settings import DETECTION_LINES_MIN
+from livebode.estimation import DETECTION_LINES_MIN
 from livebode.excitation import recognise
-from livebode.experiment_design.axis_file import lines_text
+from livebode.experiment_design import lines_text
+from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.plan import beginning, make_settings, roles_in_doubt
 from livebode.sources import Log
 
@@ -47,10 +48,11 @@ def suitable_estimator(log: Log, signals: Mapping[str, str]) -> tuple[str, str]:
     reference = signals.get("excitation") or signals.get("input")
     if reference is None:
         return "joint", ""
+    w = beginning(log, reference)
     try:
-        recognise(beginning(log, reference), log.rate_hz)
+        recognise(w, log.rate_hz)
     except LivebodeError as error:
-        if error.code in _NOT_REPEATING:
+        if error.code in _NOT_REPEATING and suits_lpm(w, log.rate_hz):
             return "lpm", f"{reference} does not repeat, as noise or a single chirp"
     if "excitation" not in signals:
         return "direct", "without the excitation: for an open loop"

@@ -8,9 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from livebode.core import Block, QuantityKind, RecordingError
-from livebode.sources import Log
-from livebode.sources.recording import Skipped
-from livebode.sources.uneven import UnevenLog
+from livebode.sources import Log, Skipped, UnevenLog
 
 _UNREADABLE_MAX = 16
 """Channels with text further down that are left out, each after another reading of the file."""

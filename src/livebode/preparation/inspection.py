@@ -8,19 +8,18 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from livebode.core import Lines, LivebodeError, RecordingError, UsageError
-from livebode.estimation.settings import nearest_hop
+from livebode.estimation import nearest_hop
 from livebode.excitation import Excitation, pattern, recognise
 from livebode.locations import Location
+from livebode.preparation._uneven_grid import measured_grid
 from livebode.preparation.contents import Contents, read_contents
+from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.part import chosen_part
 from livebode.preparation.plan import LIVE_RESPONSES_PER_S, SEARCHED, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
 from livebode.preparation.stretches import Stretch, stretches
-from livebode.preparation.uneven_grid import measured_grid
 from livebode.preparation.uneven_plan import clock_facts
-from livebode.sources import Log, open_log
-from livebode.sources.recording import Skipped
-from livebode.sources.uneven import UNEVEN, ClockGroup, UnevenLog, open_uneven
+from livebode.sources import UNEVEN, ClockGroup, Log, Skipped, UnevenLog, open_log, open_uneven
 
 _WITHOUT_RATE = tuple(
     f"recording.{code}"
@@ -44,8 +43,8 @@ class Inspection:
     """Result of `livebode inspect`.
 
     `unrecognised`: why an excitation is not recognised, because it does not repeat, or next to a silent stretch.
-    `without_rate`: why the recording has no rate; the rate of `log` has no meaning then. `repeats`: whether the
-    excitation repeats, as far as it was examined.
+    `without_rate`: why the recording has no rate; the rate of `log` has no meaning then. `estimator`: the one for this
+    excitation; empty if none was examined, or none finds a response to it.
     """
 
     log: Log
@@ -54,14 +53,7 @@ class Inspection:
     quiet: Quiet | None = None
     unrecognised: str = ""
     without_rate: str = ""
-    repeats: bool = True
-
-    @property
-    def estimator(self) -> str:
-        """The estimator for this excitation; empty if none was examined."""
-        if not self.repeats:
-            return "lpm"
-        return "joint" if self.excitation is not None else ""
+    estimator: str = ""
 
     @property
     def skipped(self) -> tuple[Skipped, ...]:
@@ -177,16 +169,18 @@ def inspect(
     if lines is not None:
         signals = [name for name in (output, input) if name is not None]
         quiet = look_for_hum(log, signals, excitation, Lines.parse(lines[0], log.rate_hz, lines[1]))
-    unrecognised, repeats = "", True
+    unrecognised, estimator = "", ""
     if excitation is not None and not (quiet is not None and quiet.constant):
         try:
             w = beginning(log, excitation)
             found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
+            estimator = "joint"
         except LivebodeError as error:
             if quiet is None and error.code not in (*_NOT_REPEATING, "signal.lines-ambiguous"):
                 raise
-            unrecognised, repeats = str(error), error.code not in _NOT_REPEATING
-    return Inspection(log, contents, found, quiet, unrecognised, without_rate, repeats)
+            unrecognised = str(error)
+            estimator = "lpm" if error.code in _NOT_REPEATING and suits_lpm(w, log.rate_hz) else ""
+    return Inspection(log, contents, found, quiet, unrecognised, without_rate, estimator)
 
 
 def open_with_or_without_rate(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Lines, SignalError
+from livebode.estimation import WINDOW_MIN, LocalPolynomial, separable
 
 LINES_MAX = 1000
 """Lines that are chosen at most, at equal ratios."""
@@ -36,6 +37,21 @@ def whole_stretch(signals: NDArray[np.float64], samples_min: int, seams: Sequenc
             samples_min=samples_min,
         )
     return slice(int(starts[longest]), int(stops[longest]))
+
+
+def suits_lpm(reference: NDArray[np.float64], rate_hz: float) -> bool:
+    """Whether the local polynomial method finds a response to this reference at any line.
+
+    Single tones, decaying oscillations and ramps have spectra as smooth as that of a transient.
+    """
+    try:
+        samples = reference[whole_stretch(reference[np.newaxis], WINDOW_MIN)]
+        lines = excited_lines(samples, samples.size, rate_hz, hann=False)
+    except SignalError:
+        return False
+    with np.errstate(all="ignore"):
+        found = LocalPolynomial(lines, 1, 0, 1.0).take(np.array([samples, samples]), 0)
+    return bool(separable(found).any())
 
 
 def excited_lines(reference: NDArray[np.float64], window: int, rate_hz: float, *, hann: bool) -> Lines:

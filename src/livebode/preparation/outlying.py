@@ -7,9 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, counted
+from livebode.arrays import Flags, Floats
+from livebode.core import Event
 from livebode.estimation import Settings
-from livebode.excitation.medians import medians
+from livebode.excitation import medians
+from livebode.language import Message
 from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.roles import ROLES
 from livebode.preparation.transients import (
@@ -19,11 +21,9 @@ from livebode.preparation.transients import (
     SHARE_MAX,
     CutPeriods,
     excited_bins,
+    left_out,
     moves,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _SILENT = 0.5  # of the typical excitation: below it does not run, as in `extent`
 _AT_END = 2  # periods at the end of a recording that may differ without a return to the others
@@ -119,14 +119,12 @@ def outlying_samples(periods: Sequence[int], window: int, first: int) -> NDArray
 
 def outlying_event(periods: Sequence[int], settings: Settings, first: int) -> Event:
     """One Event for all periods that are left out, at the first of them."""
-    lines, numbers = settings.lines, ", ".join(map(str, periods[:20]))
-    which = f"period {numbers} differs" if len(periods) == 1 else f"periods {numbers}"
-    which += "" if len(periods) == 1 else f"{' …' if len(periods) > 20 else ''} differ"
+    lines, numbers = settings.lines, ", ".join(map(str, periods[:20])) + " …" * (len(periods) > 20)
+    finding = Message("periods {numbers} differ from the others", numbers=numbers)
+    if len(periods) == 1:
+        finding = Message("period {number} differs from the others", number=periods[0])
     samples = len(periods) * lines.window
-    message = (
-        f"{which} from the others: {counted(samples, 'sample')} ({samples / lines.rate_hz:.4g} s) are excluded; "
-        "--all-periods includes them"
-    )
+    message = left_out(finding, samples, samples / lines.rate_hz)
     at = first + periods[0] * lines.window
     details = {"periods": list(periods[:_LISTED_MAX]), "count": len(periods), "samples": samples}
     return Event("outlying-periods", at, at / lines.rate_hz, message, details)

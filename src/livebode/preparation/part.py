@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.core import UsageError
 from livebode.preparation.plan import beginning, make_lines, reference_of
-from livebode.sources import Log
-from livebode.sources.part_limit import PartLimit, part_limit
+from livebode.sources import Log, PartLimit, part_limit
 
 FindPeriods = Callable[[Log], tuple[int, int]]
 """Number of the sample at which the excitation of a recording begins, and its period in samples."""
@@ -18,8 +17,7 @@ def configured_part(axis: Axis, log: Log) -> Log:
     """The part in [source]; the recording itself without these keys."""
 
     def periods_in(part: Log) -> tuple[int, int]:
-        from livebode.excitation.extent import extent
-        from livebode.excitation.prepare import checked, clipped, filled
+        from livebode.excitation import checked, clipped, extent, filled
 
         window, name = make_lines(axis, part).window, reference_of(axis)
         if name is None:

@@ -7,14 +7,19 @@ from typing import Protocol
 
 import numpy as np
 
-from livebode.configuration.axis import Axis
-from livebode.core import Block, ConfigError, Event, Lines, SpectraLayout
-from livebode.core.errors.signal import ANY_EXCITATION
-from livebode.estimation import NonPeriodicTracker, RippleOrder, Settings, SpectraTracker, Tracker
-from livebode.estimation.local_polynomial import WINDOW_MIN
-from livebode.estimation.settings import nearest_hop
-from livebode.estimation.stream_estimator import Follower
-from livebode.estimation.welch_average import WINDOWS
+from livebode.configuration import Axis
+from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines, SpectraLayout
+from livebode.estimation import (
+    WINDOW_MIN,
+    WINDOWS,
+    Follower,
+    NonPeriodicTracker,
+    RippleOrder,
+    Settings,
+    SpectraTracker,
+    Tracker,
+    nearest_hop,
+)
 from livebode.preparation.checks import check_length
 from livebode.preparation.nonperiodic import excited_lines, whole_stretch
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
@@ -262,4 +267,4 @@ def roles_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[str]:
         data = np.where(holds, data[:-1], np.nan)
     rows = dict(zip(channels, data))
     signals = {role: rows[name] for role, name in names.items()}
-    return check_roles(signals, settings, accepted=axis.tracking.accept_roles)
+    return check_roles(signals, settings, log.naming(channels).channels, accepted=axis.tracking.accept_roles)

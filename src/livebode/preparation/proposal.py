@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import LivebodeError, QuantityKind
+from livebode.arrays import Floats
+from livebode.core import LivebodeError
 from livebode.excitation import recognise
 from livebode.preparation.contents import ChannelSummary, contents_of
 from livebode.preparation.plan import beginnings
+from livebode.preparation.quantity_names import DRIVING, NAMED_INPUT, NAMED_OUTPUT
 from livebode.sources import Log
-
-Floats = NDArray[np.float64]
 
 _SEARCHED = 1 << 18  # samples: enough for some periods of an excitation
 _CERTAIN = 3  # score of a proposal
@@ -25,10 +24,7 @@ _SLOW = 3.0  # a position that travels: its means over pieces scatter this many 
 _PIECES = 50
 _EXCITATION = re.compile(r"^(w|exc\w*|dither|inject\w*|multisine|prbs|chirp|sweep)$")
 _COMMAND = re.compile(r"(ref|set|target|cmd|command|soll|demand|desired)")
-_INPUT = re.compile(r"^(u|i_?q|torque|current|force|motor|input|effort|drehmoment|strom)")
-_OUTPUT = re.compile(r"^(y|vel\w*|speed|omega|theta|angle|phi|pos\w*|acc\w*|gyro\w*|output|drehzahl)")
 _SCHEDULE = re.compile(r"^(x|pos\w*|stroke|travel|cart\w*)$")
-_DRIVING: tuple[QuantityKind, ...] = ("torque", "current", "force")
 
 
 @dataclass(frozen=True)
@@ -86,7 +82,7 @@ class Proposals:
         score, reason = 0, ""
         if _EXCITATION.search(channel.name.lower()):
             score, reason = 4, "by its name"
-        score += bool(_COMMAND.search(channel.name.lower())) + (channel.kind in _DRIVING)
+        score += bool(_COMMAND.search(channel.name.lower())) + (channel.kind in DRIVING)
         score -= 2 * (channel.kind == "position")
         if score + 3 < _CERTAIN:
             return 0, ""
@@ -119,14 +115,14 @@ class Proposals:
 
 def _as_input(channel: ChannelSummary) -> tuple[int, str]:
     name = channel.name.lower()
-    named = bool(_INPUT.search(name))
-    score = 5 * (channel.kind in _DRIVING) + 2 * named - 2 * bool(_COMMAND.search(name))  # a reference is an input too
-    return score + named * (channel.kind == "other"), _by(channel, channel.kind in _DRIVING)
+    named = bool(NAMED_INPUT.search(name))
+    score = 5 * (channel.kind in DRIVING) + 2 * named - 2 * bool(_COMMAND.search(name))  # a reference is an input too
+    return score + named * (channel.kind == "other"), _by(channel, channel.kind in DRIVING)
 
 
 def _as_output(channel: ChannelSummary) -> tuple[int, str]:
     name = channel.name.lower()
-    named = bool(_OUTPUT.search(name))
+    named = bool(NAMED_OUTPUT.search(name))
     size = {"velocity": 5, "position": 2, "acceleration": 2}.get(channel.kind, 0)
     score = size + 2 * named - 6 * bool(_COMMAND.search(name)) + named * (channel.kind == "other")
     return score, _by(channel, size > 0)

@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Lines, SignalError
-from livebode.estimation.hum import SECONDS_MIN, Hum, find_hum
+from livebode.estimation import (
+    SECONDS_MIN,
+    Hum,
+    Settings,
+    SilenceSearch,
+    SilentStretch,
+    disturbed_lines,
+    find_hum,
+    may_disturb,
+)
+from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.plan import beginnings
 from livebode.sources import Log
 
@@ -80,11 +90,30 @@ def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines
             limit_s=float(SECONDS_MIN),
         )
     found = find_hum({name: rows[name][first:stop] for name in dict.fromkeys(signals)}, lines.rate_hz)
-    f = lines.frequency_hz
-    near = [f[np.abs(f - hum.frequency_hz) <= lines.resolution_hz / 2].tolist() for hum in found]
+    near = [lines.frequency_hz[disturbed].tolist() for disturbed in disturbed_lines(found, lines)]
     known = {channel.name: channel.unit for channel in log.channels}
     units = {name: known.get(name, "") for name in signals}
     return Quiet(lines, log.first + first, stop - first, list(zip(found, near)), units, constant)
+
+
+def silences(source: AlignedLog, settings: Settings) -> list[SilentStretch]:
+    """The stretches of a recording in which the excitation does not change for two seconds or more, with their tones.
+
+    None where no tone of the mains can disturb a line.
+    """
+    lines, excitation = settings.lines, settings.excitation or settings.channel(settings.method.reference) or ""
+    if not may_disturb(lines):
+        return []
+    names = list(dict.fromkeys(name for role in settings.roles if (name := settings.channel(role))))
+    search = SilenceSearch(len(names), lines.rate_hz, (_SAMPLES_MAX,))
+    found, stop = list[SilentStretch](), source.first
+    for block in source.blocks(list(dict.fromkeys([*names, excitation]))):
+        if block.gap or block.start != stop:
+            found += search.interrupt()
+        signals = np.array([block[name] for name in names])
+        found += search.process(signals, block[excitation], block.start, np.zeros(0, dtype=np.intp))
+        stop = block.stop
+    return found + list(search.interrupt())
 
 
 def _longest(flags: np.ndarray) -> tuple[int, int]:

@@ -7,24 +7,27 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex
 from livebode.core import RecordingError
 from livebode.estimation import Settings
 from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.plan import beginnings
 from livebode.sources import Log
 
-Complex = NDArray[np.complex128]
-
 _PERIODS = 16  # that show the phases of an excitation
 _SAME_PHASES = 0.95  # share of the amplitudes that add up at the best shift in time
 
 
 def check_same(first: Log, of_first: Settings, log: Log, settings: Settings) -> None:
-    """RecordingError if the rate, the units, the window or the lines differ from those of the first recording."""
+    """RecordingError if the rate, the units, the window or the lines differ from those of the first recording.
+
+    Rates that an error of the clock explains are the same (`Lines.alike`).
+    """
     used = [name for role in settings.roles if (name := settings.channel(role))]
     one, other = _properties(first, of_first, used), _properties(log, settings, used)
+    if of_first.lines.alike(settings.lines):
+        other["rate"] = one["rate"]
     for what, remedy in (
         ("rate", "correct the rate"), ("units", "convert it"), ("window", "specify lines.window"),
         ("lines", "specify the lines that all of them have"),

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.arrays import Complex, Floats
 
 _CHANCE = 1e-3  # probability that noise alone, at any line, is taken for a signal
 _LINES_MIN, _SLOPE_LINES = 4, 200  # fewer give no slope, more do not improve it

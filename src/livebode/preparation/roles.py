@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import SignalError
-from livebode.core.errors.signal import ANY_EXCITATION
-from livebode.estimation import Settings
-from livebode.estimation.estimators import Role
+from livebode.arrays import Complex, Floats
+from livebode.core import ANY_EXCITATION, Channel, SignalError
+from livebode.estimation import Role, Settings
+from livebode.language import Message
+from livebode.preparation._role_spectra import RoleSpectra, role_spectra
+from livebode.preparation.quantity_names import ChannelQuantities
 from livebode.preparation.role_shapes import direct, lags, limit, mean_deg, sized, slope, wide
-from livebode.preparation.role_spectra import RoleSpectra, role_spectra
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 ROLES: tuple[Role, ...] = ("excitation", "input", "output")
 _OPEN_LOOP = "for an open loop set tracking.estimator to 'direct' and name only that input"
-_ACCEPT = "to keep these roles, set tracking.accept_roles"
+_ACCEPT = Message("to keep these roles, set tracking.accept_roles")
 # Repeating share of a variance: all of a command, almost nothing of a moving axis.
 _REPEATING_MIN, _REPEATING_USUAL = 0.1, 0.5
 _WINDOWS_MIN, _PAIRS_MIN = 8, 16  # fewer cannot show noise
@@ -47,7 +45,7 @@ class Suspicion:
     @property
     def sentence(self) -> str:
         """Message and remedy."""
-        return f"{self.message}; {self.remedy}"
+        return Message("{message}; {remedy}", message=self.message, remedy=self.remedy)
 
 
 def check_distinct(settings: Settings) -> None:
@@ -69,7 +67,7 @@ def check_distinct(settings: Settings) -> None:
             )
 
 
-def suspicions(signals: Mapping[Role, Floats], settings: Settings) -> list[Suspicion]:
+def suspicions(signals: Mapping[Role, Floats], settings: Settings, channels: Iterable[Channel] = ()) -> list[Suspicion]:
     """All doubts about the roles, from the beginning of a recording, by role, with NaN for missing samples.
 
     It detects: two roles with the same samples; an excitation that does not repeat, or that is a response of the
@@ -83,8 +81,10 @@ def suspicions(signals: Mapping[Role, Floats], settings: Settings) -> list[Suspi
     spectra = role_spectra(signals, settings)
     if spectra is None or any(one.certain for one in found):
         return found
+    quantities = ChannelQuantities(channels)
     rules: tuple[Callable[[RoleSpectra], Suspicion | None], ...] = (
-        _not_repeating, _answering_excitation, _noise_as_input, _exchanged, _contradicting_loop, _without_answer,
+        _not_repeating, partial(_answering_excitation, quantities=quantities), _noise_as_input,
+        partial(_exchanged, quantities=quantities), _contradicting_loop, _without_answer,
     )  # fmt: skip
     with np.errstate(all="ignore"):  # a signal without power at a line gives NaN, which no rule rejects
         return found + [one for rule in rules if (one := rule(spectra)) is not None]
@@ -95,11 +95,19 @@ def _copies(signals: Mapping[Role, Floats], settings: Settings) -> Iterator[Susp
         if settings.channel(one) != settings.channel(other) and np.array_equal(
             signals[one], signals[other], equal_nan=True
         ):
-            names = f"{settings.channel(one)!r} ({one}) and {settings.channel(other)!r} ({other})"
             certain = other == "output"
-            remedy = "name the channel of the machine's output" if certain else "correct only without feedback"
+            remedy = Message("correct only without feedback")
+            if certain:
+                remedy = Message("name the channel of the machine's output")
             both = settings.channel(one), settings.channel(other)
-            yield Suspicion(f"{names} have the same samples", f"{remedy}; {_ACCEPT}", certain, both)
+            message = Message(
+                "{channel} ({role}) and {other} ({other_role}) have the same samples",
+                channel=repr(both[0]),
+                role=one,
+                other=repr(both[1]),
+                other_role=other,
+            )
+            yield Suspicion(message, Message("{remedy}; {keep}", remedy=remedy, keep=_ACCEPT), certain, both)
 
 
 def _not_repeating(spectra: RoleSpectra) -> Suspicion | None:
@@ -107,29 +115,46 @@ def _not_repeating(spectra: RoleSpectra) -> Suspicion | None:
     if settings.method.reference != "excitation" or spectra.repeating >= _REPEATING_USUAL:
         return None
     return Suspicion(
-        f"{settings.excitation!r} does not repeat like an excitation: "
-        f"{100 * max(spectra.repeating, 0.0):.2g} % of its variance repeats every {settings.lines.window} samples",
-        f"name the channel of the signal that is added; {ANY_EXCITATION}; {_ACCEPT}",
+        Message(
+            "{excitation} does not repeat like an excitation: {percent:.2g} % of its variance repeats every "
+            "{window} samples",
+            excitation=repr(settings.excitation),
+            percent=100 * max(spectra.repeating, 0.0),
+            window=settings.lines.window,
+        ),
+        Message(
+            "name the channel of the signal that is added; {spectrum}; {keep}", spectrum=ANY_EXCITATION, keep=_ACCEPT
+        ),
         spectra.repeating < _REPEATING_MIN,
         (settings.excitation,),
     )
 
 
-def _answering_excitation(spectra: RoleSpectra) -> Suspicion | None:
+def _answering_excitation(spectra: RoleSpectra, quantities: ChannelQuantities) -> Suspicion | None:
     """A position as excitation: it falls with frequency, and the signal that should respond to it rises."""
     settings, f = spectra.settings, spectra.frequency_hz
     if settings.method.reference != "excitation" or spectra.exact or not wide(f, _ZONE):
         return None
+    if quantities.drives(str(settings.excitation)):
+        return None
     own = slope(f, np.sqrt(np.mean(np.abs(spectra.spectra["excitation"]) ** 2, axis=0)))
     slopes = {role: slope(f, spectra.ratio(role, "excitation")) for role in ROLES[1:] if role in spectra.spectra}
-    inputs, outputs = slopes.get("input", np.inf) >= _RESPONSE_INPUT, slopes["output"] >= _RESPONSE_OUTPUT
+    rises_by_nature = quantities.accelerates(settings.output)
+    inputs = slopes.get("input", np.inf) >= _RESPONSE_INPUT
+    outputs = slopes["output"] >= _RESPONSE_OUTPUT and not rises_by_nature
     if own > _RESPONSE_ITSELF or not inputs or not (outputs or "input" in slopes):
         return None
     role: Role = "input" if "input" in slopes else "output"
     return Suspicion(
-        f"{settings.excitation!r} looks like a response of the machine, not like an excitation: it falls with "
-        f"f^{own:.1f}, and {settings.channel(role)!r} over it rises with f^{slopes[role]:.1f}",
-        f"name the channel of the signal that is added; {_ACCEPT}",
+        Message(
+            "{channel} looks like a response of the machine, not like an excitation: it falls with "
+            "f^{slope:.1f}, and {response} over it rises with f^{rise:.1f}",
+            channel=repr(settings.excitation),
+            slope=own,
+            response=repr(settings.channel(role)),
+            rise=slopes[role],
+        ),
+        Message("name the channel of the signal that is added; {keep}", keep=_ACCEPT),
         outputs,
         (settings.excitation,),
     )
@@ -143,18 +168,29 @@ def _noise_as_input(spectra: RoleSpectra) -> Suspicion | None:
     if pairs < _PAIRS_MIN or not np.all(returning < min(limit(len(returning), pairs), _RETURNING_MAX)):
         return None
     return Suspicion(
-        f"{settings.input!r} is noise at all {len(returning)} lines: at most {100 * returning.max():.2g} % of its "
-        f"power repeats every {settings.lines.window} samples, so that a window leaks",
-        f"name the excited input; {ANY_EXCITATION}; {_ACCEPT}",
+        Message(
+            "{input} is noise at all {lines} lines: at most {percent:.2g} % of its power repeats every {window} "
+            "samples, so that a window leaks",
+            input=repr(settings.input),
+            lines=len(returning),
+            percent=100 * returning.max(),
+            window=settings.lines.window,
+        ),
+        Message("name the excited input; {spectrum}; {keep}", spectrum=ANY_EXCITATION, keep=_ACCEPT),
         True,
         (settings.input,),
     )
 
 
-def _exchanged(spectra: RoleSpectra) -> Suspicion | None:
-    """Input and output exchanged: the specified output follows the excitation, or leads the input."""
+def _exchanged(spectra: RoleSpectra, quantities: ChannelQuantities) -> Suspicion | None:
+    """Input and output exchanged: the specified output follows the excitation, or leads the input.
+
+    An acceleration over a force rises with f² and leads by 180° below a resonance.
+    """
     settings, f = spectra.settings, spectra.frequency_hz
-    if "input" not in spectra.spectra or not wide(f, _ZONE):
+    if "input" not in spectra.spectra or settings.input is None or not wide(f, _ZONE):
+        return None
+    if quantities.accelerates(settings.output):
         return None
     plant = spectra.ratio("output", "input")
     rising = slope(f, plant)
@@ -166,21 +202,36 @@ def _exchanged(spectra: RoleSpectra) -> Suspicion | None:
             return None
         follows = direct(output) and not direct(input_)
         if follows and (lags(mean_deg(input_)) or rising > _RISES):
-            shown = (
-                f"{settings.output!r} is a share of the excitation {settings.excitation!r} ({sized(output)}), "
-                f"{settings.input!r} is not ({sized(input_)})"
+            shown = Message(
+                "{output} is a share of the excitation {excitation} ({output_share}), {input} is not ({input_share})",
+                output=repr(settings.output),
+                excitation=repr(settings.excitation),
+                output_share=sized(output),
+                input=repr(settings.input),
+                input_share=sized(input_),
             )
             certain = leading or lags(mean_deg(input_))
-    if shown is None and rising > _RISES and not lags(mean_deg(plant)):
-        leads = f"the output leads the input by {mean_deg(plant) % 360:.0f}° on average"
-        shown = f"{leads}, and the gain rises with f^{rising:.2g}"
+    known = quantities.drives(settings.input) and quantities.moves(settings.output)
+    if shown is None and not known and rising > _RISES and not lags(mean_deg(plant)):
+        shown = Message(
+            "the output leads the input by {lead_deg:.0f}° on average, and the gain rises with f^{power:.2g}",
+            lead_deg=mean_deg(plant) % 360,
+            power=rising,
+        )
         # An inverted output between antiresonance and resonance leads by more than 90° too.
         inverted = mean_deg(plant) % 360 > _LEADING_MAX_DEG and rising < _RISES_AS_POSITION
-        certain = rising > _RISES_CLEARLY and leading and wide(f, _ZONE_MAX) and not inverted
+        contradicted = quantities.moves(settings.input) or quantities.drives(settings.output)
+        certain = rising > _RISES_CLEARLY and leading and wide(f, _ZONE_MAX) and not inverted and contradicted
     if shown is None:
         return None
-    names = f"{settings.input!r} as input and {settings.output!r} as output look exchanged"
-    return Suspicion(f"{names}: {shown}", f"exchange them; {_ACCEPT}", certain, (settings.input, settings.output))
+    message = Message(
+        "{input} as input and {output} as output look exchanged: {why}",
+        input=repr(settings.input),
+        output=repr(settings.output),
+        why=shown,
+    )
+    remedy = Message("exchange them; {keep}", keep=_ACCEPT)
+    return Suspicion(message, remedy, certain, (settings.input, settings.output))
 
 
 def _upper(spectra: RoleSpectra, role: Role) -> Complex:
@@ -206,9 +257,14 @@ def _contradicting_loop(spectra: RoleSpectra) -> Suspicion | None:
     if not away[worst] > _LOOP_DOUBTFUL:
         return None
     return Suspicion(
-        f"the description of the loop contradicts {settings.input!r}: at {f[worst]:g} Hz it predicts "
-        f"{abs(quotient[worst]):.3g} times the measured input, so the indirect estimate is off by that",
-        f"check the gains and units in [loop], or set tracking.estimator to 'joint'; {_ACCEPT}",
+        Message(
+            "the description of the loop contradicts {input}: at {line_hz:g} Hz it predicts {times:.3g} times "
+            "the measured input, so the indirect estimate is off by that",
+            input=repr(settings.input),
+            line_hz=f[worst],
+            times=abs(quotient[worst]),
+        ),
+        Message("check the gains and units in [loop], or set tracking.estimator to 'joint'; {keep}", keep=_ACCEPT),
         bool(away[worst] > _LOOP_WRONG),
         (settings.input,),
     )
@@ -226,18 +282,27 @@ def _without_answer(spectra: RoleSpectra) -> Suspicion | None:
         if np.all(coherence < chance):
             reference = spectra.settings.channel(spectra.settings.method.reference)
             return Suspicion(
-                f"{spectra.settings.channel(role)!r} ({role}) does not respond to {reference!r} at any line: their "
-                f"coherence over {spectra.windows} windows is at most {coherence.max():.2g}",
-                "name another channel, or raise the amplitude",
+                Message(
+                    "{channel} ({role}) does not respond to {reference} at any line: their coherence over {windows} "
+                    "windows is at most {coherence:.2g}",
+                    channel=repr(spectra.settings.channel(role)),
+                    role=role,
+                    reference=repr(reference),
+                    windows=spectra.windows,
+                    coherence=coherence.max(),
+                ),
+                Message("name another channel, or raise the amplitude"),
                 False,
                 (spectra.settings.channel(role),),
             )
     return None
 
 
-def check_roles(signals: Mapping[Role, Floats], settings: Settings, *, accepted: bool) -> list[str]:
+def check_roles(
+    signals: Mapping[Role, Floats], settings: Settings, channels: Iterable[Channel], *, accepted: bool
+) -> list[str]:
     """Doubts as sentences; SignalError if one is certain, except if the roles are `accepted`."""
-    found = suspicions(signals, settings)
+    found = suspicions(signals, settings, channels)
     certain = [one for one in found if one.certain]
     if certain and not accepted:
         worst = certain[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.core import ConfigError, Lines, SpectraLayout
 
 

@@ -8,17 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, counted
-from livebode.estimation import Movement, Settings
-from livebode.estimation.movement import PLACES
-from livebode.excitation.blocks import cut
-from livebode.excitation.prepare import filled
-from livebode.excitation.transient import leading, unlike
+from livebode.arrays import Floats
+from livebode.core import Event
+from livebode.estimation import PLACES, Movement, Settings
+from livebode.excitation import cut, filled, leading, unlike
+from livebode.language import Message
 from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.plan import beginnings
 from livebode.preparation.roles import ROLES
-
-Floats = NDArray[np.float64]
 
 EXAMINED, EXAMINED_SAMPLES_MAX = 64, 1 << 20
 """Periods that are compared with each other, and samples in them, at most."""
@@ -99,6 +96,14 @@ def moves(schedule: np.ndarray, window: int) -> bool:
     return bool(Movement(periods.shape[1]).process(0, periods.ravel()).any())
 
 
+def left_out(finding: Message, samples: int, seconds: float, *, also_before: bool = False) -> Message:
+    """What was found, and the samples that are therefore left out; `also_before`: with those before the excitation."""
+    excluded = Message("{samples} samples ({seconds:.4g} s) are excluded", samples=samples, seconds=seconds)
+    if also_before:
+        excluded = Message("with the samples before them, {excluded}", excluded=excluded)
+    return Message("{finding}: {excluded}; --all-periods includes them", finding=finding, excluded=excluded)
+
+
 def transient_event(periods: int, settings: Settings, first: int = 0, time_s: float = 0.0, *, begun: int = 0) -> Event:
     """Event for the excluded samples up to the steady state, at sample `first`, where the excitation begins.
 
@@ -106,10 +111,8 @@ def transient_event(periods: int, settings: Settings, first: int = 0, time_s: fl
     """
     stop = first + periods * settings.lines.window
     samples = stop - begun
-    which = "period differs" if periods == 1 else f"{periods} periods differ"
-    before = "with the samples before them, " if first > begun else ""
-    message = (
-        f"the first {which} from the steady state: {before}{counted(samples, 'sample')} "
-        f"({samples / settings.lines.rate_hz:.4g} s) are excluded; --all-periods includes them"
-    )
+    finding = Message("the first period differs from the steady state")
+    if periods > 1:
+        finding = Message("the first {periods} periods differ from the steady state", periods=periods)
+    message = left_out(finding, samples, samples / settings.lines.rate_hz, also_before=first > begun)
     return Event("transient", first, time_s, message, {"periods": periods, "samples": stop})

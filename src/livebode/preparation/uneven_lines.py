@@ -5,14 +5,12 @@ from __future__ import annotations
 from math import gcd
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex
 from livebode.core import Lines, SignalError
-from livebode.estimation.uneven import UnevenSpectra
+from livebode.estimation import UnevenSpectra
 from livebode.preparation.uneven_segments import segments
-from livebode.sources.uneven import UnevenLog
-
-Complex = NDArray[np.complex128]
+from livebode.sources import UnevenLog
 
 _BLOCKS = 16
 _BINS_MAX = 1024
@@ -32,7 +30,7 @@ def excited_lines(log: UnevenLog, name: str, window: int) -> Lines:
     SignalError
         If there are less than two periods, or no line exceeds the noise.
     """
-    from livebode.excitation.significance import find_lines  # slow to import
+    from livebode.excitation import find_lines  # slow to import
 
     spectra = _block_spectra(log, name, window)
     power = np.sum(np.abs(spectra) ** 2, axis=1)

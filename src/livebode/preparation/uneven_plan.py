@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from livebode.configuration.axis import Axis
+from livebode.configuration import Axis
 from livebode.core import ConfigError, Event, Lines
 from livebode.estimation import Settings
+from livebode.language import Message
+from livebode.preparation._uneven_grid import PLACES
 from livebode.preparation.plan import settings_of
-from livebode.preparation.uneven_grid import PLACES
-from livebode.sources.uneven import UnevenLog
+from livebode.sources import UnevenLog
 
 _UNKNOWNS = 300
 """Amplitudes of a window up to which the default hop is that of even samples; the cost of a fit is their cube."""
@@ -72,15 +73,20 @@ def _default_hop(lines: Lines) -> int:
 def uneven_event(log: UnevenLog, channels: Sequence[str], lines: Lines) -> Event:
     """An Event that describes the clocks, and how the spectra are computed."""
     clocks = log.clocks(channels)
-    listed = ", ".join(one.described for one in clocks)
-    message = (
-        f"the channels are sampled at times of their own ({listed}), so that spectra are fitted to the "
-        f"samples at these times; window and hop count samples of a grid of {lines.rate_hz:.9g} Hz"
+    message = Message(
+        "the channels are sampled at times of their own ({described}), so that spectra are fitted to the samples at "
+        "these times; window and hop count samples of a grid of {grid_hz:.9g} Hz",
+        described=", ".join(one.described for one in clocks),
+        grid_hz=lines.rate_hz,
     )
     slow = [one for one in clocks if one.stamps.rate_hz / 2 <= lines.frequency_hz[-1]]
     if slow:
         nyquist_hz = min(one.stamps.rate_hz for one in slow) / 2
-        message += f"; lines above {nyquist_hz:.6g} Hz contain what a channel has at their image frequencies"
+        message = Message(
+            "{grid}; lines above {nyquist_hz:.6g} Hz contain what a channel has at their image frequencies",
+            grid=message,
+            nyquist_hz=nyquist_hz,
+        )
     details = {"rate_hz": lines.rate_hz, "window": lines.window, "clocks": clock_facts(log, channels)}
     return Event("uneven-clock", log.first, log.origin_s + log.first / log.rate_hz, message, details)
 

@@ -6,11 +6,9 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.sources.uneven import UnevenLog
-
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
+from livebode.sources import UnevenLog
 
 
 def segments(

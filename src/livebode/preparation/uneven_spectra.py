@@ -6,18 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import LEFT_OUT, NOT_WHOLE, Channel, SignalError, Spectra, SpectraLayout, rms
-from livebode.estimation import Settings
-from livebode.estimation.line_stage import LineStage
-from livebode.estimation.uneven import UnevenSpectra, UnevenWindow
+from livebode.estimation import LineStage, Settings, UnevenSpectra, UnevenWindow
 from livebode.preparation.uneven_segments import segments
-from livebode.sources.resample import Resampler
-from livebode.sources.uneven import ClockGroup, UnevenLog
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from livebode.sources import ClockGroup, Resampler, UnevenLog
 
 _TYPICAL = 16  # windows that show the usual variance
 _INSEPARABLE = 10.0

@@ -6,6 +6,7 @@ import numpy as np
 
 from livebode.core import Event, LivebodeError
 from livebode.estimation import Settings
+from livebode.language import Message
 
 _LAGS = 8  # samples around the window in which another period is searched
 _ROUNDING = 1e-12
@@ -48,11 +49,15 @@ def divided_window(samples: np.ndarray, settings: Settings) -> list[Event]:
 
 def _doubt(settings: Settings, period: int, changes: float, rest: float) -> Event:
     window = settings.lines.window
-    message = (
-        f"{settings.excitation!r} repeats every {period} samples rather than every {window}: "
-        f"{100 * changes:.2g} % of its power changes from one window to the next, "
-        f"{100 * rest:.2g} % from one such period to the next; "
-        "compare lines.window with the design of the excitation"
+    message = Message(
+        "{channel} repeats every {period} samples rather than every {window}: {changes_percent:.2g} % of its "
+        "power changes from one window to the next, {rest_percent:.2g} % from one such period to the next; "
+        "compare lines.window with the design of the excitation",
+        channel=repr(settings.excitation),
+        period=period,
+        window=window,
+        changes_percent=100 * changes,
+        rest_percent=100 * rest,
     )
     facts = {"window": window, "period": period, "share_that_changes": changes}
     return Event("window-doubtful", 0, 0.0, message, facts)

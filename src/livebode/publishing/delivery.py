@@ -10,13 +10,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from livebode.configuration.publish_section import PublishSection
+from livebode.configuration import PublishSection
 from livebode.core import LivebodeError, PublishError
+from livebode.language import Message
 from livebode.publishing.feed import AxisFeed
 from livebode.publishing.messages import AxisValues, EventMessage
 from livebode.publishing.outbox import Outbox
 from livebode.publishing.sink import SinkConnection
-from livebode.sources.live.pauses import Pauses
+from livebode.sources.live import Pauses
 
 DOWN_AFTER = 2
 """Failures in succession after which a receiver is reported as down."""
@@ -196,25 +197,43 @@ class DeliveryThread:
         if self._failures >= DOWN_AFTER and self._down_s is None:
             self._down_s = self._first_failure_s
             waits = (
-                "events wait on disk, retrying with increasing delay"
+                Message("events wait on disk, retrying with increasing delay")
                 if self._outbox
-                else "retrying with increasing delay"
+                else Message("retrying with increasing delay")
             )
-            self._tell("sink-down", f"{self.section.label} does not take messages: {error.message}; {waits}")
+            self._tell(
+                "sink-down",
+                Message(
+                    "{receiver} does not take messages: {reason}; {retry}",
+                    receiver=self.section.label,
+                    reason=error.message,
+                    retry=waits,
+                ),
+            )
 
     def _succeeded(self) -> None:
         self._failures = 0
         self._pauses.reset()
         if self._down_s is not None:
             down_s, self._down_s = time.monotonic() - self._down_s, None
-            self._tell("sink-up", f"{self.section.label} takes messages again, after {down_s:.0f} s", down_s=down_s)
+            self._tell(
+                "sink-up",
+                Message(
+                    "{receiver} takes messages again, after {down_s:.0f} s", receiver=self.section.label, down_s=down_s
+                ),
+            )
 
     def _not_taken(self, events: Sequence[EventMessage], error: PublishError) -> None:
         self.refused.update(event.axis for event in events)
         count = sum(self.refused.values())
         if time.monotonic() - self._reported_s >= _REPORT_S:
             self._reported_s = time.monotonic()
-            message = f"{self.section.label} refused {count} events permanently: {error.message}"
+            message = Message(
+                "{receiver} refused {refused} events permanently: {reason}",
+                receiver=self.section.label,
+                refused=count,
+                reason=error.message,
+            )
             self._tell("sink-refused", message, count=count)
 
     def _report_dropped(self) -> None:
@@ -222,7 +241,9 @@ class DeliveryThread:
         dropped = sum(n for (sink, _), n in self._outbox.dropped.copy().items() if sink == self.section.label)
         if dropped > self._dropped and time.monotonic() - self._reported_s >= _REPORT_S:
             self._dropped, self._reported_s = dropped, time.monotonic()
-            message = f"{dropped} events for {self.section.label} were lost: too many waited"
+            message = Message(
+                "{lost} events for {receiver} were lost: too many waited", lost=dropped, receiver=self.section.label
+            )
             self._tell("sink-full", message, count=dropped)
 
     def _tell(self, kind: str, message: str, **details: Any) -> None:

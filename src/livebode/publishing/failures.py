@@ -30,4 +30,5 @@ def cannot_listen(host: str, port: int, error: OSError) -> PublishError:
         f"nothing can listen at {host} port {port}: {error.strerror}",
         "choose another port in publish.url, or end the program that uses it",
         port=port,
+        errno=error.errno,
     )

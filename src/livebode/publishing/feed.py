@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from livebode.configuration.publish_section import PublishSection
-from livebode.core import Event, Parameters, Responses
-from livebode.core.clock import RunClock
-from livebode.monitoring.alarm_kinds import ALARMS, FAR, RETURNS, Priority, cause_of
+from livebode.configuration import PublishSection
+from livebode.core import Event, Parameters, Responses, RunClock
+from livebode.monitoring import ALARMS, FAR, RETURNS, Priority, cause_of
 from livebode.publishing.messages import (
     AlarmNow,
     AxisValues,
@@ -20,9 +19,7 @@ from livebode.publishing.messages import (
     measurements_of,
     response_of,
 )
-from livebode.runtime import RunControl
-from livebode.runtime.documents import ClockSet, Document, FitResults, RunEnded, RunStarted
-from livebode.runtime.status import Status
+from livebode.runtime import ClockSet, Document, FitResults, RunControl, RunEnded, RunStarted, Status
 
 SINK_KINDS = ("sink-down", "sink-up", "sink-full", "sink-refused")
 """Events about a receiver; they are not sent to this receiver itself."""

@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from livebode.configuration.message_template import filled
+from livebode.configuration import filled
 from livebode.core import Parameters, Responses
-from livebode.monitoring.alarm_kinds import Priority
+from livebode.monitoring import Priority
 
 Condition = Literal["alarm", "ended", "event"]
 """An alarm began or is reported again; its condition ended; an event that is no alarm."""

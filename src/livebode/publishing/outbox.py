@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import queue
 import sqlite3
+import stat
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from livebode.core import PublishError
+from livebode.core import PublishError, remove_files
 from livebode.publishing.messages import EventMessage, read_event
 
 WAITING_MAX = 10_000
@@ -19,6 +21,8 @@ WAITING_MAX = 10_000
 INTAKE_MAX = 4096
 """Events that wait to be written to the file."""
 _RETRY_S = 1.0
+_MARK = 0x6C624F42
+"""The application of the database in its header: the letters lbOB."""
 _TABLE = """CREATE TABLE IF NOT EXISTS events (
     number INTEGER PRIMARY KEY AUTOINCREMENT, sink TEXT NOT NULL, id TEXT NOT NULL, axis TEXT NOT NULL,
     event TEXT NOT NULL, UNIQUE (sink, id))"""
@@ -53,20 +57,34 @@ class Outbox:
         self._lock = threading.Lock()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+            if os.path.lexists(path) and not stat.S_ISREG(os.lstat(path).st_mode):
+                raise _foreign(path)
             self._database = sqlite3.connect(path, check_same_thread=False)
+            if not self._verified():
+                raise _foreign(path)
             self._database.execute("PRAGMA journal_mode = WAL")
             self._database.execute("PRAGMA synchronous = FULL")
             with self._database:
                 self._database.execute(_TABLE)
         except (OSError, sqlite3.Error) as error:
+            if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_NOTADB:
+                raise _foreign(path) from None
             raise PublishError(
                 "outbox-unusable",
                 f"the file {str(path)!r} for events that wait for delivery cannot be used: {error}",
-                "check the permissions and the disk, or move the file away",
+                "check the permissions and the disk",
                 path=str(path),
             ) from None
         self._thread = threading.Thread(target=self._work, name="livebode outbox", daemon=True)
         self._thread.start()
+
+    def _verified(self) -> bool:
+        """Whether the database is new or livebode's; `close` would remove another one."""
+        (tables,) = self._database.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()
+        (mark,) = self._database.execute("PRAGMA application_id").fetchone()
+        if not tables:
+            self._database.execute(f"PRAGMA application_id = {_MARK}")
+        return not tables or mark == _MARK
 
     def put(self, sink: str, event: EventMessage) -> None:
         """Take an event for a receiver, without waiting."""
@@ -105,7 +123,7 @@ class Outbox:
             (left,) = self._database.execute("SELECT COUNT(*) FROM events").fetchone()
             self._database.close()
         if not left:
-            self.path.unlink(missing_ok=True)
+            remove_files(self.path.parent.resolve(), [self.path.name])
 
     def _work(self) -> None:
         while True:
@@ -146,3 +164,12 @@ class Outbox:
                     (sink, WAITING_MAX),
                 ).fetchall()
                 self.dropped.update((sink, axis) for (axis,) in removed)
+
+
+def _foreign(path: Path) -> PublishError:
+    return PublishError(
+        "outbox-foreign",
+        f"{str(path)!r}, the file for events that wait for delivery, was written by another program",
+        "move it away",
+        path=str(path),
+    )

@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from livebode.configuration.axis import Axis
-from livebode.configuration.publish_section import PublishSection
+from livebode.configuration import Axis, PublishSection
 from livebode.core import ConfigError
+from livebode.publishing._exposure import exposure
 from livebode.publishing.delivery import DeliveryThread
-from livebode.publishing.exposure import exposure
 from livebode.publishing.feed import AxisFeed
 from livebode.publishing.outbox import Outbox
 from livebode.publishing.sink import SinkConnection, open_sink

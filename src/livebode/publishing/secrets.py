@@ -5,9 +5,9 @@ from __future__ import annotations
 import ssl
 from pathlib import Path
 
-from livebode.configuration.publish_section import PublishSection, check_url
+from livebode.configuration import PublishSection, check_url
 from livebode.core import ConfigError
-from livebode.sources.live.secret import secret
+from livebode.sources.live import secret
 
 
 def password(section: PublishSection) -> str | None:

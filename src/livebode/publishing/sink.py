@@ -3,23 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Protocol
 
-from livebode.configuration.publish_section import PublishSection
+from livebode.configuration import PublishSection
+from livebode.plugins import loaded, named
 from livebode.publishing.messages import AxisValues, EventMessage
-
-MODULES = {
-    "webhook": "webhook",
-    "email": "mail",
-    "prometheus": "prometheus",
-    "mqtt": "mqtt",
-    "sparkplug": "sparkplug",
-    "syslog": "syslog",
-    "influxdb": "influxdb",
-    "opcua": "opcua",
-}
-"""The module of each kind; it ends with SINK, and imports its library when the sink is created."""
 
 
 class SinkConnection(Protocol):
@@ -47,6 +35,5 @@ class SinkConnection(Protocol):
 
 def open_sink(section: PublishSection) -> SinkConnection:
     """The sink of a section; see `SinkConnection` for what it raises."""
-    module = import_module(f"livebode.publishing.{MODULES[section.kind]}")
-    sink: SinkConnection = module.SINK(section)
+    sink: SinkConnection = loaded(named("sinks")[section.kind].sink)(section)
     return sink

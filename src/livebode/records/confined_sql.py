@@ -7,8 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from livebode.core import UsageError
-from livebode.core.installing import not_installed
+from livebode.core import UsageError, not_installed
 
 # It reads only the given tables and writes nothing, so that an untrusted query can be run.
 _CONFINED = (
@@ -51,7 +50,7 @@ class QueryTables:
     known: Callable[[], list[str]]
 
 
-def answer(sql: str, rows_max: int, tables: QueryTables) -> QueryResult:
+def answer_query(sql: str, rows_max: int, tables: QueryTables) -> QueryResult:
     """The first rows of a query.
 
     Raises

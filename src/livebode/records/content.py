@@ -46,7 +46,11 @@ def content_sha256(path: Path) -> str:
         raise RecordingError("not-found", f"there is no file {path}", "check the name", path=str(path)) from None
     except OSError as error:
         raise RecordingError(
-            "not-readable", f"cannot read {path}: {error.strerror}", "check its permissions", path=str(path)
+            "not-readable",
+            f"cannot read {path}: {error.strerror}",
+            "check its permissions",
+            path=str(path),
+            errno=error.errno,
         ) from None
 
 

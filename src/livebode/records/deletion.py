@@ -9,9 +9,7 @@ from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
 
-from livebode.core import RecordError
-from livebode.core.files import move_directory, sync_directory
-from livebode.core.writing import writing
+from livebode.core import RecordError, move_directory, remove_empty, sync_directory, writing
 from livebode.records.inside import is_folder
 from livebode.records.segments.lock import Lock
 
@@ -45,7 +43,7 @@ def delete(run: Path) -> Path:
         try:
             to = move_directory(run, place)
         except OSError:
-            place.rmdir()
+            remove_empty(place)
             raise
         sync_directory(bin_)
     return to

@@ -29,15 +29,15 @@ def open_read(run: Path, name: str) -> BinaryIO:
     """
     check_folder(run, name)
     try:
-        file = os.fdopen(os.open(run / name, os.O_RDONLY | _SAFE), "rb")
+        file = os.open(run / name, os.O_RDONLY | _SAFE)
     except OSError as error:
         if error.errno in (errno.ELOOP, errno.ENXIO):  # a link; a socket
             raise _not_regular(run / name) from None
         raise
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-        file.close()
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
         raise _not_regular(run / name)
-    return file
+    return os.fdopen(file, "rb")
 
 
 def read_bytes(run: Path, name: str, size_bytes_max: int | None = None) -> bytes:

@@ -6,9 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from livebode.core import RecordError
-from livebode.core.files import write_whole
-from livebode.core.writing import writing
+from livebode.core import RecordError, write_whole, writing
 from livebode.records.inside import check_own, read_bytes
 from livebode.records.plain_json import to_json
 from livebode.records.versions import check_version, format_of

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex
 from livebode.core import REASONS, Lines, MatrixResponses
 from livebode.records import response_table
 from livebode.records.table_file import ColumnTable
@@ -16,7 +17,7 @@ from livebode.tables import Field, Schema, Table, Text
 
 SCHEMA = Schema(
     (
-        *response_table.SCHEMA,
+        *response_table.RESPONSE_SCHEMA,
         Field("output", "string"),
         Field("input", "string"),
         Field("condition", "float64"),
@@ -45,8 +46,6 @@ MATRIX_RESPONSES = ColumnTable(
 )
 COVARIANCE = ColumnTable(COVARIANCE_SCHEMA, ("sample", "time_s", "frequency_hz", "factor", "row", "column"))
 
-Complex = NDArray[np.complex128]
-
 
 @dataclass(frozen=True)
 class MatrixShape:
@@ -72,7 +71,7 @@ def matrix_rows(responses: MatrixResponses) -> Table:
     outputs, inputs = responses.outputs, responses.inputs
     entries = [response_table.as_batch(responses.entry(o, i)) for o in outputs for i in inputs]
     columns: list[Any] = [
-        np.stack([entry[name] for entry in entries], axis=1).ravel() for name in response_table.SCHEMA.names
+        np.stack([entry[name] for entry in entries], axis=1).ravel() for name in response_table.RESPONSE_SCHEMA.names
     ]
     cells = len(responses) * len(responses.lines)
     output, input = (at.ravel() for at in np.indices((len(outputs), len(inputs))))
@@ -106,7 +105,7 @@ def covariance_rows(responses: MatrixResponses) -> Table:
 
 
 def entry_rows(
-    table: Table, output: str, input: str, columns: Sequence[str] = tuple(response_table.SCHEMA.names)
+    table: Table, output: str, input: str, columns: Sequence[str] = tuple(response_table.RESPONSE_SCHEMA.names)
 ) -> Table:
     """The rows of one entry, with the columns of any run."""
     at = table.text("output").where(output) & table.text("input").where(input)

@@ -7,9 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, field_validator
 
-from livebode.core import RecordError
-from livebode.core.files import write_whole
-from livebode.core.writing import writing
+from livebode.core import RecordError, write_whole, writing
 from livebode.records.inside import check_own, read_bytes
 from livebode.records.plain_json import to_json
 from livebode.records.versions import check_version, format_of

@@ -6,10 +6,9 @@ import numpy as np
 
 from livebode.core import Parameters
 from livebode.records.table_file import ColumnTable
-from livebode.tables import Schema, Table, Text
-from livebode.tables.table import Column
+from livebode.tables import Column, Schema, Table, Text
 
-SCHEMA = Schema.of(
+PARAMETER_SCHEMA = Schema.of(
     sample="int64",
     time_s="float64",
     schedule="float64",
@@ -24,7 +23,7 @@ SCHEMA = Schema.of(
 """Columns: those of the response; model, parameter or derived quantity, its value and standard deviation (NaN if the
 status is not "ok"), unit, status, and the model's misfit as a share of |G|."""
 
-PARAMETERS = ColumnTable(SCHEMA, ("sample", "time_s", "schedule", "model", "name", "unit", "status"))
+PARAMETERS = ColumnTable(PARAMETER_SCHEMA, ("sample", "time_s", "schedule", "model", "name", "unit", "status"))
 
 
 def parameter_rows(parameters: Parameters) -> Table:
@@ -42,4 +41,4 @@ def parameter_rows(parameters: Parameters) -> Table:
         Text.of(statuses.tolist(), np.repeat(status, n)),
         np.repeat(parameters.epsilon, n),
     ]
-    return Table(SCHEMA, tuple(columns))
+    return Table(PARAMETER_SCHEMA, tuple(columns))

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from livebode.core import Event, RecordError
+from livebode.language import Message
 from livebode.records.inside import open_read
-from livebode.records.parquet_part import ParquetPart, sha256_of_next
 from livebode.records.segments.damage import KIND
-from livebode.tables import Table
-from livebode.tables.parquet_file import ParquetFile
+from livebode.records.table_file import ParquetPart, sha256_of_next
+from livebode.tables import ParquetFile, Table
 
 _verified: dict[tuple[object, ...], list[bool]] = {}
 
@@ -81,5 +81,11 @@ class StoredTable:
     def _report_of(self, what: str, rows: int) -> None:
         table = self._name.removesuffix(".parquet")
         self._report(
-            Event(KIND, 0, 0.0, f"{self._name} is damaged: {what}", {"file": self._name, "rows": {table: rows}})
+            Event(
+                KIND,
+                0,
+                0.0,
+                Message("{file} is damaged: {what}", file=self._name, what=what),
+                {"rows": {table: rows}},
+            )
         )

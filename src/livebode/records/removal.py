@@ -8,7 +8,7 @@ import re
 import stat
 from pathlib import Path
 
-from livebode.core import RecordError
+from livebode.core import RecordError, remove_empty, remove_files
 from livebode.records.inside import is_folder
 from livebode.records.summary_file import read_summary
 
@@ -74,19 +74,22 @@ def remove(run: Path, *, itself: bool = True) -> None:
     OSError
         If something cannot be removed, or there are other files.
     """
+    for name in _FOLDERS:
+        remove_folder(run, name)
     # Without it the rest is not a run: it is removed last, so that an interrupted removal can be repeated.
-    for path in sorted(run.iterdir(), key=lambda path: path.name == "run.json"):
-        inner = _FOLDERS.get(path.name)
-        if inner is not None and is_folder(path):
-            for file in path.iterdir():
-                if _written(file, inner):
-                    os.unlink(file)
-            with contextlib.suppress(OSError):
-                os.rmdir(path)
-        elif _FILES.fullmatch(path.name) and _regular(path):
-            os.unlink(path)
+    files = sorted((path for path in run.iterdir() if _written(path, _FILES)), key=lambda path: path.name == "run.json")
+    remove_files(run, [path.name for path in files])
     if itself:
-        os.rmdir(run)
+        remove_empty(run)
+
+
+def remove_folder(run: Path, name: str) -> None:
+    """Remove what livebode wrote to a directory of a run, and the directory itself if it is then empty."""
+    folder = run / name
+    if is_folder(folder):
+        remove_files(folder, [path.name for path in folder.iterdir() if _written(path, _FOLDERS[name])])
+        with contextlib.suppress(OSError):
+            remove_empty(folder)
 
 
 def _written(path: Path, names: re.Pattern[str]) -> bool:

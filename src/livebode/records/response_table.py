@@ -11,7 +11,7 @@ from livebode.core import PER_LINE, PER_RESPONSE, Lines, Responses
 from livebode.records.table_file import ColumnTable
 from livebode.tables import Schema, Table
 
-SCHEMA = Schema.of(
+RESPONSE_SCHEMA = Schema.of(
     first="int64",
     sample="int64",
     time_s="float64",
@@ -33,10 +33,10 @@ SCHEMA = Schema.of(
 response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
 input, weight in a mean, distortion, whether the machine was ready in the whole window. NaN for missing values."""
 
-EARLIER = SCHEMA.names[:-1]
+EARLIER = RESPONSE_SCHEMA.names[:-1]
 """Names of the columns of runs from before `signals.ready`: the machine was always ready."""
 
-RESPONSES = ColumnTable(SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
+RESPONSES = ColumnTable(RESPONSE_SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
 
 
 def as_batch(responses: Responses) -> Table:
@@ -60,13 +60,13 @@ def as_batch(responses: Responses) -> Table:
         responses.distortion.ravel(),
         np.repeat(responses.ready, lines),
     ]
-    return Table(SCHEMA, tuple(columns))
+    return Table(RESPONSE_SCHEMA, tuple(columns))
 
 
 def responses_in(table: Table, lines: Lines, found: Mapping[str, Any]) -> Responses:
     """The responses in complete rows of this table; `found` of run.json has quantity and unit."""
     shape = table.num_rows // len(lines), len(lines)
-    names = [name for name in SCHEMA.names if name in table.column_names]
+    names = [name for name in RESPONSE_SCHEMA.names if name in table.column_names]
     column: dict[str, Any] = {name: table[name].reshape(shape) for name in names}
     value = np.empty(shape, dtype=np.complex128)
     value.real, value.imag = column["re"], column["im"]

@@ -24,10 +24,10 @@ from livebode.core import (
     PlantKinds,
     RecordError,
     Responses,
+    RunClock,
 )
-from livebode.core.clock import RunClock
+from livebode.language import Message
 from livebode.locations import original
-from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.matrix_run import (
     entries_of,
@@ -40,11 +40,12 @@ from livebode.records.matrix_run import (
 from livebode.records.matrix_table import COVARIANCE_SCHEMA, MatrixShape, entry_rows, matrices
 from livebode.records.matrix_table import SCHEMA as MATRIX_SCHEMA
 from livebode.records.piece import StoredTable
-from livebode.records.response_table import EARLIER, SCHEMA, responses_in
-from livebode.records.segments import reading
+from livebode.records.response_table import EARLIER, RESPONSE_SCHEMA, responses_in
+from livebode.records.segments import event_lines, reading
 from livebode.records.segments.damage import KIND
+from livebode.records.segments.manifest import NAME as MANIFEST
 from livebode.records.segments.manifest import Manifest, Segment
-from livebode.records.summary_file import RUN, read_summary
+from livebode.records.summary_file import COPY, RUN, copy_damage, read_summary
 from livebode.records.summary_shape import what_is_wrong
 from livebode.tables import Table
 
@@ -150,8 +151,10 @@ class RunRecord:
             len(() if run.output_only else run.lines)
         except LivebodeError as error:
             raise error.at(str(path / RUN)) from None
-        if damaged:
-            run.report(Event(KIND, 0, 0.0, damaged, {"file": RUN}))
+        copy_damaged = "" if damaged else copy_damage(path)
+        for file, message in ((RUN, damaged), (COPY, copy_damaged)):
+            if message:
+                run.report(Event(KIND, 0, 0.0, message, {"file": file}))
         if entry is not None:
             return run.entry(*entry_named(str(path), summary, entry))
         if run.is_matrix and not matrix:
@@ -274,7 +277,9 @@ class RunRecord:
 
     def responses(self) -> Responses:
         """All responses, as written; an empty batch before the first. RecordError of a matrix run."""
-        return Responses.join(list(self.batches()) or [responses_in(Table.empty(SCHEMA), self.lines, self.found)])
+        return Responses.join(
+            list(self.batches()) or [responses_in(Table.empty(RESPONSE_SCHEMA), self.lines, self.found)]
+        )
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
         """All readable responses in order, in parts of bounded size; or the newest, from files up to this size."""
@@ -297,7 +302,7 @@ class RunRecord:
         if self.is_matrix:
             raise entry_missing(str(self.path), self.summary)
         lines = self.lines
-        for table in self._whole(tables, len(lines), (SCHEMA.names, EARLIER)):
+        for table in self._whole(tables, len(lines), (RESPONSE_SCHEMA.names, EARLIER)):
             yield responses_in(table, lines, self.found)
 
     def _whole(self, tables: Iterator[Table], rows: int, columns: Collection[list[str]]) -> Iterator[Table]:
@@ -357,7 +362,9 @@ class RunRecord:
         file = self.path / name
         try:
             if reading.in_segments(self.path):
-                yield from reading.tables(self.path, name, self.report, size_bytes_max, span_s, finished=self.finished)
+                yield from reading.tables(
+                    self.path, name, self.report, size_bytes_max, span_s, manifest_bytes=self._manifest_bytes
+                )
             elif (piece := self._piece(name)) is not None:
                 yield from piece.tables(_ROWS)
         except LivebodeError:  # it is a ValueError
@@ -371,8 +378,13 @@ class RunRecord:
         if os.path.lexists(self.path / file):
             return StoredTable(self.path, file, parts.get(file), self.report)
         if (name == "responses" and not self.output_only) or file in parts:
-            self.report(Event(KIND, 0, 0.0, f"{file} is damaged: the file is missing", {"file": file}))
+            self.report(Event(KIND, 0, 0.0, Message("{file} is damaged: the file is missing", file=file)))
         return None
+
+    @property
+    def _manifest_bytes(self) -> int | None:
+        """Length of the manifest of a finished run, 0 if it is not known; None of an unfinished one."""
+        return self.summary.get("size_bytes", {}).get(MANIFEST, 0) if self.finished else None
 
     @property
     def segments(self) -> list[Segment]:
@@ -386,7 +398,7 @@ class RunRecord:
                 groups = {name: piece.groups() for name in tables if (piece := self._piece(name)) is not None}
                 whole = {name: found for name, found in groups.items() if found != []}
                 return {name: Files([self.path / f"{name}.parquet"], found, []) for name, found in whole.items()}
-            segments, rows = reading.parts(self.path, self.report, finished=self.finished)
+            segments, rows = reading.parts(self.path, self.report, self._manifest_bytes)
             found = {name: Files([], None, rows.get(name, [])) for name in tables}
             for segment in segments:
                 if segment.table in found and reading.whole(self.path, segment, self.report) is not None:
@@ -399,7 +411,7 @@ class RunRecord:
         """The closed segments of all tables, by age, and later rows of each; None of a run in one piece."""
         try:
             if reading.in_segments(self.path):
-                return reading.parts(self.path, self.report, finished=self.finished)
+                return reading.parts(self.path, self.report, self._manifest_bytes)
         except OSError as error:
             raise _unreadable(self.path, error) from None
         return None
@@ -413,19 +425,22 @@ class RunRecord:
 
     def each_event(self) -> Iterator[Event]:
         """The same one by one, in bounded memory."""
-        # Before the lines: events written in between are then in both instead of in neither.
-        waiting = self.waiting_events()
-        yield from still_waiting(self.event_lines(), waiting)
+        lines, waiting = self.event_lines()
+        yield from still_waiting(lines, waiting)
 
-    def waiting_events(self) -> list[Event]:
-        """Events of the newest commit that will share a line of events.jsonl."""
-        plain = [] if self.finished or not reading.in_segments(self.path) else reading.waiting_events(self.path)
-        return [event for value in plain if (event := event_lines.to_event(value)) is not None]
+    def event_lines(self) -> tuple[Iterator[Event], list[Event]]:
+        """Events in events.jsonl, and those of the newest commit that will share a line of it."""
+        # The commit before the lines: events written in between are then in both instead of in neither.
+        unfinished = not self.finished and reading.in_segments(self.path)
+        commit = reading.newest_commit(self.path) if unfinished else None
+        if commit is None:
+            return self._event_lines(self.summary.get("size_bytes", {}).get(event_lines.NAME, 0)), []
+        waiting = [event for value in commit.waiting if (event := event_lines.to_event(value)) is not None]
+        return self._event_lines(commit.events_bytes), waiting
 
-    def event_lines(self) -> Iterator[Event]:
-        """Events in events.jsonl."""
+    def _event_lines(self, least_bytes: int) -> Iterator[Event]:
         try:
-            yield from event_lines.events(self.path, self.report, finished=self.finished)
+            yield from event_lines.events(self.path, self.report, finished=self.finished, least_bytes=least_bytes)
         except OSError as error:
             raise _unreadable(self.path / event_lines.NAME, error) from None
 
@@ -442,4 +457,5 @@ def _unreadable(path: Path, error: Exception) -> RecordError:
         "check its permissions and the disk",
         path=str(path),
         reason=str(error),
+        errno=getattr(error, "errno", None),
     )

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from livebode.core import Event, MatrixResponses, Parameters, RecordError, Responses
-from livebode.core.files import whole_directory
-from livebode.core.writing import writing
-from livebode.records.matrix_table import COVARIANCE, MATRIX_RESPONSES, covariance_rows, matrix_rows
-from livebode.records.parameter_table import PARAMETERS, parameter_rows
+from livebode.core import Event, RecordError, whole_directory, writing
+from livebode.records._result_rows import RESPONSE_TABLES, result_rows
 from livebode.records.removal import check_removable, remove
-from livebode.records.response_table import RESPONSES, as_batch
+from livebode.records.segments.event_lines import NAME as EVENTS
 from livebode.records.segments.json_lines import to_line
 from livebode.records.segments.lock import Lock
 from livebode.records.summary_file import COPY, RUN, to_document
-from livebode.records.table_file import TableFile
+from livebode.records.table_file import ColumnTable, TableFile
 
 _logger = logging.getLogger(__name__)
 
@@ -37,10 +34,8 @@ class RunDirectory:
         Path of the directory.
     force
         Whether to replace an existing directory. Only the directory of a run is replaced.
-    responses
-        Whether the run has responses; an output-only run has only parameters.
-    matrix
-        Whether these are matrices; their covariance is then in ``covariance.parquet``.
+    tables
+        The tables of the run. Each has a file from the beginning, except the parameters: a run may have no fits.
 
     Raises
     ------
@@ -48,25 +43,18 @@ class RunDirectory:
         If the path exists and must not be replaced, or the disk reports an error.
     """
 
-    def __init__(self, path: Path, *, force: bool = False, responses: bool = True, matrix: bool = False) -> None:
-        self.path = path
-        self._force = force
-        self._has_matrices = matrix
-        self._has_responses = responses
+    def __init__(self, path: Path, tables: Mapping[str, ColumnTable] = RESPONSE_TABLES, *, force: bool = False) -> None:
+        self.path, self._tables, self._force = path, tables, force
 
     def __enter__(self) -> RunDirectory:
         self._check_free()
         with writing(self.path, RecordError), contextlib.ExitStack() as undo:
             self.partial = undo.enter_context(whole_directory(self.path, remove))
-            self._events = (self.partial / "events.jsonl").open("wb")
-            self._responses: TableFile | None = None
-            if self._has_responses:
-                table = MATRIX_RESPONSES if self._has_matrices else RESPONSES
-                self._responses = TableFile(self.partial / "responses.parquet", table)
-            self._covariance: TableFile | None = None
-            if self._has_matrices:
-                self._covariance = TableFile(self.partial / "covariance.parquet", COVARIANCE)
-            self._parameters: TableFile | None = None
+            self._events = (self.partial / EVENTS).open("wb")
+            self._files: dict[str, TableFile] = {}
+            for name in self._tables:
+                if name != "parameters":
+                    self._open(name)
             self._place = undo.pop_all()
         _logger.info("%s: the record begins", self.path)
         return self
@@ -85,27 +73,15 @@ class RunDirectory:
                 self._check_free()
         _logger.info("%s: the record is complete", self.path)
 
-    def write(self, responses: Responses) -> None:
-        """Append responses."""
-        assert self._responses is not None
+    def write(self, results: Any) -> None:
+        """Append results: responses, matrices of them, or parameters."""
         with writing(self.path, RecordError):
-            self._responses.write(as_batch(responses))
+            for name, rows in result_rows(results).items():
+                (self._files.get(name) or self._open(name)).write(rows)
 
-    def write_matrices(self, responses: MatrixResponses) -> None:
-        """Append matrices of responses with their covariance."""
-        assert self._responses is not None
-        assert self._covariance is not None
-        with writing(self.path, RecordError):
-            self._responses.write(matrix_rows(responses))
-            self._covariance.write(covariance_rows(responses))
-
-    def write_parameters(self, *parts: Parameters) -> None:
-        """Append fitted parameters and derived quantities; the first ones create ``parameters.parquet``."""
-        with writing(self.path, RecordError):
-            if self._parameters is None:
-                self._parameters = TableFile(self.partial / "parameters.parquet", PARAMETERS)
-            for parameters in parts:
-                self._parameters.write(parameter_rows(parameters))
+    def _open(self, name: str) -> TableFile:
+        self._files[name] = TableFile(self.partial / f"{name}.parquet", self._tables[name])
+        return self._files[name]
 
     def write_event(self, event: Event) -> None:
         """Append an event."""
@@ -115,7 +91,9 @@ class RunDirectory:
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
         """Close the tables, write run.json with their checksums, and let `draw` add pictures to the directory."""
         with writing(self.path, RecordError):
-            data = to_document(summary | {"files": self._close()})
+            files = self._close()
+            size_bytes = {EVENTS: (self.partial / EVENTS).stat().st_size}
+            data = to_document(summary | {"files": files, "size_bytes": size_bytes})
             for name in (RUN, COPY):
                 (self.partial / name).write_bytes(data)
             draw(self.partial)
@@ -123,12 +101,7 @@ class RunDirectory:
     def _close(self) -> dict[str, Any]:
         """Close the files; the parts of the tables, for run.json."""
         self._events.close()
-        tables = {
-            "covariance.parquet": self._covariance,
-            "parameters.parquet": self._parameters,
-            "responses.parquet": self._responses,
-        }
-        return {name: table.close() for name, table in tables.items() if table is not None}
+        return {f"{name}.parquet": self._files[name].close() for name in sorted(self._files)}
 
     def _check_free(self) -> None:
         if not self.path.exists() and not self.path.is_symlink():

@@ -13,9 +13,7 @@ from typing import Any, TypeVar, get_args
 
 import numpy as np
 
-from livebode.core import Lines, Quantity, RecordError, Responses
-from livebode.core.files import write_whole
-from livebode.core.writing import writing
+from livebode.core import Lines, Quantity, RecordError, Responses, write_whole, writing
 from livebode.records.inside import read_bytes
 from livebode.records.summary_file import from_document, to_document
 from livebode.records.versions import check_version, format_of

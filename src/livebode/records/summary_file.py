@@ -82,12 +82,29 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
     except OSError as error:
         path = str(run / RUN)
         first = RecordError(
-            "unreadable", f"{path!r} cannot be read: {error}", "check its permissions", path=path, reason=str(error)
+            "unreadable",
+            f"{path!r} cannot be read: {error}",
+            "check its permissions",
+            path=path,
+            reason=str(error),
+            errno=error.errno,
         )
     try:
         return _read(run, COPY), f"{first.message}; its copy {COPY} is read instead"
     except (OSError, RecordError):
         raise first from None
+
+
+def copy_damage(run: Path) -> str:
+    """What is wrong with the copy of an intact run.json; empty if it is intact too, or missing."""
+    try:
+        _read(run, COPY)
+    except FileNotFoundError:
+        return ""
+    except (OSError, RecordError) as error:
+        reason = error.message if isinstance(error, RecordError) else str(error)
+        return f"{reason}; {RUN} is intact, so nothing is lost"
+    return ""
 
 
 def _not_a_run(run: Path) -> RecordError:

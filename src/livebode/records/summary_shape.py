@@ -6,9 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationError, model_validator
 
-from livebode.core import QuantityKind
-from livebode.core.clock import ClockKind
-from livebode.core.deferred_model import DeferredModel
+from livebode.core import ClockKind, DeferredModel, QuantityKind
+from livebode.estimates import RESPONSE, kind_of
 
 Text = Annotated[str, Field(max_length=100_000)]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -136,6 +135,7 @@ class _Configuration(_Part):
 class _AnySummary(_Part):
     configuration: _Configuration = _Configuration()
     counts: dict[str, Count | None] = {}
+    size_bytes: dict[str, Count] = {}
     speed: _Speed | None = None
     versions: Section = {}
     machine: dict[Text, Text] = {}
@@ -188,14 +188,15 @@ def what_is_wrong(summary: dict[str, Any]) -> str:
     'found.rate_hz: Input should be a valid number'
     """
     try:
-        _shape_of(summary).model_validate(summary)
+        _SHAPES.get(kind_of(summary), _AnySummary).model_validate(summary)
     except ValidationError as error:
         first = error.errors()[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
     return ""
 
 
-def _shape_of(summary: dict[str, Any]) -> type[_AnySummary]:
-    if summary.get("output_only") is True:
-        return _OutputOnlySummary
-    return _MatrixSummary if summary.get("matrix") is True else _Summary
+_SHAPES: dict[str, type[_AnySummary]] = {
+    RESPONSE: _Summary,
+    "matrix": _MatrixSummary,
+    "output_only": _OutputOnlySummary,
+}

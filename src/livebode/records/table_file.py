@@ -1,19 +1,37 @@
-"""Layout of a table, and a table as one Parquet file, readable with any tool."""
+"""Layout of a table, and a table as one Parquet file, readable with any tool, with a checksum of each part."""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from livebode.records.parquet_part import ParquetPart, sha256_of_next
-from livebode.tables import Schema, Table
-from livebode.tables.parquet_writer import ParquetWriter
+from livebode.tables import ParquetWriter, Schema, Table
 
 _GROUP_ROWS = 1 << 15  # two groups at a time are in memory: one fills, one is written
+_BLOCK = 1 << 20
+
+
+@dataclass(frozen=True)
+class ParquetPart:
+    """Consecutive bytes of a Parquet file: a row group, or, with no rows, the bytes after the last one."""
+
+    rows: int
+    size_bytes: int
+    sha256: str
+
+
+def sha256_of_next(file: BinaryIO, size: int) -> str:
+    """The checksum of the next `size` bytes, in hexadecimal form."""
+    found = hashlib.sha256()
+    while size > 0 and (block := file.read(min(size, _BLOCK))):
+        found.update(block)
+        size -= len(block)
+    return found.hexdigest()
 
 
 @dataclass(frozen=True)

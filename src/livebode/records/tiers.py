@@ -10,7 +10,7 @@ import numpy as np
 from livebode.core import Lines, Responses
 from livebode.fitting import BinnedMeans, SharedWindows, binned_means, combined
 from livebode.records.matrix_table import entry_rows
-from livebode.records.response_table import SCHEMA, as_batch, responses_in
+from livebode.records.response_table import RESPONSE_SCHEMA, as_batch, responses_in
 from livebode.records.run import RunRecord, lines_in
 from livebode.records.segments import reading
 from livebode.records.segments.manifest import TIERS, Segment
@@ -19,7 +19,9 @@ from livebode.tables import Field, Schema, Table, Text
 BIN_S = dict(zip(TIERS, (1.0, 60.0, 3600.0)))
 """The tables and the spans of their means."""
 
-TIER_SCHEMA = Schema((*SCHEMA, Field("count", "int64"), Field("windows", "float64"), Field("responses", "int64")))
+TIER_SCHEMA = Schema(
+    (*RESPONSE_SCHEMA, Field("count", "int64"), Field("windows", "float64"), Field("responses", "int64"))
+)
 """Columns: those of the responses, and number of the responses in the mean at the line, of windows without overlap
 with the same information, and of all responses of the span."""
 
@@ -134,7 +136,7 @@ def _means_of(run: RunRecord, table: Table, bin_s: float | None) -> BinnedMeans:
     """The means in rows of a tier, or with `bin_s` those of full responses."""
     lines, found = run.lines, run.found
     if run.selected is not None:
-        names = SCHEMA.names if bin_s is not None else TIER_SCHEMA.names
+        names = RESPONSE_SCHEMA.names if bin_s is not None else TIER_SCHEMA.names
         table = entry_rows(table, *run.selected, names)
     means = responses_in(table, lines, found)
     if bin_s is not None:

@@ -5,22 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import Model, Response, Responses
-from livebode.core.clock import moment
-from livebode.drawing import bound_db, bound_deg, decibels, ticks
-from livebode.drawing.panel import FEW_LINES, alone, band, bound
+from livebode.arrays import Floats
+from livebode.core import Model, Response, Responses, moment
+from livebode.drawing import FEW_LINES, alone, band, bound, bound_db, bound_deg, decibels, ticks
 from livebode.language import tr, trn
 from livebode.report import words
-from livebode.report.style import Style, drawing, empty_note, heading, new_figure, plain, style
+from livebode.report._style import Style, drawing, empty_note, heading, new_figure, plain, style
 from livebode.report.summary import MEAN_PROBABILITY, PROBABILITY, Summary, summarised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 _LEFT = 0.085
 _FIT_POINTS = 600
@@ -152,7 +149,7 @@ def _draw(
 
 
 def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *panels: Axes) -> None:
-    from livebode.drawing.scales import frequency_axis
+    from livebode.drawing import frequency_axis
 
     magnitude, phase, *rest = panels
     for axes in panels:
@@ -208,7 +205,9 @@ def _legend(figure: Figure, look: Style, summary: Summary, fit: bool, mean: bool
         ]
     mark: dict[str, Any] = {"linestyle": "", "marker": "+", "markersize": 10, "markeredgewidth": 1.8} if few else {}
     handles.append(Line2D([], [], color=look.newest, linewidth=1.6, **mark))
-    median = trn("median of {n} valid response", "median of {n} valid responses", summary.count)
+    median = trn(
+        "median of {n} response with a valid line", "median of {n} responses with a valid line", summary.count
+    )  # fmt: skip
     texts = [median, tr("5–95 % of them")][: len(handles) - 1]
     if mean:
         handles, texts = handles[len(texts) // 2 :], [tr("5–95 % of the responses")] * (len(texts) // 2)

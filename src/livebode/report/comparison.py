@@ -7,22 +7,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Response
-from livebode.drawing import bound_db, bound_deg, decibels, unwrapped
-from livebode.drawing.panel import FEW_LINES
-from livebode.drawing.panel import bound as draw_bound
+from livebode.drawing import FEW_LINES, bound_db, bound_deg, decibels, unwrapped
+from livebode.drawing import bound as draw_bound
 from livebode.language import tr, trn
 from livebode.report import words
+from livebode.report._style import Style, drawing, heading, new_figure, plain, style
 from livebode.report.map import frequency_edges
-from livebode.report.style import Style, drawing, heading, new_figure, plain, style
 from livebode.report.summary import MEAN_C
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 PlaceChange = tuple[float, float, bool, Complex, NDArray[np.bool_]]
 """From, to, whether return, ratio and mask of the lines that differ, (lines,) each."""
 
@@ -45,7 +43,7 @@ def comparison_figure(
     dark
         Whether to draw light on dark.
     """
-    from livebode.drawing.scales import frequency_axis
+    from livebode.drawing import frequency_axis
 
     look = style(dark)
     f = before.lines.frequency_hz

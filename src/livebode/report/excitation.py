@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.drawing.panel import FEW_LINES
+from livebode.drawing import FEW_LINES
+from livebode.report._style import Style, drawing, heading, new_figure, plain, style
 from livebode.report.pictures import save
-from livebode.report.style import Style, drawing, heading, new_figure, plain, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
 
     from livebode.experiment_design import Design, Waveform
 
-Floats = NDArray[np.float64]
 
 _CLASSES = 41
 _POINTS_MAX = 20_000  # of a period; of a longer one only the extremes are drawn

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
-from livebode.core.document import Picture
-from livebode.language import tr
+from livebode.core import Picture
+from livebode.language import Message, worded
+from livebode.plugins import loaded
 from livebode.report.local_ticks import localise_ticks
 
 if TYPE_CHECKING:
@@ -13,6 +15,20 @@ if TYPE_CHECKING:
 
 WIDTH_IN = 9.0
 """Width of all pictures of a document; on A4 they are scaled to three quarters, with letters of 7 points."""
+
+
+_FIGURES: Mapping[str, tuple[str, str, bool]] = {
+    "bode": ("livebode.report.bode:bode_figure", Message("Average response"), False),
+    "tracking": ("livebode.report.tracking:tracking_figure", Message("Magnitude over time"), True),
+    "parameters": ("livebode.report.parameters:parameters_figure", "", False),
+    "loop": ("livebode.report.loop:loop_figure", Message("Open loop"), True),
+    "validation": ("livebode.report.validation:validation_figure", Message("Measured and simulated"), False),
+    "matrix": ("livebode.report.matrix:matrix_figure", Message("Matrix of responses"), True),
+    "singular values": ("livebode.report.matrix:singular_values_figure", Message("Singular values"), False),
+    "comparison": ("livebode.report.comparison:comparison_figure", "", False),
+    "places": ("livebode.report.comparison:places_figure", "", False),
+}
+"""What draws each kind, its title, and whether it needs the width of the page."""
 
 
 def drawn(picture: Picture) -> Figure:
@@ -23,50 +39,9 @@ def drawn(picture: Picture) -> Figure:
 
 
 def _figure(picture: Picture) -> Figure:
-    if picture.what == "bode":
-        from livebode.report.bode import bode_figure
-
-        return bode_figure(**picture.data, title=tr("Average response"))
-    if picture.what == "tracking":
-        from livebode.report.tracking import tracking_figure
-
-        return tracking_figure(**picture.data, title=tr("Magnitude over time"), width_in=WIDTH_IN)
-    if picture.what == "parameters":
-        from livebode.report.parameters import parameters_figure
-
-        return parameters_figure(**picture.data)
-    if picture.what in ("loop", "proposal"):
-        return _loop_figure(picture)
-    if picture.what == "validation":
-        from livebode.report.validation import validation_figure
-
-        return validation_figure(**picture.data, title=tr("Measured and simulated"), folded=True)
-    if picture.what == "years":
-        from livebode.report.year import years_figure
-
-        return years_figure(**picture.data)
-    if picture.what == "matrix":
-        from livebode.report.matrix import matrix_figure
-
-        return matrix_figure(**picture.data, title=tr("Matrix of responses"), width_in=WIDTH_IN)
-    if picture.what == "singular values":
-        from livebode.report.matrix import singular_values_figure
-
-        return singular_values_figure(**picture.data, title=tr("Singular values"))
-    if picture.what == "comparison":
-        from livebode.report.comparison import comparison_figure
-
-        return comparison_figure(**picture.data)
-    from livebode.report.comparison import places_figure
-
-    return places_figure(**picture.data)
-
-
-def _loop_figure(picture: Picture) -> Figure:
-    if picture.what == "loop":
-        from livebode.report.loop import loop_figure
-
-        return loop_figure(**picture.data, title=tr("Open loop"), width_in=WIDTH_IN)
-    from livebode.report.tuning import folded_tuning_figure
-
-    return folded_tuning_figure(**picture.data, width_in=WIDTH_IN)
+    reference, title, wide = _FIGURES.get(picture.what, (picture.what, "", True))
+    options: dict[str, Any] = {"title": worded(title)} if title else {}
+    if wide:
+        options["width_in"] = WIDTH_IN
+    figure: Figure = loaded(reference)(**picture.data, **options)
+    return figure

@@ -5,8 +5,8 @@ from __future__ import annotations
 from base64 import b64encode
 from html import escape
 
-from livebode.core.document import Document, Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
-from livebode.language import current_language, recognised
+from livebode.core import Document, Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
+from livebode.language import current_language, worded
 from livebode.report.page_style import STYLE_SHEET
 from livebode.report.svg import pictures_svg, themed_svg
 
@@ -71,13 +71,13 @@ class _Page:
         if not self._of.result:
             return ""
         first, *more = self._of.result
-        word = f'<p class="word {first.tone}">{_text(recognised(self._of.tones[first.tone]))}</p>'
+        word = f'<p class="word {first.tone}">{_text(worded(self._of.tones[first.tone]))}</p>'
         rest = self._findings(tuple(more)) if more else ""
         return f'<div class="result {first.tone}">{word}<p class="why">{_text(first.text)}</p></div>\n{rest}'
 
     def _findings(self, findings: tuple[Finding, ...]) -> str:
         rows = "\n".join(
-            f'<li><span class="tone {f.tone}">{_text(recognised(self._of.tones[f.tone]))}</span>'
+            f'<li><span class="tone {f.tone}">{_text(worded(self._of.tones[f.tone]))}</span>'
             f"<span>{_text(f.text)}</span></li>"
             for f in findings
         )

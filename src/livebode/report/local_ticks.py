@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from livebode.core.installing import needing
+from livebode.core import needing
 from livebode.language import numerals
 
 with needing("Matplotlib", "plots", "a picture"):

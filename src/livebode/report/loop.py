@@ -7,21 +7,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Responses
 from livebode.fitting import Fit
-from livebode.language import number, recognised, tr
+from livebode.language import number, tr, worded
 from livebode.margins import Margins, OpenLoop
+from livebode.report._style import Style, drawing, heading, new_figure, plain, style
 from livebode.report.pictures import save
-from livebode.report.style import Style, drawing, heading, new_figure, plain, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _POINTS = 1200
 _DRAWS = 100  # of the fit's parameters, for the band
@@ -100,7 +98,7 @@ def _degrees(value: Complex) -> Floats:
 def _bode(
     magnitude: Axes, phase: Axes, look: Style, found: LoopCurves, f: Floats, curves: tuple[Complex, Any, Any]
 ) -> None:
-    from livebode.drawing.scales import frequency_axis
+    from livebode.drawing import frequency_axis
 
     value, low, high = curves
     inside = (f >= found.fit.band_hz[0]) & (f <= found.fit.band_hz[1])
@@ -213,7 +211,7 @@ def _facts(found: LoopCurves) -> str:
         )
         if np.isfinite(found.margins.value[0, (i := found.margins.index(name))])
     ]
-    return " · ".join(words) or recognised(str(found.margins.status[0]))
+    return " · ".join(words) or worded(str(found.margins.status[0]))
 
 
 def _legend(figure: Figure, look: Style, left: float) -> None:

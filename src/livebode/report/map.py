@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Responses
 from livebode.drawing import decibels, quantiles, ticks
 from livebode.language import tr
 from livebode.report import words
-from livebode.report.style import Style, plain
+from livebode.report._style import Style, plain
 
 if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
 
-Floats = NDArray[np.float64]
 
 # About one cell for two pixels of the picture: finer cells cost time and show no more detail.
 _TIME_CELLS_MAX = 400

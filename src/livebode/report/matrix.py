@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import REASONS, MatrixResponses
-from livebode.core.clock import moment
-from livebode.drawing import bound_db, decibels
-from livebode.drawing.panel import FEW_LINES, alone, bound
-from livebode.language import recognised, tr
+from livebode.arrays import Floats
+from livebode.core import REASONS, MatrixResponses, moment
+from livebode.drawing import FEW_LINES, alone, bound, bound_db, decibels
+from livebode.language import tr, worded
+from livebode.report._style import Style, drawing, heading, new_figure, plain, shortened, style
 from livebode.report.pictures import save
-from livebode.report.style import Style, drawing, heading, new_figure, plain, shortened, style
 from livebode.report.summary import BOUND_C, PROBABILITY
 from livebode.report.words import lines_phrase
 
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 _LEFT_IN, _RIGHT_IN, _TOP_IN, _BOTTOM_IN = 0.85, 0.2, 1.25, 0.55
 _DASHES = ((), (5, 2), (1.5, 1.5), (5, 2, 1.5, 2))
@@ -61,7 +59,7 @@ def matrix_figure(
     """
     look, (down, across) = style(dark), responses.value.shape[2:]
     with drawing(look):
-        from livebode.drawing.scales import frequency_axis
+        from livebode.drawing import frequency_axis
 
         width, height = width_in or max(9.0, 1.05 + 3.4 * across), 1.8 + 3.2 * down
         figure = new_figure(width, height)
@@ -87,7 +85,7 @@ def singular_values_figure(responses: MatrixResponses, *, title: str = "", dark:
     """The singular values of the newest matrix over frequency, each with the bound that covers it with 99.7 %."""
     look, f = style(dark), responses.frequency_hz
     with drawing(look):
-        from livebode.drawing.scales import frequency_axis
+        from livebode.drawing import frequency_axis
 
         figure, bounds = new_figure(9.0, 4.8), tr("bounds: {percent:.1f} %", percent=100 * PROBABILITY)
         heading(
@@ -145,7 +143,7 @@ def _entry(pair: Sequence[Axes], look: Style, responses: MatrixResponses, at: tu
     for axes in pair:
         _shade(axes, look, responses, invalid)
     if invalid.all():
-        words = sorted({recognised(REASONS[number]) for number in responses.reason[-1, :, i]})
+        words = sorted({worded(REASONS[number]) for number in responses.reason[-1, :, i]})
         _note(magnitude, look, tr("not valid: {why}", why=", ".join(words)))
     if i:
         phase.set_ylabel("")

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from livebode.report._style import Style, drawing, heading, new_figure, plain, style
 from livebode.report.pictures import save
-from livebode.report.style import Style, drawing, heading, new_figure, plain, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from livebode.mimo.design import MatrixDesign
+    from livebode.mimo import MatrixDesign
 
 _DASHES = ((), (5, 2), (1.5, 1.5), (5, 2, 1.5, 2))
 

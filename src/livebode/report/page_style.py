@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from livebode.core.document import Tone
-from livebode.report.style import DARK, LIGHT
+from livebode.core import Tone
+from livebode.report._style import DARK, LIGHT
 from livebode.report.svg import variables
 
 _GREEN, _AMBER, _RED, _GREY = (

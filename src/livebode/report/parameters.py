@@ -6,18 +6,17 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.language import recognised, tr
+from livebode.arrays import Floats
+from livebode.language import tr, worded
 from livebode.report import words
-from livebode.report.style import Style, drawing, new_figure, plain, shortened, style
+from livebode.report._style import Style, drawing, new_figure, plain, shortened, style
 from livebode.report.tracking import with_holes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 Curve = tuple[str, str, Floats, Floats]
 """Name, unit, values and half-widths of the bounds, (rows,) each; NaN if there is no value."""
 
@@ -79,8 +78,8 @@ def _panel(axes: Axes, look: Style, time_s: Floats, curve: Curve) -> None:
 
 def labelled(name: str, unit: str) -> str:
     """A quantity with its unit."""
-    text = recognised(name.replace("_", " "))
-    return tr("{name} in {unit}", name=text, unit=recognised(unit)) if unit else text
+    text = worded(name.replace("_", " "))
+    return tr("{name} in {unit}", name=text, unit=worded(unit)) if unit else text
 
 
 def _limits(axes: Axes, value: Floats, half: Floats) -> None:

@@ -14,13 +14,12 @@ from typing import Any
 
 import typst
 
-from livebode.core import OutputError
-from livebode.core.document import Document, Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
-from livebode.language import current_language, recognised
+from livebode.core import Document, Finding, Listing, OutputError, Paragraph, Part, Picture, PrintedTable, Section
+from livebode.language import current_language, worded
+from livebode.report._style import LIGHT, columns
 from livebode.report.html import readable
 from livebode.report.page_style import TONE_COLOURS
 from livebode.report.pdf_fonts import Letters, letters_of
-from livebode.report.style import LIGHT, columns
 from livebode.report.svg import pictures_svg
 
 STANDARDS = ("a-2a", "ua-1")
@@ -111,7 +110,7 @@ class _Data:
         }  # fmt: skip
 
     def _finding(self, finding: Finding) -> dict[str, str]:
-        word = readable(recognised(self._of.tones[finding.tone]))
+        word = readable(worded(self._of.tones[finding.tone]))
         return {"tone": finding.tone, "word": word, "text": readable(finding.text)}
 
     def _section(self, section: Section) -> dict[str, Any]:

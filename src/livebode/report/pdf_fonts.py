@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from livebode.core import OutputError
-from livebode.core.installing import needing
+from livebode.core import OutputError, needing
 from livebode.language import current_language
 
 with needing("Matplotlib", "plots", "a picture"):

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from livebode.core import Model, Responses
-from livebode.core.files import whole_file
-from livebode.report.style import Style, drawing, quiet_about_letters, style
+from livebode.core import Model, Responses, whole_file
+from livebode.report._style import Style, drawing, quiet_about_letters, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

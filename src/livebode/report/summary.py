@@ -14,10 +14,9 @@ from math import log, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Response, Responses
 from livebode.drawing import circular, decibels, near, quantiles, unwrapped
-
-Floats = NDArray[np.float64]
 
 # The probability of ±3 standard deviations of a normal variable, used for the circle around a complex response.
 PROBABILITY = 0.9973

@@ -6,9 +6,9 @@ import io
 import re
 from typing import TYPE_CHECKING
 
-from livebode.core.document import Document
+from livebode.core import Document
+from livebode.report._style import DARK, LIGHT, Style, drawing, quiet_about_letters
 from livebode.report.figures import drawn
-from livebode.report.style import DARK, LIGHT, Style, drawing, quiet_about_letters
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TextIO
 
-from livebode.core.installing import needing
-from livebode.report.style import wide_letters
+from livebode.core import needing
+from livebode.report._style import wide_letters
 
 with needing("Matplotlib", "plots", "a picture"):
     from matplotlib.backends.backend_mixed import MixedModeRenderer

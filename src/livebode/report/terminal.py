@@ -6,15 +6,13 @@ docs/decisions/0003-terminal-plot.md has the reasons for drawing it here.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Responses, counted
 from livebode.drawing import ticks
 from livebode.report import words
 from livebode.report.canvas import Canvas, Scale, written
 from livebode.report.summary import Summary, summarised
-
-Floats = NDArray[np.float64]
 
 _WIDTH_MIN, _HEIGHT_MIN = 40, 16
 
@@ -28,18 +26,19 @@ def terminal_bode(
     ----------
     width, height
         Columns and lines of the terminal; the text is never wider or higher. Below 40 × 16, and if no response is
-        valid, one sentence replaces the plot.
+        valid or all are 0, one sentence replaces the plot.
     colour
         Whether to use ANSI colours.
     unicode
         False uses only ASCII, for terminals whose encoding is not UTF-8.
     """
     summary = summarised(responses)
-    middle = f"{words.quantity(responses)}: median of {counted(summary.count, 'valid response')}"
+    middle = f"{words.quantity(responses)}: median of {counted(summary.count, 'response')} with a valid line"
     if not summary.count:
         middle = f"{words.quantity(responses)}: no valid response"
     caption = written(f"{middle}, {words.lines_phrase(responses)}", width, unicode)
-    if width < _WIDTH_MIN or height < _HEIGHT_MIN or not summary.count:
+    drawn = summary.count and all(np.isfinite(of[1]).any() for of in (summary.magnitude_db, summary.phase_deg))
+    if width < _WIDTH_MIN or height < _HEIGHT_MIN or not drawn:  # a response of 0 has neither dB nor degrees
         return caption
     picture = _picture(summary, width, height - 1, colour, unicode)
     if not unicode:

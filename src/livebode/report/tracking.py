@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Responses
 from livebode.drawing import decibels, ticks
 from livebode.language import numerals, tr
 from livebode.report import words
+from livebode.report._style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
 from livebode.report.map import draw_maps
-from livebode.report.style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
 from livebode.report.summary import BOUND_C, PROBABILITY, usable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 # More traces than this cannot be distinguished by colour and label; maps are drawn instead.
 TRACES_MAX = 10

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from livebode.language import recognised, tr
+from livebode.language import tr, worded
+from livebode.report._style import Style, drawing, heading, new_figure, plain, shortened, style
 from livebode.report.pictures import save
-from livebode.report.style import Style, drawing, heading, new_figure, plain, shortened, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,7 +79,7 @@ def _output(axes: Axes, look: Style, found: Validation, last: bool) -> None:
     axes.set_title(
         tr(
             "{model}: {verdict}, fit {percent:.1f} %",
-            model=recognised(found.model), verdict=recognised(found.verdict), percent=found.fit_percent,
+            model=worded(found.model), verdict=worded(found.verdict), percent=found.fit_percent,
         ),
         loc="left", size=10, color=look.ink,
     )  # fmt: skip

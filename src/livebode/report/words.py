@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import MatrixResponses, Response, Responses
-from livebode.core.clock import moment, moment_of_start
-from livebode.drawing.ticks import frequency_label
-from livebode.language import marked, numerals, recognised, tr, trn
-from livebode.report.style import shortened
+from livebode.core import MatrixResponses, Response, Responses, moment, moment_of_start
+from livebode.drawing import frequency_label
+from livebode.language import Message, numerals, tr, trn, worded
+from livebode.report._style import shortened
 
-_SYMBOL = {
-    marked("plant"): "G",
-    marked("open loop"): "L",
-    marked("closed loop"): "T",
-    marked("sensitivity"): "S",
+_SYMBOL: dict[str, str] = {
+    Message("plant"): "G",
+    Message("open loop"): "L",
+    Message("closed loop"): "T",
+    Message("sensitivity"): "S",
 }
 _READABLE_TO_S = 1e5  # ticks with more digits than this, over a short span, differ only in the last ones
 
@@ -22,7 +21,7 @@ _READABLE_TO_S = 1e5  # ticks with more digits than this, over a short span, dif
 def quantity(responses: Response | Responses) -> str:
     """The quantity with its usual letter: "plant G"."""
     letter = _SYMBOL.get(responses.quantity)
-    name = recognised(str(responses.quantity))
+    name = worded(str(responses.quantity))
     return f"{name} {letter}" if letter else name
 
 

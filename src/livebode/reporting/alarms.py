@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from livebode.core import Event
-from livebode.core.document import Finding, Tone
-from livebode.language import recognised, tr, trn
+from livebode.core import Event, Finding
+from livebode.language import recorded, tr, trn, worded
+from livebode.monitoring import result_tone
 from livebode.records import RunRecord
 from livebode.reporting.event_summary import EventSummary
 
@@ -18,14 +18,12 @@ def alarms(run: RunRecord, event_summary: EventSummary) -> tuple[Finding, ...]:
     monitoring: dict[str, Any] = run.summary.get("monitoring", {})
     if "message" not in monitoring or (run.finished and monitoring.get("baseline") is None):
         return (_so_far(run, event_summary),)
-    tone: Tone = "open"
     active = bool(monitoring.get("standing"))
-    if monitoring.get("baseline") is not None and monitoring.get("judged_s"):
-        tone = "alarm" if active else "check" if monitoring.get("changes") else "ok"
+    tone = result_tone(monitoring, active=active)
     latest = _newest(event_summary)[-_ACTIVE_MAX:] if active else []
     return (
-        Finding(tone, recognised(monitoring["message"])),
-        *(Finding("alarm", recognised(event.message)) for event in latest),
+        Finding(tone, worded(recorded(monitoring.get("words", {}), monitoring["message"]))),
+        *(Finding("alarm", worded(event.words)) for event in latest),
     )
 
 

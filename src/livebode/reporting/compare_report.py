@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite
@@ -12,23 +13,26 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.averaged import Averaged
-from livebode.analysis.changes import Changes, QuantityChange, changes, percent
-from livebode.analysis.difference import ALPHA, Compared, Difference, compare
-from livebode.configuration.recorded import recorded_configuration, recorded_report
-from livebode.configuration.report_section import ReportSection
-from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, PrintedTable, Section
-from livebode.language import marked, number, recognised, tr, trn
-from livebode.records import RunRecord
-from livebode.records.grouped_events import event_counts
+from livebode.analysis import ALPHA, Averaged, Changes, Compared, Difference, QuantityChange, changes, compare, percent
+from livebode.configuration import ReportSection, recorded_configuration, recorded_report
+from livebode.core import TONES, Document, Finding, Paragraph, Part, Picture, PrintedTable, Section
+from livebode.estimates import kind_of, rule
+from livebode.language import Message, number, recorded, tr, trn, worded
+from livebode.records import RunRecord, event_counts, read_summary
 from livebode.reporting import first_page
 from livebode.reporting.comparison_verdict import detectable, verdict
 from livebode.reporting.limits import limits
 from livebode.reporting.report_data import entry_title, read, written
-from livebode.reporting.wording import BOUND_95, decibels, pairs, polar, signed, with_bound
+from livebode.reporting.wording import BOUND_95, decibels, pairs, polar, polar_phrase, signed, with_bound
 
-TONES_OF_A_COMPARISON = {**TONES, "ok": marked("no difference shown")}
+TONES_OF_A_COMPARISON = {**TONES, "ok": Message("no difference shown")}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40
+
+
+def comparison_of(before: Path, after: Path) -> Any:
+    """What compares two runs: a class such as `Comparison`. RecordError if one is not a run."""
+    first, second = (kind_of(read_summary(path)[0]) for path in (before, after))
+    return (first == second and rule(first, "compare")) or Comparison
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,19 @@ class Comparison:
         return cls(found, changes(found))
 
     @property
+    def later(self) -> RunRecord:
+        """The run after the change."""
+        return self.found.runs[1]
+
+    @property
+    def printed(self) -> Iterator[str]:
+        """Verdict and tables for the terminal, and why there are no parameters."""
+        yield from (finding.text for finding in self.sentences)
+        yield from (f"\n{table}" for table in self.tables)
+        if not self.changes.parameters:
+            yield self.changes.parameter_words
+
+    @property
     def sentences(self) -> tuple[Finding, ...]:
         """The verdict, the most urgent finding first."""
         return verdict(self.found, self.changes)
@@ -62,10 +79,8 @@ class Comparison:
         """Tables for the terminal: ratio at each line, changes of parameters and margins."""
         d = self.found.overall
         rows = [
-            f"{f:>10g} Hz {signed(db):>9} ± {around:<8} dB {signed(deg):>9} ± {turned:<8} °{'  differs' * bool(on)}"
-            for f, (db, around, deg, turned), on in zip(
-                d.before.lines.frequency_hz, map(polar, d.ratio.tolist(), d.bound.tolist()), d.differs
-            )
+            f"{f:>10g} Hz {_ratio_columns(ratio, bound)}{'  differs' * bool(on)}"
+            for f, ratio, bound, on in zip(d.before.lines.frequency_hz, d.ratio.tolist(), d.bound.tolist(), d.differs)
         ]
         more = len(rows) - _LINES_SHOWN
         lines = "\n".join(rows[:_LINES_SHOWN] + [f"and {more} more lines; --json prints all"] * (more > 0))
@@ -140,7 +155,7 @@ class Comparison:
         absent = (
             (self.changes.parameter_words, self.changes.parameters), (self.changes.margin_words, self.changes.margins),
         )  # fmt: skip
-        parts = tuple(Paragraph(recognised(words)) for words, table in absent if words and not table)
+        parts = tuple(Paragraph(worded(words)) for words, table in absent if words and not table)
         paths = pairs([(tr("before"), self.found.runs[0].place), (tr("after"), self.found.runs[1].place)])
         found = (Section(tr("Details of the measurement"), (paths,)), _settings(*self.found.runs))
         return (*found, Section(tr("Not in this report"), parts)) if parts else found
@@ -247,7 +262,7 @@ class Comparison:
             (self.changes.margin_words, self.changes.margins),
         ):
             if table:
-                parts += [Paragraph(recognised(words))] if words else []
+                parts += [Paragraph(worded(words))] if words else []
                 headings = (
                     "", tr("before"), "±", tr("after"), "±", tr("unit"), tr("change"), "±", tr("in %"),
                     tr("detectable %"), tr("significant"),
@@ -263,14 +278,24 @@ class Comparison:
         """Events of both runs."""
         counts = [sum(map(event_counts, run.each_event_and_damage()), Counter[str]()) for run in self.found.runs]
         kinds = sorted(counts[0].keys() | counts[1].keys())
-        rows = tuple((recognised(kind), *(number(count[kind], ",") for count in counts)) for kind in kinds)
+        rows = tuple((worded(kind), *(number(count[kind], ",") for count in counts)) for kind in kinds)
         parts: list[Part] = [PrintedTable((tr("kind"), tr("before"), tr("after")), rows, (1, 2))] if rows else []
         for run, when in zip(self.found.runs, (tr("Before"), tr("After"))):
             monitoring = run.summary.get("monitoring", {})
             judged = monitoring.get("baseline") is not None and "message" in monitoring
-            message = monitoring["message"] if judged else marked("changes are not assessed.")
-            parts.append(Paragraph(f"{when}: {recognised(message)}"))
+            message: str = Message("changes are not assessed.")
+            if judged:
+                message = recorded(monitoring.get("words", {}), monitoring["message"])
+            parts.append(Paragraph(f"{when}: {worded(message)}"))
         return Section(tr("Events"), tuple(parts))
+
+
+def _ratio_columns(ratio: complex, bound: float) -> str:
+    """A ratio with its bound in columns, or in words where a side of the bound is open."""
+    if not bound < abs(ratio):
+        return f"{polar_phrase(ratio, bound):<44}"
+    db, around, deg, turned = polar(ratio, bound)
+    return f"{signed(db):>9} ± {around:<8} dB {signed(deg):>9} ± {turned:<8} °"
 
 
 def _how_tested(m: int) -> str:
@@ -309,7 +334,7 @@ def _of(lines: set[tuple[str, str]], key: tuple[str, ...]) -> str:
 def _row(c: QuantityChange) -> tuple[str, ...]:
     changed = with_bound(c.amount, c.bound)
     return (
-        recognised(c.words), *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed,
+        worded(c.words), *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed,
         number(percent(c, c.amount), "+.2g"), _seen(percent(c, c.seen) / 100), tr("yes") if c.significant else tr("no"),
     )  # fmt: skip
 

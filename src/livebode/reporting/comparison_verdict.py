@@ -8,13 +8,12 @@ from math import isfinite, log10
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.analysis.changes import Changes, QuantityChange, percent
-from livebode.analysis.difference import Compared, ComparedPlace, Difference
-from livebode.core.document import Finding, Tone
-from livebode.language import listed, number, recognised, tr, trn
+from livebode.analysis import Changes, Compared, ComparedPlace, Difference, QuantityChange, percent
+from livebode.core import Finding, Tone
+from livebode.language import listed, number, tr, trn, worded
 from livebode.reporting.alarms import alarms
 from livebode.reporting.event_summary import EventSummary
-from livebode.reporting.wording import polar, signed
+from livebode.reporting.wording import polar_phrase
 
 _URGENT: tuple[Tone, ...] = ("alarm", "differs", "check", "open", "ok")
 
@@ -23,7 +22,7 @@ def verdict(found: Compared, changes: Changes) -> tuple[Finding, ...]:
     """The findings, the most urgent first."""
     findings = [
         *_alarms(found),
-        *(Finding("check", recognised(text)) for text in found.warnings),
+        *(Finding("check", worded(text)) for text in found.warnings),
         _overall(found.overall),
         *_by_place(found.places),
         *_parameters(changes.parameters),
@@ -50,15 +49,12 @@ def _overall(d: Difference) -> Finding:
         text = tr("No line differs by more than chance ({m} tested together; {seen}).", m=d.m, seen=_seen([d]))
         return Finding("ok", text)
     f, worst = d.before.lines.frequency_hz, int(np.nanargmin(d.p))
-    db, around, deg, turned = polar(complex(d.ratio[worst]), float(d.bound[worst]))
     words = trn(
         "{n:,} line of {m} differs: {lines}.", "{n:,} lines of {m} differ: {lines}.", int(d.differs.sum()),
         m=d.m, lines=_hz(f[d.differs]),
     )  # fmt: skip
-    words += " " + tr(
-        "Most certain at {at:g} Hz: {db} ± {around} dB, {deg} ± {turned}°.",
-        at=f[worst], db=signed(db), around=around, deg=signed(deg), turned=turned,
-    )  # fmt: skip
+    ratio = polar_phrase(complex(d.ratio[worst]), float(d.bound[worst]))
+    words += " " + tr("Most certain at {at:g} Hz: {ratio}.", at=f[worst], ratio=ratio)
     return Finding("differs", f"{words} {_ignored(d)}" if d.ignored.any() else words)
 
 
@@ -152,13 +148,11 @@ def _changed(table: tuple[QuantityChange, ...]) -> tuple[int, str]:
     moved = [c for c in table if c.significant]
     if moved:
         return len(moved), "; ".join(
-            f"{recognised(c.words)} {number(percent(c, c.amount), '+.2g')} % ± {number(percent(c, c.bound), '.2g')} %"
+            f"{worded(c.words)} {number(percent(c, c.amount), '+.2g')} % ± {number(percent(c, c.bound), '.2g')} %"
             for c in moved[:6]
         )
     return 0, "; ".join(
-        f"{recognised(c.words)} ≥ {number(percent(c, c.seen), '.2g')} %"
-        for c in table[:6]
-        if isfinite(percent(c, c.seen))
+        f"{worded(c.words)} ≥ {number(percent(c, c.seen), '.2g')} %" for c in table[:6] if isfinite(percent(c, c.seen))
     )
 
 

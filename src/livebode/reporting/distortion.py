@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from livebode.core.document import Paragraph, Part, PrintedTable, Section
-from livebode.language import marked, number, recognised, tr
+from livebode.core import Paragraph, Part, PrintedTable, Section
+from livebode.language import Message, number, tr, worded
 from livebode.reporting.report_data import ReportData
 
-_KINDS = {"even": marked("even"), "odd": marked("odd")}
+_KINDS = {"even": Message("even"), "odd": Message("odd")}
 _LINES_SHOWN = 60
 
 
@@ -61,7 +61,7 @@ def _levels(levels: dict[str, Any]) -> list[Part]:
         "these detection lines, relative to the output at a line; mean over {periods} periods.",
         periods=levels["periods"],
     )
-    rows = tuple(_row(recognised(word), levels.get(kind)) for kind, word in _KINDS.items())
+    rows = tuple(_row(worded(word), levels.get(kind)) for kind, word in _KINDS.items())
     headings = (tr("distortion"), "dB", tr("95 % bounds, dB"), tr("noise, dB"), tr("detection lines"))
     return [Paragraph(words), PrintedTable(headings, rows, (1, 2, 3, 4))]
 

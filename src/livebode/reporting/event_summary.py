@@ -6,13 +6,15 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from livebode.core import Event
-from livebode.core.clock import moment
-from livebode.core.document import Paragraph, Part, PrintedTable
-from livebode.language import number, recognised, tr, trn
-from livebode.records.grouped_events import each_event, event_counts
+from livebode.core import Event, Paragraph, Part, PrintedTable, moment
+from livebode.language import number, tr, trn, worded
+from livebode.monitoring import UNMONITORED
+from livebode.records import each_event, event_counts
 
-ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
+ALARMS = (
+    "change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful", *UNMONITORED,
+    "places-not-monitored",
+)  # fmt: skip
 """Kinds that are listed individually; so are the events of the record itself."""
 _IN_FULL = 20  # of the first and of the newest events, each
 
@@ -73,8 +75,8 @@ class EventSummary:
             return (Paragraph(tr("The run has no events.")),)
         rows = tuple(
             (
-                recognised(name), number(k.count, ","), moment(k.first.time_s, 2), moment(k.newest.time_s, 2),
-                recognised(k.newest.message),
+                worded(name), number(k.count, ","), moment(k.first.time_s, 2), moment(k.newest.time_s, 2),
+                worded(k.newest.words),
             )
             for name, k in self.kinds.items()
         )  # fmt: skip
@@ -87,7 +89,7 @@ class EventSummary:
             "{n:,} events between them not shown; events.jsonl contains all.",
             self.left_out,
         )
-        in_full = tuple((moment(e.time_s, 2), recognised(e.kind), recognised(e.message)) for e in self.in_full)
+        in_full = tuple((moment(e.time_s, 2), worded(e.kind), worded(e.words)) for e in self.in_full)
         return grouped, PrintedTable(
             (tr("time"), tr("kind"), tr("message")), in_full, note=note if self.left_out else ""
         )

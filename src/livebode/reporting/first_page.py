@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
-from livebode.analysis.acceptance import Accepted
-from livebode.configuration.report_section import ReportSection
-from livebode.core.clock import date_and_time
-from livebode.core.document import Finding, Logo, Tone
+from livebode.analysis import Accepted
+from livebode.configuration import ReportSection
+from livebode.core import Finding, Logo, Tone, date_and_time
 from livebode.language import tr
 from livebode.records import RunRecord
 from livebode.reporting.limits import about_limits

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import ceil, isfinite, isinf
 
-from livebode.analysis.acceptance import Accepted
-from livebode.configuration.report_section import MAGNITUDES, LimitSection
-from livebode.core.document import TONES, Finding, Paragraph, PrintedTable, Section
-from livebode.language import marked, number, recognised, tr, trn
+from livebode.analysis import Accepted
+from livebode.configuration import MAGNITUDES, LimitSection
+from livebode.core import TONES, Finding, Paragraph, PrintedTable, Section
+from livebode.language import Message, number, tr, trn, worded
 from livebode.reporting.wording import with_bound
 
 _WORDS = {
-    "resonance_hz": marked("resonance"), "resonance_damping": marked("resonance damping"),
-    "antiresonance_hz": marked("antiresonance"), "antiresonance_damping": marked("antiresonance damping"),
-    "stiffness": marked("stiffness"), "inertia": marked("inertia"), "load_mass": marked("load mass"),
-    "damping": marked("damping"), "delay_s": marked("delay"), "gain_margin_db": marked("gain may rise by"),
-    "gain_reduction_db": marked("gain may fall by"), "phase_margin_deg": marked("phase margin"),
-    "delay_margin_ms": marked("delay margin"), "max_sensitivity": marked("peak sensitivity Ms"),
-    "bandwidth_hz": marked("bandwidth"),
+    "resonance_hz": Message("resonance"), "resonance_damping": Message("resonance damping"),
+    "antiresonance_hz": Message("antiresonance"), "antiresonance_damping": Message("antiresonance damping"),
+    "stiffness": Message("stiffness"), "inertia": Message("inertia"), "load_mass": Message("load mass"),
+    "damping": Message("damping"), "delay_s": Message("delay"), "gain_margin_db": Message("gain may rise by"),
+    "gain_reduction_db": Message("gain may fall by"), "phase_margin_deg": Message("phase margin"),
+    "delay_margin_ms": Message("delay margin"), "max_sensitivity": Message("peak sensitivity Ms"),
+    "bandwidth_hz": Message("bandwidth"),
 }  # fmt: skip
 
 
@@ -66,15 +66,15 @@ def limits(found: Sequence[Accepted]) -> Section | None:
 
 def _name(limit: LimitSection) -> str:
     if limit.quantity in MAGNITUDES:
-        words = f"{limit.quantity} ({recognised(MAGNITUDES[limit.quantity])})"
+        words = f"{limit.quantity} ({worded(MAGNITUDES[limit.quantity])})"
         if limit.band_hz is None:
             return words
         low, high = (number(f, "g") for f in limit.band_hz)
         return tr("{quantity}, {low} … {high} Hz", quantity=words, low=low, high=high)
     if limit.quantity in _WORDS:
-        return recognised(_WORDS[limit.quantity])
+        return worded(_WORDS[limit.quantity])
     pole, which, kind = limit.quantity.split("_")
-    return f"{recognised(_WORDS[f'{pole}_{kind}'])} {which}"
+    return f"{worded(_WORDS[f'{pole}_{kind}'])} {which}"
 
 
 def _range(limit: LimitSection) -> str:
@@ -88,16 +88,16 @@ def _value(a: Accepted) -> tuple[str, str, str]:
         return "—", "—", ""
     unit = a.unit if not isfinite(a.at_hz) else tr("{unit}, at {at:g} Hz", unit=a.unit, at=a.at_hz)
     if isinf(a.value):
-        return tr("any amount"), "", recognised(unit)
+        return tr("any amount"), "", worded(unit)
     if isinf(a.bound):
-        return number(a.value, ".4g"), tr("unbounded"), recognised(unit)
-    return *with_bound(a.value, a.bound), recognised(unit)
+        return number(a.value, ".4g"), tr("unbounded"), worded(unit)
+    return *with_bound(a.value, a.bound), worded(unit)
 
 
 def _result(a: Accepted) -> str:
-    word = recognised(TONES[a.result])
+    word = worded(TONES[a.result])
     if a.reason:
-        return tr("{result}: {why}", result=word, why=recognised(a.reason))
+        return tr("{result}: {why}", result=word, why=worded(a.reason))
     if a.result != "undecided":
         return word
     if isinf(a.times):
@@ -110,6 +110,6 @@ def _short(a: Accepted) -> str:
     """Quantity, limit and measured value in a sentence."""
     head = f"{_name(a.limit)} {_range(a.limit)}"
     if a.reason:
-        return f"{head} ({recognised(a.reason)})"
+        return f"{head} ({worded(a.reason)})"
     value, bound, unit = _value(a)
     return f"{head} ({value} ± {bound} {unit})" if bound else f"{head} ({value} {unit})"

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from livebode.core import ConfigError
-from livebode.core.document import Logo
+from livebode.core import ConfigError, Logo
 
 BYTES_MAX = 1 << 20
 _PIXELS_MAX = 4000

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from livebode.configuration.report_section import ReportSection
-from livebode.core import FitError, GridError, MatrixResponses
-from livebode.core.document import Document, Finding, Section, Tone
-from livebode.language import recognised, tr
+from livebode.configuration import ReportSection
+from livebode.core import Document, Finding, FitError, GridError, MatrixResponses, Section, Tone
+from livebode.language import tr, worded
 from livebode.mimo import compare_gantries, compare_matrices
 from livebode.records import RunRecord
 from livebode.reporting import first_page
@@ -35,14 +34,14 @@ class MatrixComparison:
     @classmethod
     def of(
         cls,
-        before: RunRecord,
-        after: RunRecord,
+        first: Path,
+        second: Path,
         *,
         ignore_below: float = 0.0,
         gantry: Gantry | None = None,
         cart_m: tuple[float, float] | None = None,
     ) -> MatrixComparison:
-        """Read and compare two matrix runs; `gantry` and `cart_m` as in `compare_gantries`.
+        """Read and compare the matrix runs in two directories; `gantry` and `cart_m` as in `compare_gantries`.
 
         Raises
         ------
@@ -51,6 +50,7 @@ class MatrixComparison:
         SignalError
             If an entry has no valid response.
         """
+        before, after = (RunRecord.open(path, matrix=True) for path in (first, second))
         common = [name for name in before.entries if name in after.entries]
         if not common:
             raise GridError(
@@ -69,6 +69,17 @@ class MatrixComparison:
             },
             _whole(before.matrix(), after.matrix(), gantry, cart_m),
         )
+
+    @property
+    def later(self) -> RunRecord:
+        """The run after the change."""
+        return next(iter(self.entries.values())).later
+
+    @property
+    def printed(self) -> Iterator[str]:
+        """Verdicts and tables for the terminal."""
+        yield from self.sentences
+        yield from (f"\n{table}" for table in self.tables)
 
     @property
     def sentences(self) -> list[str]:
@@ -104,7 +115,7 @@ class MatrixComparison:
         title = header.machine or runs
         findings = [Finding(f.tone, f"{_arrow(name)}: {f.text}") for name, one in named for f in one.sentences]
         tone: Tone = "differs" if first.found.overall.differs.any() else "ok"
-        findings = [*(Finding(tone, f"{recognised(sentence)}.") for sentence in self.whole), *findings]
+        findings = [*(Finding(tone, f"{worded(sentence)}.") for sentence in self.whole), *findings]
         return Document(
             kind=tr("Before and after"),
             title=title,
@@ -155,9 +166,3 @@ def _whole(
         if gantry is not None:
             raise
         return (f"all entries: not compared together: {error}",)
-
-
-def both_matrices(before: Path, after: Path) -> tuple[RunRecord, RunRecord] | None:
-    """Two matrix runs; None if one of them is another run."""
-    runs = RunRecord.open(before, matrix=True), RunRecord.open(after, matrix=True)
-    return runs if all(run.is_matrix for run in runs) else None

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.configuration.recorded import recorded_configuration, recorded_report
-from livebode.configuration.report_section import ReportSection
+from livebode.configuration import ReportSection, recorded_configuration, recorded_report
 from livebode.core import MatrixResponses, SignalError
 from livebode.records import RunRecord
 from livebode.reporting.event_summary import EventSummary

@@ -3,34 +3,41 @@
 from __future__ import annotations
 
 from datetime import datetime
+from pathlib import Path
 
-from livebode.core.document import Document, Paragraph, Section
+from livebode.analysis import Accepted
+from livebode.configuration import ReportSection
+from livebode.core import Document, Paragraph, Section
 from livebode.language import tr
 from livebode.reporting import first_page, matrix_sections, sections
-from livebode.reporting.matrix_data import MatrixReportData
+from livebode.reporting.matrix_data import read_matrix
+from livebode.reporting.report_data import Judged
 from livebode.reporting.run_report import facts, not_judged, record_appendix
 from livebode.reporting.verdict import about_record, by_urgency
 
 
-def matrix_report(of: MatrixReportData, *, made: datetime, appendix: bool = False) -> Document:
-    """Build the report of a matrix run that was read: the matrix of Bode plots, singular values, and its entries.
+def matrix_report(
+    directory: Path,
+    judged: Judged | None = None,  # noqa: ARG001 - a matrix has no model
+    *,
+    made: datetime,
+    header: ReportSection | None = None,
+    appendix: bool = False,
+    entry: str | None = None,  # noqa: ARG001 - the report of an entry is that of a response
+) -> tuple[Document, tuple[Accepted, ...]]:
+    """Build the report of a matrix run: the matrix of Bode plots, singular values, and its entries.
 
-    Models, margins and limits belong to one response, so they are in the report of an entry.
-
-    Parameters
-    ----------
-    of
-        From `read_matrix`.
-    made
-        Time of the report, for the title block.
-    appendix
-        Add the raw configuration and the versions.
+    Models, margins and limits belong to one response, so they are in the report of an entry. Arguments are those of
+    `accepted_report`.
 
     Raises
     ------
+    RecordError, SignalError
+        As `read_matrix`.
     ConfigError
         If the logo cannot be used.
     """
+    of = read_matrix(directory, header)
     findings = by_urgency(
         [*about_record(of), *matrix_sections.about_columns(of.newest), matrix_sections.about_responses(of)]
     )
@@ -42,7 +49,7 @@ def matrix_report(of: MatrixReportData, *, made: datetime, appendix: bool = Fals
     if of.header.limits:
         words = tr("Limits apply to one response: they are judged in the report of an entry.")
         parts.insert(0, Section(tr("Limits"), (Paragraph(words),)))
-    return Document(
+    document = Document(
         kind=tr("Measurement report"),
         title=title,
         facts=first_page.facts(of.header, of.title, facts(of), made),
@@ -58,3 +65,4 @@ def matrix_report(of: MatrixReportData, *, made: datetime, appendix: bool = Fals
         paper=of.header.paper,
         made=made,
     )
+    return document, ()

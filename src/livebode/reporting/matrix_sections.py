@@ -6,10 +6,20 @@ from math import isfinite
 
 import numpy as np
 
-from livebode.core import REASONS, MatrixResponses, Responses
-from livebode.core.clock import moment
-from livebode.core.document import Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
-from livebode.language import number, recognised, tr, trn
+from livebode.core import (
+    REASONS,
+    Finding,
+    Listing,
+    MatrixResponses,
+    Paragraph,
+    Part,
+    Picture,
+    PrintedTable,
+    Responses,
+    Section,
+    moment,
+)
+from livebode.language import number, tr, trn, worded
 from livebode.reporting.matrix_data import MatrixReportData
 from livebode.reporting.measured import about_bounds, grid_rows, matrix_in_words, signal_rows
 from livebode.reporting.wording import BOUND_95, line_table, lines_of, pairs, polar, share, with_bound
@@ -84,7 +94,7 @@ def _entry_row(one: Responses, name: str, reason: np.ndarray) -> tuple[str, ...]
     valid, f = one.valid[0], one.lines.frequency_hz
     counted = tr("{count} of {all}", count=int(valid.sum()), all=valid.size)
     if not valid.any():
-        why = ", ".join(sorted({recognised(REASONS[code]) for code in reason if code}))
+        why = ", ".join(sorted({worded(REASONS[code]) for code in reason if code}))
         return (name, one.unit, f"{counted}: {why}", "—", "—", "—", "—", "—", "—")
     size, bound = np.where(valid, np.abs(one.value[0]), np.nan), np.where(valid, one.bound(BOUND_95)[0], np.nan)
     at = int(np.nanargmax(size))
@@ -109,7 +119,7 @@ def inputs(of: MatrixReportData) -> Section:
         "it is, the more the inputs move together, and the wider are the bounds."
     )
     parts: list[Part] = [Paragraph(words)]
-    parts += [Paragraph(f"{recognised(sentence)}.") for sentence in newest.why(0)]
+    parts += [Paragraph(f"{worded(sentence)}.") for sentence in newest.why(0)]
     sizes, radius = newest.singular_values[0], newest.singular_value_bound(BOUND_95)[0]
     several = sizes.shape[1] > 1
     rows = [
@@ -128,7 +138,7 @@ def inputs(of: MatrixReportData) -> Section:
 def about_columns(newest: MatrixResponses) -> list[Finding]:
     """Findings about the validity of the newest matrix and the separation of the inputs."""
     count, size = newest.value.shape[2] * newest.value.shape[3], lines_of(len(newest.lines))
-    wrong = [Finding("check", f"{recognised(sentence)}.") for sentence in newest.why(0)]
+    wrong = [Finding("check", f"{worded(sentence)}.") for sentence in newest.why(0)]
     found = wrong or [
         Finding("ok", tr("All {count} entries of the newest matrix are valid at {lines}.", count=count, lines=size))
     ]

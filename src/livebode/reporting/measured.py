@@ -4,35 +4,34 @@ from __future__ import annotations
 
 from typing import Any
 
-from livebode.core.clock import moment
-from livebode.core.document import Paragraph, Section
-from livebode.language import listed, marked, number, recognised, tr, trn
+from livebode.core import Paragraph, Section, moment
+from livebode.language import Message, listed, number, tr, trn, worded
 from livebode.locations import location, resolved
 from livebode.reporting.report_data import ReportData, RunData, recordings
 from livebode.reporting.wording import duration, pairs
 
 _ESTIMATOR = {
-    "joint": marked("joint: S_wy/S_wu, unbiased in any linear loop"),
-    "direct": marked("direct: S_uy/S_uu, biased if y is fed back to u"),
-    "lpm": marked("lpm: local polynomial method, for an excitation that does not repeat"),
-    "welch": marked("welch: averaged Hann windows, for an excitation that does not repeat"),
-    "indirect": marked("indirect: response of the closed loop, from which the described controllers are removed"),
+    "joint": Message("joint: S_wy/S_wu, unbiased in any linear loop"),
+    "direct": Message("direct: S_uy/S_uu, biased if y is fed back to u"),
+    "lpm": Message("lpm: local polynomial method, for an excitation that does not repeat"),
+    "welch": Message("welch: averaged Hann windows, for an excitation that does not repeat"),
+    "indirect": Message("indirect: response of the closed loop, from which the described controllers are removed"),
 }
 _NOISE = {
-    "periods": marked("the scatter between windows that are whole periods apart"),
-    "auto": marked(
+    "periods": Message("the scatter between windows that are whole periods apart"),
+    "auto": Message(
         "the scatter between windows that are whole periods apart; where the schedule moves, detection lines "
         "(non-excited bins)"
     ),
-    "bins": marked("what the local polynomials do not explain at the bins around each line"),
-    "windows": marked("what the response does not explain in the averaged windows"),
-    "quiet": marked("detection lines (non-excited bins); at standstill the scatter between periods if it is larger"),
+    "bins": Message("what the local polynomials do not explain at the bins around each line"),
+    "windows": Message("what the response does not explain in the averaged windows"),
+    "quiet": Message("detection lines (non-excited bins); at standstill the scatter between periods if it is larger"),
 }
 _ROLES = {
-    "excitation": marked("excitation w"),
-    "input": marked("plant input u"),
-    "output": marked("output y"),
-    "schedule": marked("schedule"),
+    "excitation": Message("excitation w"),
+    "input": Message("plant input u"),
+    "output": Message("output y"),
+    "schedule": Message("schedule"),
 }
 
 
@@ -44,7 +43,7 @@ def how(of: ReportData) -> Section:
         *signal_rows(of),
         (tr("quantity"), _quantity(found)),
         *grid_rows(of),
-        (tr("bounds from"), recognised(_NOISE.get(noise, ""))),
+        (tr("bounds from"), worded(_NOISE.get(noise, ""))),
         (tr("options"), listed(_options(tracking, of))),
     ]
     return Section(tr("How it was measured"), (Paragraph(_in_words(of)), pairs(rows), Paragraph(about_bounds())))
@@ -63,7 +62,7 @@ def signal_rows(of: RunData) -> list[tuple[str, str]]:
     """Names and values of the signals: channels, rate, samples and responses."""
     rate_hz = of.run.found["rate_hz"]
     return [
-        *((recognised(_ROLES[role]), of.channels[role]) for role in _ROLES if role in of.channels),
+        *((worded(_ROLES[role]), of.channels[role]) for role in _ROLES if role in of.channels),
         (tr("rate"), f"{number(rate_hz, 'g')} Hz" + _rate_from(of.run.found)),
         (tr("samples"), listed((number(of.samples, ","), duration(of.samples / rate_hz)))),
         (tr("run's clock"), " … ".join(moment(at_s, 2) for at_s in of.extent.spans_s)),
@@ -86,7 +85,7 @@ def grid_rows(of: RunData) -> list[tuple[str, str]]:
             samples=found["window"], ms=1000 * window_s,
         )),
         (tr("hop"), _hop(found)),
-        (tr("estimator"), recognised(_ESTIMATOR.get(of.configuration.get("tracking", {}).get("estimator", ""), ""))),
+        (tr("estimator"), worded(_ESTIMATOR.get(of.configuration.get("tracking", {}).get("estimator", ""), ""))),
     ]  # fmt: skip
 
 
@@ -162,16 +161,16 @@ def _loop(loop: dict[str, Any]) -> list[str]:
         for name in ("velocity", "position", "position_pd")
         if name in loop
     ]
-    at = recognised(str(loop.get("excitation_at")))
+    at = worded(str(loop.get("excitation_at")))
     return [tr("excitation at the {place}", place=at), *parts] if parts else []
 
 
 def _rate_from(found: dict[str, Any]) -> str:
-    return f" ({recognised(found['rate_from'])})" if "rate_from" in found else ""
+    return f" ({worded(found['rate_from'])})" if "rate_from" in found else ""
 
 
 def _quantity(found: dict[str, Any]) -> str:
-    name, unit = recognised(found["quantity"]), found["unit"]
+    name, unit = worded(found["quantity"]), found["unit"]
     return tr("{quantity}, in {unit}", quantity=name, unit=unit) if unit else tr("{quantity}, no unit", quantity=name)
 
 

@@ -9,24 +9,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from livebode.analysis.acceptance import Accepted, LimitEvidence, accepted
-from livebode.analysis.averaged import Averaged, averaged
-from livebode.analysis.checked_loop import checked_loop
-from livebode.analysis.fits import fit_averaged
-from livebode.analysis.loop_report import LoopReport, loop_report
-from livebode.analysis.parameter_track import MARGINS, Track, tracks
-from livebode.analysis.stored_proposal import newest_proposal
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.recorded import recorded_configuration, recorded_report
-from livebode.configuration.report_section import ReportSection
-from livebode.core import LivebodeError, Responses
-from livebode.core.clock import date_and_time
+from livebode.analysis import (
+    MARGINS,
+    Accepted,
+    Averaged,
+    LimitEvidence,
+    LoopReport,
+    Track,
+    accepted,
+    averaged,
+    checked_loop,
+    fit_averaged,
+    loop_report,
+    tracks,
+)
+from livebode.configuration import FitSection, LoopSection, ReportSection, recorded_configuration, recorded_report
+from livebode.core import LivebodeError, Responses, date_and_time
 from livebode.fitting import Fit
-from livebode.language import listed, recognised, tr
+from livebode.language import listed, tr, worded
 from livebode.records import RunRecord
 from livebode.reporting.event_summary import EventSummary
-from livebode.tuning import ControllerProposal
 
 if TYPE_CHECKING:
     from livebode.validation import Validation
@@ -111,8 +113,6 @@ class ReportData(RunData):
         The model fitted to the mean and the data of the fit; or None and the reason.
     loop, loop_words
         Margins of the described loop; or None and the reason.
-    proposal, proposal_words
-        The newest proposal of `livebode tune`; or None and the reason.
     tracks
         Parameters and margins over the run, by model.
     judged
@@ -124,8 +124,6 @@ class ReportData(RunData):
     fit_words: str
     loop: LoopReport | None
     loop_words: str
-    proposal: ControllerProposal | None
-    proposal_words: str
     tracks: dict[str, Track]
     judged: Judged | None = None
 
@@ -161,7 +159,6 @@ def read(
     configuration, of = recorded_configuration(run.summary), averaged(run)
     fit, fit_words = _fit(configuration, of)
     loop, loop_words = _loop(run, configuration, of, fit)
-    proposal, proposal_words = _proposal(run)
     over = tracks(run, of.overview.sample, of.overview.time_s)
     event_summary = EventSummary.of(run.each_event_and_damage())
     own = recorded_report(run.summary) if header is None else header
@@ -176,8 +173,6 @@ def read(
         fit_words=fit_words,
         loop=loop,
         loop_words=loop_words,
-        proposal=proposal,
-        proposal_words=proposal_words,
         tracks=over,
         judged=judged,
     )
@@ -194,10 +189,10 @@ def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
     try:
         found, words = fit_averaged(of, FitSection.model_validate(configuration["fit"]))
     except LivebodeError as error:
-        return None, tr("No model was fitted: {why}.", why=recognised(str(error)))
+        return None, tr("No model was fitted: {why}.", why=worded(error.words))
     if found.status == "ok":
         return found, words
-    return None, tr("The fit to {what} was rejected: {why}.", what=recognised(words), why=recognised(found.sentence))
+    return None, tr("The fit to {what} was rejected: {why}.", what=worded(words), why=worded(found.sentence))
 
 
 def _loop(
@@ -213,16 +208,8 @@ def _loop(
         found = loop_report(fit, "the mean", of.overview, described)
         checked = checked_loop(run.path, section, run.selected)
     except LivebodeError as error:
-        return None, tr("No margins: {why}.", why=recognised(str(error)))
+        return None, tr("No margins: {why}.", why=worded(error.words))
     return replace(found, responses=Responses.of(of.response), checked=checked), ""
-
-
-def _proposal(run: RunRecord) -> tuple[ControllerProposal | None, str]:
-    try:
-        found = newest_proposal(run.path, run.entry_name)
-    except LivebodeError as error:
-        return None, tr("No controller is proposed: {why}.", why=recognised(str(error)))
-    return found, "" if found else tr("No controller was proposed. Use `livebode tune RUN` to propose one.")
 
 
 def recordings(source: dict[str, Any]) -> list[str]:

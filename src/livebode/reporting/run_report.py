@@ -5,22 +5,24 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from livebode.configuration.report_section import ReportSection
-from livebode.core.document import Document, Paragraph, Section
+from livebode.analysis import Accepted
+from livebode.configuration import ReportSection
+from livebode.core import Document, Paragraph, Section
 from livebode.language import tr
+from livebode.plugins import loaded, named
+from livebode.records import RunRecord
 from livebode.reporting import first_page, sections
 from livebode.reporting.distortion import distortion
 from livebode.reporting.limits import limits
 from livebode.reporting.measured import details, how
-from livebode.reporting.proposal_section import proposed_controller
 from livebode.reporting.report_data import Judged, ReportData, RunData, entry_title, read, recordings, written
 from livebode.reporting.verdict import verdict
 from livebode.reporting.wording import duration
 
-_SECTIONS = (
+_MEASURED = (
     how, sections.response, distortion, sections.tracking, sections.parameters, sections.motion, sections.margins,
-    proposed_controller, sections.events, sections.quality, sections.validation,
 )  # fmt: skip
+_RECORDED = sections.events, sections.quality, sections.validation
 _APPENDIX = (details, sections.source_state, sections.settings, sections.versions)
 
 
@@ -56,12 +58,26 @@ def run_report(
     ConfigError
         If the logo cannot be used.
     """
-    return report_of(read(directory, judged, header), made=made, appendix=appendix)
+    return accepted_report(directory, judged, made=made, header=header, appendix=appendix)[0]
+
+
+def accepted_report(
+    directory: Path,
+    judged: Judged | None = None,
+    *,
+    made: datetime,
+    header: ReportSection | None = None,
+    appendix: bool = False,
+    entry: str | None = None,
+) -> tuple[Document, tuple[Accepted, ...]]:
+    """The report of a run, or of an entry of a matrix run, as `run_report`; and the results of the limits."""
+    of = read(directory, judged, header, entry)
+    return report_of(of, made=made, appendix=appendix), of.accepted
 
 
 def report_of(of: ReportData, *, made: datetime, appendix: bool = False) -> Document:
     """The report of a run that was read; see `run_report`."""
-    found = [make(of) for make in _SECTIONS]
+    found = [*(make(of) for make in _MEASURED), *_analyses(of.run), *(make(of) for make in _RECORDED)]
     absent = tuple(Paragraph(reason) for reason in found if isinstance(reason, str))
     there = [limits(of.accepted), *(section for section in found if isinstance(section, Section))]
     findings, title = verdict(of), " · ".join(filter(None, (of.header.machine or of.title, of.entry)))
@@ -81,6 +97,12 @@ def report_of(of: ReportData, *, made: datetime, appendix: bool = False) -> Docu
         paper=of.header.paper,
         made=made,
     )
+
+
+def _analyses(run: RunRecord) -> list[Section | str]:
+    """The sections of analyses that plug-ins add."""
+    makers = [row.section for row in named("analyses").values() if row.section]
+    return [loaded(maker)(run.path, run.entry_name) for maker in makers]
 
 
 def not_judged(of: RunData) -> str:

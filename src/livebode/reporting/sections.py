@@ -7,13 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.loop_report import LoopReport
-from livebode.analysis.parameter_track import MARGINS, Track
-from livebode.core.clock import moment
-from livebode.core.document import Listing, Paragraph, Part, Picture, PrintedTable, Section
+from livebode.analysis import MARGINS, LoopReport, Track
+from livebode.core import Listing, Paragraph, Part, Picture, PrintedTable, Section, moment
 from livebode.fitting import Fit
-from livebode.language import listed, marked, number, recognised, tr
-from livebode.margins.margins import WORDS
+from livebode.language import Message, listed, number, tr, worded
+from livebode.margins import WORDS
 from livebode.reporting.alarms import alarms
 from livebode.reporting.report_data import ReportData, RunData, by_schedule
 from livebode.reporting.wording import (
@@ -37,10 +35,10 @@ def average(of: ReportData) -> Picture:
     names = (of.channels["input"], of.channels["output"]) if {"input", "output"} <= of.channels.keys() else None
     caption = tr(
         "Bars: {what}, with 95 % bounds. Light: range of 5–95 % of the single responses{thinned}.",
-        what=recognised(of.of.words), thinned=_drawn(of, len(of.of.overview)),
+        what=worded(of.of.words), thinned=_drawn(of, len(of.of.overview)),
     )  # fmt: skip
     if of.fit:
-        caption += tr(" Dashed: the {model} model fitted to it.", model=recognised(of.fit.model.name))
+        caption += tr(" Dashed: the {model} model fitted to it.", model=worded(of.fit.model.name))
     return Picture("bode", {"responses": of.of.overview, "mean": one, "names": names, "fitted": of.fit}, caption)
 
 
@@ -88,11 +86,11 @@ def parameters(of: ReportData) -> Section | str:
         mean = with_bound(*fitted[name]) if name in fitted else (tr("fixed") if now and not now.sigma else "—", "")
         late = with_bound(now.value, 1.96 * now.sigma) if now else ("—", "")
         rows.append(
-            (recognised(name.replace("_", " ")), *mean, *late, recognised(units.get(name) or (now.unit if now else "")))
+            (worded(name.replace("_", " ")), *mean, *late, worded(units.get(name) or (now.unit if now else "")))
         )
     note = tr("± covers 95 % if the model is complete.")
     if of.fit:
-        note = tr("Of the mean: {bounds}.", bounds=recognised(of.fit.about_bounds))
+        note = tr("Of the mean: {bounds}.", bounds=worded(of.fit.about_bounds))
     at = next((n.time_s for n in newest.values()), float("nan"))
     late_at = tr("newest, at {time}", time=moment(at, 2)) if newest else tr("newest")
     headings = ("", tr("of the mean"), "±", late_at, "±", tr("unit"))
@@ -105,7 +103,7 @@ def parameters(of: ReportData) -> Section | str:
 def _fitted(fit: Fit, what: str) -> str:
     low, high = fit.band_hz
     values = {
-        "model": recognised(fit.model.name), "what": recognised(what), "lines": lines_of(fit.lines), "low": low,
+        "model": worded(fit.model.name), "what": worded(what), "lines": lines_of(fit.lines), "low": low,
         "high": high, "percent": 100 * fit.epsilon, "chi2": fit.chi2,
     }  # fmt: skip
     if isfinite(fit.chi2):
@@ -141,7 +139,7 @@ def margins(of: ReportData) -> Section | str:
     if of.loop is None:
         return of.loop_words
     if of.loop.message:
-        return tr("No margins: {why}.", why=recognised(of.loop.message))
+        return tr("No margins: {why}.", why=worded(of.loop.message))
     found = of.loop.margins
     bound = found.bound()[0]
     rows = []
@@ -149,11 +147,11 @@ def margins(of: ReportData) -> Section | str:
         value, at = found.value[0, i], found.frequency_hz[0, i]
         if isnan(at):
             size = tr("any amount") if isinf(value) else tr("none")
-            rows.append((recognised(WORDS[name]), size, "", recognised(unit), "", tr("no crossing")))
+            rows.append((worded(WORDS[name]), size, "", worded(unit), "", tr("no crossing")))
             continue
         between = found.place[0, i] == "interpolated"
         mark = tr("between the lines") if between else tr("EXTRAPOLATED: no line checks it")
-        rows.append((recognised(WORDS[name]), *with_bound(value, bound[i]), recognised(unit), number(at, ".4g"), mark))
+        rows.append((worded(WORDS[name]), *with_bound(value, bound[i]), worded(unit), number(at, ".4g"), mark))
     headings = (tr("margin"), tr("value"), "±", tr("unit"), tr("at Hz"), tr("range"))
     table = PrintedTable(headings, tuple(rows), (1, 2, 4), _about_margins(of.loop, of.fit))
     caption = tr(
@@ -167,12 +165,12 @@ def margins(of: ReportData) -> Section | str:
 
 def _about_margins(loop: LoopReport, fit: Fit | None) -> str:
     size, around, at_hz = loop.at_lines
-    about = "" if fit is None else tr("Of the fit: {bounds}. ", bounds=recognised(fit.about_bounds))
+    about = "" if fit is None else tr("Of the fit: {bounds}. ", bounds=worded(fit.about_bounds))
     return about + tr(
         "From the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} (at {at:g} Hz). Tuning "
         "{verdict}: {sentence}",
-        size=size, around=around, at=at_hz, verdict=recognised(loop.tuning.verdict),
-        sentence=recognised(loop.tuning.sentence),
+        size=size, around=around, at=at_hz, verdict=worded(loop.tuning.verdict),
+        sentence=worded(loop.tuning.sentence),
     ) + " " + _about_description(loop)  # fmt: skip
 
 
@@ -198,7 +196,7 @@ def events(of: RunData) -> Section:
         named = f"{name} ({version})" if version else str(name)
         words += " " + tr(
             "Baseline {baseline}, judged by {judge}; mean time between false alarms: {days} days of motion or more.",
-            baseline=named, judge=recognised(str(monitoring.get("judged_by", "—"))),
+            baseline=named, judge=worded(str(monitoring.get("judged_by", "—"))),
             days=monitoring.get("false_alarm_interval_days", "—"),
         )  # fmt: skip
         if covariates := monitoring.get("covariates"):
@@ -211,11 +209,7 @@ def quality(of: RunData) -> Section:
     counts, extent = of.run.summary.get("counts", {}), of.extent
     rows = [
         (tr("samples"), number(of.samples, ",")),
-        *(
-            (recognised(words), number(counts[key], ","))
-            for key, words in _COUNTS.items()
-            if counts.get(key) is not None
-        ),
+        *((worded(words), number(counts[key], ",")) for key, words in _COUNTS.items() if counts.get(key) is not None),
         (tr("responses"), number(extent.count, ",")),
         (tr("with an invalid line"), f"{number(extent.incomplete, ',')} ({share(extent.incomplete, extent.count)})"),
     ]
@@ -230,7 +224,7 @@ def source_state(of: RunData) -> Section | None:
     """The state of the source at the end, and the speed; None if neither was recorded."""
     parts: list[Part] = []
     if source := of.run.summary.get("source"):
-        parts.append(pairs([(recognised(_SOURCE.get(key, key)), _plain(value)) for key, value in source.items()]))
+        parts.append(pairs([(worded(_SOURCE.get(key, key)), _plain(value)) for key, value in source.items()]))
     if (speed := of.run.summary.get("speed")) is not None:
         words = tr(
             "{recorded:.4g} s of signals were tracked in {run:.3g} s ({times:.3g} times real time).",
@@ -241,14 +235,15 @@ def source_state(of: RunData) -> Section | None:
 
 
 _COUNTS = {
-    "gaps": marked("gaps"), "missing": marked("missing samples"), "non-finite": marked("samples that are not finite"),
-    "implausible": marked("implausibly large samples"), "spike": marked("spikes"),
+    "gaps": Message("gaps"), "missing": Message("missing samples"),
+    "non-finite": Message("samples that are not finite"),
+    "implausible": Message("implausibly large samples"), "spike": Message("spikes"),
 }  # fmt: skip
 _SOURCE = {
-    "connected": marked("connected at the end"), "lost": marked("lost samples"), "silent_s": marked("silent, s"),
-    "measured_hz": marked("rate of arrival, Hz"), "clock_offset_s": marked("sender's clock at sample 0"),
-    "latency_s": marked("latency, s"), "waiting_bytes": marked("bytes waiting"), "waiting_s": marked("backlog, s"),
-    "first_sample": marked("first sample"), "counts": marked("events"),
+    "connected": Message("connected at the end"), "lost": Message("lost samples"), "silent_s": Message("silent, s"),
+    "measured_hz": Message("rate of arrival, Hz"), "clock_offset_s": Message("sender's clock at sample 0"),
+    "latency_s": Message("latency, s"), "waiting_bytes": Message("bytes waiting"), "waiting_s": Message("backlog, s"),
+    "first_sample": Message("first sample"), "counts": Message("events"),
 }  # fmt: skip
 
 
@@ -256,22 +251,22 @@ def validation(of: ReportData) -> Section | str:
     """Validation of the model on independent data, or why there is none."""
     if of.judged is None:
         return tr("No validation: the model was not tested on independent data. Use `livebode report RUN --on LOG`.")
-    parts: list[Part] = [Paragraph(f"{recognised(v.sentence)}.") for v in of.judged.found]
+    parts: list[Part] = [Paragraph(f"{worded(v.sentence)}.") for v in of.judged.found]
     rows = tuple(
         (
-            recognised(v.model), c.name, f"{number(100 * c.share, '.0f')} %", number(c.largest, ".3g"),
+            worded(v.model), c.name, f"{number(100 * c.share, '.0f')} %", number(c.largest, ".3g"),
             number(c.p, ".2g"), tr("yes") if c.name in v.judged_by else tr("no"),
         )
         for v in of.judged.found
         for c in v.correlations
     )  # fmt: skip
     headings = (tr("model"), tr("ε with"), tr("lags inside"), tr("largest"), tr("joint p"), tr("counts"))
-    parts.append(PrintedTable(headings, rows, (2, 3, 4), " ".join(f"{recognised(n)}." for n in of.judged.notes)))
+    parts.append(PrintedTable(headings, rows, (2, 3, 4), " ".join(f"{worded(n)}." for n in of.judged.notes)))
     caption = tr(
         "On {recording}: measured and simulated output, and the residual's correlations with their limits.",
         recording=of.judged.on,
     )
-    parts.append(Picture("validation", {"found": of.judged.found}, caption))
+    parts.append(Picture("validation", {"found": of.judged.found, "folded": True}, caption))
     return Section(tr("Validation"), tuple(parts))
 
 
@@ -314,7 +309,7 @@ def _re(of: ReportData) -> str:
 
 def _plain(value: Any) -> str:
     if isinstance(value, dict):
-        return listed(f"{recognised(name)} {_plain(count)}" for name, count in value.items() if count) or tr("none")
+        return listed(f"{worded(name)} {_plain(count)}" for name, count in value.items() if count) or tr("none")
     if value is None:
         return ""
     if isinstance(value, bool):

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import isfinite
 
-from livebode.analysis.parameter_track import MARGINS, failed
-from livebode.core.document import Finding, Tone
-from livebode.language import listed, number, recognised, tr, trn
+from livebode.analysis import MARGINS, failed
+from livebode.core import Finding, Tone
+from livebode.language import listed, number, tr, trn, worded
 from livebode.margins import worst
-from livebode.records.run import RunRecord
+from livebode.records import RunRecord
 from livebode.reporting.alarms import alarms
 from livebode.reporting.report_data import ReportData, RunData
 from livebode.reporting.wording import lines_of, share
@@ -50,7 +50,7 @@ def _record(of: RunData) -> list[Finding]:
             )
         )
     found += [
-        Finding("check", tr("The signals are doubtful: {why}.", why=recognised(event.message)))
+        Finding("check", tr("The signals are doubtful: {why}.", why=worded(event.words)))
         for event in of.event_summary.in_full
         if event.kind == "doubtful"
     ]
@@ -129,7 +129,7 @@ def _fits(of: ReportData) -> list[Finding]:
     if of.fit is None:
         return [Finding("check", of.fit_words)] if "fit" in of.configuration else []
     rough = of.fit.epsilon > _EPSILON_LARGE
-    values = {"model": recognised(of.fit.model.name), "percent": 100 * of.fit.epsilon}
+    values = {"model": worded(of.fit.model.name), "percent": 100 * of.fit.epsilon}
     text = tr("The {model} model, fitted to the run's mean: model error ε = {percent:.2g} % of |G|.", **values)
     if rough and of.of.moved:
         text = tr(
@@ -141,7 +141,7 @@ def _fits(of: ReportData) -> list[Finding]:
     for track in of.tracks.values():
         if track.model != MARGINS and (why := failed(track)):
             every, not_ok = sum(track.statuses.values()), sum(why.values())
-            reasons = listed(f"{number(count, ',')} {recognised(word)}" for word, count in why.items())
+            reasons = listed(f"{number(count, ',')} {worded(word)}" for word, count in why.items())
             tone: Tone = "check" if not_ok > _INVALID_MANY * every else "ok"
             text = trn(
                 "Of {n:,} fit over the run, {rejected:,} were rejected: {reasons}.",
@@ -157,7 +157,7 @@ def _margins(of: ReportData) -> list[Finding]:
         return [Finding("open", of.loop_words)] if of.described else []
     least = worst(of.loop.places)
     if not least:
-        return [Finding("check", tr("No margins: {why}.", why=recognised(str(of.loop.margins.status[0]))))]
+        return [Finding("check", tr("No margins: {why}.", why=worded(str(of.loop.margins.status[0]))))]
     small = least["phase_margin"] < _PHASE_MIN_DEG or least["peak_sensitivity"] > _MS_MAX
     sizes = listed(
         f"{words} {number(least[name], '.3g')}{unit}"
@@ -185,6 +185,6 @@ def _validated(of: ReportData) -> list[Finding]:
         return [Finding("open", text)] if of.fit is not None else []
     on = of.judged.on
     return [
-        Finding(_TRUSTED[v.verdict], tr("On {recording}: {sentence}.", recording=on, sentence=recognised(v.sentence)))
+        Finding(_TRUSTED[v.verdict], tr("On {recording}: {sentence}.", recording=on, sentence=worded(v.sentence)))
         for v in of.judged.found
     ]

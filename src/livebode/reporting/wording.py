@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from livebode.core import Response
-from livebode.core.document import PrintedTable
+from livebode.core import PrintedTable, Response
 from livebode.language import number, tr, trn
 
 BOUND_95 = float(np.sqrt(np.log(20.0)))
@@ -84,6 +83,22 @@ def polar(value: complex, radius: float) -> tuple[str, str, str, str]:
         return db, tr("unbounded"), deg, tr("unbounded")
     half_db, half_deg = -decibels(1 - radius / size), np.degrees(np.arcsin(radius / size))
     return db, number(half_db, ".2g"), deg, number(half_deg, ".2g")
+
+
+def polar_phrase(value: complex, radius: float) -> str:
+    """A ratio in dB and degrees with its circular bound, for a sentence.
+
+    >>> polar_phrase(2, 0.2), polar_phrase(2, 3), polar_phrase(2, np.inf)
+    ('+6.02 ± 0.92 dB, +0.00 ± 5.7°', 'at most +13.98 dB, phase not known', '+6.02 dB, +0.00°, bound not known')
+    """
+    db, around, deg, turned = polar(value, radius)
+    if isfinite(radius) and radius >= abs(value) > 0:
+        return tr("at most {db} dB, phase not known", db=signed(number(decibels(abs(value) + radius), ".2f")))
+    if not isfinite(radius):
+        return tr("{db} dB, {deg}°, bound not known", db=signed(db), deg=signed(deg))
+    return tr(
+        "{db} ± {around} dB, {deg} ± {turned}°", db=signed(db), around=around, deg=signed(deg), turned=turned
+    )  # fmt: skip
 
 
 def signed(number: str) -> str:

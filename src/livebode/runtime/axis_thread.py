@@ -6,12 +6,13 @@ import logging
 import threading
 import time
 
-from livebode.configuration.axis import Axis
-from livebode.core import LivebodeError
+from livebode.configuration import Axis
+from livebode.core import ConfigError, LivebodeError
+from livebode.estimates import rule
+from livebode.runtime._run import run
 from livebode.runtime.destination import Destination
-from livebode.runtime.run import run
+from livebode.runtime.estimate import Outcome
 from livebode.runtime.run_control import RunControl, StoppedError
-from livebode.runtime.run_loop import Outcome
 from livebode.runtime.status import Status
 
 _logger = logging.getLogger(__name__)
@@ -73,6 +74,13 @@ class AxisThread:
         name = self.name or "axis"
         _logger.info("%s begins", name)
         try:
+            if rule(self.axis.kind, "estimate").alone:
+                raise ConfigError(
+                    "key-conflict",
+                    f"an axis with [{self.axis.kind}] cannot run together with others",
+                    "run its recording alone",
+                    key=self.axis.kind,
+                )
             self.outcome = run(self.axis, self._to, self.control)
         except Exception as error:  # a usage error or an internal error: the other axes continue
             self.error = error

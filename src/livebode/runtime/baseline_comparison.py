@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
-from livebode.configuration.monitoring_section import MonitoringSection
-from livebode.core import Event, RecordError
-from livebode.core.state import Stage, decode, encode
+from livebode.configuration import MonitoringSection
+from livebode.core import Event, RecordError, Stage, decode, encode
+from livebode.language import Message
 
-_ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
+_ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown", "not-monitored", "places-not-monitored"}
 _ALARMS_MAX = 100  # sentences in run.json; events.jsonl has all
 
 
@@ -32,19 +33,23 @@ class BaselineComparison(Generic[Compared]):
         Judges the results of the run; a stage with a state.
     baseline
         Name of what it compares with.
-    remark
+    remarks
         Sentences after the result.
     baseline_id
         Of the version of the baseline.
     """
 
     _stage: ClassVar[Stage]
-    _no_baseline: ClassVar[str]
+    _no_baseline: ClassVar[Message]
 
     def __init__(
-        self, monitor: Compared | None, baseline: str | None, remark: str = "", baseline_id: str | None = None
+        self,
+        monitor: Compared | None,
+        baseline: str | None,
+        remarks: Sequence[Message] = (),
+        baseline_id: str | None = None,
     ) -> None:
-        self._monitor, self._baseline, self._remark, self._id = monitor, baseline, remark, baseline_id
+        self._monitor, self._baseline, self._remarks, self._id = monitor, baseline, remarks, baseline_id
         self._alarms: list[str] = []
 
     @property
@@ -60,11 +65,12 @@ class BaselineComparison(Generic[Compared]):
     def summary(self, suppressed_s: float = 0.0) -> dict[str, Any]:
         """Entries of run.json of a run that was not assessed for so many seconds, as the machine was not ready."""
         if self._monitor is None:
-            return self.compared_with | {"message": self._no_baseline + self._remark}
+            return self.compared_with | _with_words([self._no_baseline, *self._remarks])
         found = self._result(self._monitor)
-        remark = f" Not assessed for {suppressed_s:.1f} s: the machine was not ready." if suppressed_s else ""
-        message = {"message": found["message"] + remark + self._remark}
-        return self.compared_with | found | message | {"alarms": self._alarms}
+        sentences = [found["message"], *self._remarks]
+        if suppressed_s:
+            sentences.insert(1, Message("Not assessed for {time:.1f} s: the machine was not ready.", time=suppressed_s))
+        return self.compared_with | found | _with_words(sentences) | {"alarms": self._alarms}
 
     def _result(self, monitor: Compared) -> dict[str, Any]:
         """Its summary, with the result as a sentence."""
@@ -94,8 +100,15 @@ class BaselineComparison(Generic[Compared]):
         return events
 
 
-def no_effect(section: MonitoringSection) -> str:
+def _with_words(sentences: Sequence[str]) -> dict[str, Any]:
+    """The result as text, and with its facts."""
+    message = Message.sentences(sentences)
+    return {"message": str(message), "words": message.plain()}
+
+
+def no_effect(section: MonitoringSection) -> list[Message]:
     """Remark on settings that have no effect without a baseline."""
     days = section.false_alarm_interval_days
-    remark = f" false_alarm_interval_days = {days:g} has no effect without one."
-    return remark * (days != MonitoringSection().false_alarm_interval_days)
+    if days == MonitoringSection().false_alarm_interval_days:
+        return []
+    return [Message("false_alarm_interval_days = {days:g} has no effect without one.", days=days)]

@@ -6,25 +6,34 @@ from collections.abc import Mapping
 from typing import Any
 
 from livebode.core import Event
+from livebode.language import Message
 
 
 def between_events(between: Mapping[str, Any], sample: int, time_s: float) -> list[Event]:
     """None, or one event, at the end of the run; `between` as in run.json."""
     count, noise_db = between["recordings"], between["noise_db"]
-    noise = "not known" if noise_db is None else f"{noise_db:.1f} dB"
+    noise = Message("not known") if noise_db is None else Message("{level_db:.1f} dB", level_db=noise_db)
     details = {name: between[name] for name in ("recordings", "chance", "distortion_db", "noise_db")}
     found = between["differs"] and between["distortion_db"] is not None
     if between["realisations"]:
-        distortion = f"{between['distortion_db']:.1f} dB" if found else "not significant"
-        message = (
-            f"best linear approximation of {count} realisations: stochastic distortion, relative to the output at a "
-            f"line, {distortion}; noise of the mean {noise}"
+        level = Message("not significant")
+        if found:
+            level = Message("{level_db:.1f} dB", level_db=between["distortion_db"])
+        message = Message(
+            "best linear approximation of {realisations} realisations: stochastic distortion, relative to the output "
+            "at a line, {level}; noise of the mean {noise}",
+            realisations=count,
+            level=level,
+            noise=noise,
         )
         return [Event("best-linear-approximation", sample, time_s, message, details)]
     if not found:
         return []
-    message = (
-        f"the {count} recordings differ by more than their noise: by {between['distortion_db']:.1f} dB relative to the "
-        f"output at a line; noise of the mean {noise}; the bound of the mean contains the difference"
+    message = Message(
+        "the {recordings} recordings differ by more than their noise: by {distortion_db:.1f} dB relative to the "
+        "output at a line; noise of the mean {noise}; the bound of the mean contains the difference",
+        recordings=count,
+        distortion_db=between["distortion_db"],
+        noise=noise,
     )
     return [Event("recordings-differ", sample, time_s, message, details)]

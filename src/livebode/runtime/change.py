@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from livebode.configuration.axis import Axis
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import Axis, RecordSection
 from livebode.core import ConfigError, Event
-from livebode.runtime.matrix_pipeline import live_pipeline
+from livebode.estimates import rule
+from livebode.language import Message
+from livebode.runtime.estimate import Estimate
 from livebode.runtime.run_control import RunControl
-from livebode.runtime.sample_pipeline import SamplePipeline
 from livebode.sources.live import LiveSource
 
 _KIND = "configuration-applied"
@@ -17,25 +17,27 @@ _KIND = "configuration-applied"
 
 @dataclass(frozen=True, eq=False)
 class ChangeRequest:
-    """Request to an axis: use other settings of the record, or continue in another run with another pipeline."""
+    """Request to an axis: use other settings of the record, or continue in another run with another estimate."""
 
     sections: tuple[str, ...]
     record: RecordSection | None = None
-    pipeline: SamplePipeline | None = None
+    estimate: Estimate | None = None
 
     @property
     def event(self) -> Event:
         """The event that reports it."""
-        names = " and ".join(f"[{name}]" for name in self.sections)
-        how = "in place" if self.pipeline is None else "in another run, from the next sample"
-        return Event(_KIND, 0, 0.0, f"{names} changed: applied {how}", {"sections": list(self.sections)})
+        sections = Message.conjunction(f"[{name}]" for name in self.sections)
+        message = Message("{changed} changed: applied in place", changed=sections)
+        if self.estimate is not None:
+            message = Message("{changed} changed: applied in another run, from the next sample", changed=sections)
+        return Event(_KIND, 0, 0.0, message, {"sections": list(self.sections)})
 
     def request(self, control: RunControl) -> None:
         """Send the request; the event goes to the current record."""
         if self.record is not None:
             control.limit_record(self.record)
-        if self.pipeline is not None:
-            control.change(self.pipeline, self.event)
+        if self.estimate is not None:
+            control.change(self.estimate, self.event)
         else:
             control.report(_KIND, self.event.message, **self.event.details)
 
@@ -84,4 +86,4 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> ChangeRequest 
     record, before = new.record or RecordSection(), old.record or RecordSection()
     if set(sections) <= {"record", "publish"} and record.samples == before.samples:
         return ChangeRequest(sections, record=record)
-    return ChangeRequest(sections, pipeline=live_pipeline(new, source))
+    return ChangeRequest(sections, estimate=rule(new.kind, "estimate").live(new, source))

@@ -2,38 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import nan
 from typing import TYPE_CHECKING
 
-from livebode.configuration.axis import Axis
-from livebode.core import Block, Event, Parameters, Responses
-from livebode.core.state import Stage
+from livebode.configuration import Axis
+from livebode.core import Block, Event, Parameters, Responses, Stage
 from livebode.estimation import Settings
+from livebode.language import Message
 from livebode.runtime.baseline_comparison import BaselineComparison, no_effect
 
 if TYPE_CHECKING:
     from livebode.monitoring import Monitor
 
-_NOT_FITTED = " The baseline's fitted parameters are not judged: the run has no [fit]."
-_NO_SAMPLES = " The baseline's model of the machine is not used: it needs samples at regular times."
+_NOT_FITTED = Message("The baseline's fitted parameters are not judged: the run has no [fit].")
+_NO_SAMPLES = Message("The baseline's model of the machine is not used: it needs samples at regular times.")
 
 
 class ChangeDetection(BaselineComparison["Monitor"]):
     """Passes a run's samples and responses to a Monitor, if there is one, and lists its alarms for run.json."""
 
     _stage = Stage("change-detection", 1)
-    _no_baseline = "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs."
+    _no_baseline = Message(
+        "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs."
+    )
 
     def __init__(
         self,
         monitor: Monitor | None,
         baseline: str | None,
-        remark: str = "",
+        remarks: Sequence[Message] = (),
         covariates: tuple[str, ...] = (),
         baseline_id: str | None = None,
     ) -> None:
-        super().__init__(monitor, baseline, remark, baseline_id)
+        super().__init__(monitor, baseline, remarks, baseline_id)
         self.covariates = covariates
         """Channels that it needs in addition to those of the follower."""
 
@@ -84,9 +87,9 @@ def change_detection(axis: Axis, settings: Settings, *, samples: bool = True) ->
     learned = baseline.id
     baseline.check_covariates(covariates)
     left_out = not samples and baseline.machine is not None
-    if left_out:
-        baseline = replace(baseline, machine=None)
+    if not samples:
+        baseline = replace(baseline, machine=None, torque=None)
     monitor = Monitor(baseline, settings, 86400 * section.false_alarm_interval_days, corrected=axis.motion is not None)
     blind = axis.fit is None and "parameters" in monitor.tables
-    remark = _NOT_FITTED * blind + _NO_SAMPLES * left_out
-    return ChangeDetection(monitor, str(section.baseline), remark, baseline.covariates, learned)
+    remarks = [_NOT_FITTED] * blind + [_NO_SAMPLES] * left_out
+    return ChangeDetection(monitor, str(section.baseline), remarks, baseline.covariates, learned)

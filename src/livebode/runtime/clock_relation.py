@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from math import inf
 
-from livebode.core import Emit, Event, ignore
-from livebode.core.clock import RunClock
+from livebode.core import Emit, Event, RunClock, ignore
+from livebode.language import Message
 from livebode.sources.live import LiveBlock, Origin
 
 REFINED_FOR_S = 10.0
@@ -102,8 +102,12 @@ class ClockRelation:
         if abs(by_s) <= STEP_S:
             return False
         self._unix_s += by_s
-        message = f"this computer's clock was set by {by_s:+.4g} s; times of day before {start_s:.6g} s are unchanged"
-        emit(Event("computer-clock", block.start, start_s, message, {"set_by_s": by_s}))
+        message = Message(
+            "this computer's clock was set by {set_by_s:+.4g} s; times of day before {before_s:.6g} s are unchanged",
+            set_by_s=by_s,
+            before_s=start_s,
+        )
+        emit(Event("computer-clock", block.start, start_s, message))
         self._begin(start_s, self._unix_s + block.arrived_s - (block.origin_s + block.stop / block.rate_hz), -inf)
         return True
 

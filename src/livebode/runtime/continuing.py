@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.core import Block, RecordError
-from livebode.core.state import Stage, decode, encode
-from livebode.sources.live import LiveBlock, Position
-from livebode.sources.live.computer_clock import ClockReading
+from livebode.core import Block, RecordError, Stage, decode, encode
+from livebode.sources.live import ClockReading, LiveBlock, Position
 
 SOURCE = "source"
 """Name of a live source's position in the state of a run."""
@@ -79,7 +77,7 @@ class StreamPosition:
 
 def stream_position(run: Path) -> StreamPosition:
     """Position at which the source continues, from the newest commit of this run; of a new run if there is none."""
-    from livebode.records.segments.journal import last_commit  # needs a POSIX system
+    from livebode.records import last_commit  # needs a POSIX system
 
     commit = last_commit(run)
     return StreamPosition(b"" if commit is None else commit.states.get(SOURCE, b""))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from livebode.core import Block, Channel, Event, MatrixResponses, Parameters, Responses
 
 if TYPE_CHECKING:
-    from livebode.analysis.overview import Overview
+    from livebode.analysis import Overview
     from livebode.runtime.run_control import RunControl
 
 VERSION = 1

@@ -7,8 +7,8 @@ from copy import deepcopy
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from livebode.core import Event
-from livebode.core.state import Stage, decode, encode
+from livebode.core import Event, Stage, decode, encode
+from livebode.language import Message
 
 QUIET_S = 60.0
 """A cause without events for this time has ended; its next event begins another group."""
@@ -98,7 +98,12 @@ class _Group:
         message = exact[-1].message
         if len(exact) > 1 or counted.total():
             details["repeats"] = [[e.kind, e.sample, e.time_s, e.message, e.details] for e in exact]
-            message += f" ({self.count} events of this cause in {self.last_s - self.first_s:.4g} s)"
+            message = Message(
+                "{event} ({count} events of this cause in {seconds:.4g} s)",
+                event=exact[-1],
+                count=self.count,
+                seconds=self.last_s - self.first_s,
+            )
         if counted.total():
             details["counted"] = {kind: number for kind, number in counted.items() if number}
         return replace(exact[-1], message=message, details=exact[-1].details | details)

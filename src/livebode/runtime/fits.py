@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.fits import plain_fit
-from livebode.configuration.fit_section import FitSection
-from livebode.configuration.fit_settings import chosen_model, fitter_of
-from livebode.core import Event, Loop, Parameters, PlantKinds, Responses
-from livebode.core.state import Stage, decode, encode
+from livebode.analysis import plain_fit
+from livebode.configuration import FitSection, chosen_model, fitter_of
+from livebode.core import Event, Loop, Parameters, PlantKinds, Responses, Stage, decode, encode
 from livebode.fitting import Fit, Fitter, best_of, fit_of
 from livebode.margins import OpenLoop, against_lines, margins
 

@@ -9,29 +9,22 @@ import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from livebode.configuration.axis import NOT_RECORDED, Axis
-from livebode.configuration.record_section import RecordSection
-from livebode.core import ConfigError, Event, LivebodeError
-from livebode.core.clock import moments_by
+from livebode.configuration import NOT_RECORDED, Axis, RecordSection
+from livebode.core import ConfigError, Event, LivebodeError, moments_by
+from livebode.estimates import rule
+from livebode.language import Message
 from livebode.runtime import successors
 from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition, stream_position
 from livebode.runtime.destination import Destination
-from livebode.runtime.matrix_loop import MatrixRunLoop
-from livebode.runtime.matrix_pipeline import MatrixPipeline, live_pipeline
-from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.estimate import Estimate, Outcome
 from livebode.runtime.provenance import provenance
 from livebode.runtime.recorded_run import source_of
 from livebode.runtime.run_control import RunControl
-from livebode.runtime.run_loop import Outcome, RunLoop
-from livebode.runtime.sample_loop import SampleLoop
-from livebode.runtime.sample_pipeline import SamplePipeline
-from livebode.sources.live import LiveSource
-from livebode.sources.live.replayable import ReplaySource
+from livebode.runtime.run_loop import RunLoop
+from livebode.sources.live import LiveSource, ReplaySource
 
-AnyLoop = SampleLoop[Outcome]
 _logger = logging.getLogger(__name__)
 
 
@@ -44,8 +37,8 @@ def run_live(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     if position.left_at is not None:
         source.resume(position.left_at)
     with source.open(partial(_report_late, to)), contextlib.ExitStack() as finishing:
-        pipeline = live_pipeline(axis, source)
-        return _Succession(source, position, to, control, finishing).run(pipeline)
+        estimate = rule(axis.kind, "estimate").live(axis, source)
+        return _Succession(source, position, to, control, finishing).run(estimate)
 
 
 def _check_apart(replayed: Path | None, directory: Path) -> None:
@@ -62,7 +55,12 @@ def _check_apart(replayed: Path | None, directory: Path) -> None:
 
 def _report_late(to: Destination, why: str) -> None:
     """Report that a machine has not sent yet; without a run, the time is that of this computer."""
-    event = Event("waiting", 0, time.time(), f"{why}; the axis waits: switch the machine on, or check the address")
+    event = Event(
+        "waiting",
+        0,
+        time.time(),
+        Message("{why}; the axis waits: switch the machine on, or check the address", why=why),
+    )
     _logger.warning("%s", event.message)
     _announce(to, event)
 
@@ -89,12 +87,12 @@ class _Succession:
         if isinstance(source, ReplaySource):
             self._relation.clock.pieces = list(source.clock.pieces)
 
-    def run(self, pipeline: SamplePipeline) -> Outcome:
+    def run(self, estimate: Estimate) -> Outcome:
         """The first run and all that follow, until the end."""
         with moments_by(self._relation.clock):
-            return self._run(pipeline)
+            return self._run(estimate)
 
-    def _run(self, pipeline: SamplePipeline) -> Outcome:
+    def _run(self, estimate: Estimate) -> Outcome:
         from livebode.runtime.segmented import make_way  # needs a POSIX system
 
         directory, previous, force = self._to.directory, None, self._to.force
@@ -105,7 +103,7 @@ class _Succession:
             directory = successors.newest(directory)
         while True:
             to = replace(self._to, directory=directory, force=force)
-            loop = self._loop(pipeline, to, previous)
+            loop = self._loop(estimate, to, previous)
             with contextlib.ExitStack() as leaving:
                 leaving.enter_context(loop)
                 loop.follow()
@@ -115,14 +113,14 @@ class _Succession:
                     outcome = loop.finish()
                     break
                 directory, force = successors.free(self._to.directory), False
-                previous = self._hand_over(loop, pipeline, following, directory)
+                previous = self._hand_over(loop, estimate, following, directory)
                 self._finish_beside(loop, leaving.pop_all())
-                pipeline = following
+                estimate = following
         loop.publish_end()
         return outcome
 
-    def _loop(self, pipeline: SamplePipeline, to: Destination, previous: PreviousRun | None) -> AnyLoop:
-        axis = pipeline.axis
+    def _loop(self, estimate: Estimate, to: Destination, previous: PreviousRun | None) -> RunLoop:
+        axis = estimate.axis
         assert axis is not None
         about = {
             # Most keys of a source apply to other kinds of source.
@@ -131,31 +129,20 @@ class _Succession:
             **provenance(axis),
             "found": {"format": self._source.format, "rate_from": "the sender", "clock": "relative"},
         }
-        options: dict[str, Any] = {
-            "about": about,
-            "segments": axis.record or RecordSection(),
-            "again": False,
-            "control": self._control,
-            "position": self._position,
-            "previous": previous,
-            "relation": self._relation,
-        }
-        if isinstance(pipeline, MatrixPipeline):
-            return MatrixRunLoop(self._source, pipeline, to, **options)
-        assert isinstance(pipeline, Pipeline)
-        return RunLoop(self._source, pipeline, to, **options)
+        return RunLoop(
+            self._source, estimate, to, about=about, segments=axis.record or RecordSection(), again=False,
+            control=self._control, position=self._position, previous=previous, relation=self._relation,
+        )  # fmt: skip
 
-    def _hand_over(
-        self, loop: AnyLoop, pipeline: SamplePipeline, following: SamplePipeline, directory: Path
-    ) -> PreviousRun:
+    def _hand_over(self, loop: RunLoop, estimate: Estimate, following: Estimate, directory: Path) -> PreviousRun:
         """End a run; the next one continues with as much of its state as possible."""
-        continues = following.take_over(pipeline)
+        continues = following.take_over(estimate)
         loop.end(directory.name, handed_over=continues)
         loop.publish_end()
         counts = dict(following.counts) if continues else {}
         return PreviousRun(loop.to.directory.name, *loop.position, counts)
 
-    def _finish_beside(self, loop: AnyLoop, leaving: contextlib.ExitStack) -> None:
+    def _finish_beside(self, loop: RunLoop, leaving: contextlib.ExitStack) -> None:
         """Draw its pictures and close it while the next one continues."""
 
         def finish() -> None:
@@ -164,7 +151,7 @@ class _Succession:
                     loop.finish()
             except LivebodeError as error:
                 _logger.error("%s: %s", loop.to.directory, error)
-                _announce(self._to, Event("record-unfinished", *loop.position, str(error)))
+                _announce(self._to, Event("record-unfinished", *loop.position, error.words))
 
         thread = threading.Thread(target=finish, name="livebode finishing")
         thread.start()

@@ -10,12 +10,18 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Event, counted
+from livebode.core import Block, Channel, Event
 from livebode.estimation import Settings
-from livebode.preparation.aligned import SlipSearch, bridged
-from livebode.preparation.role_spectra import role_spectra
-from livebode.preparation.roles import ROLES, suspicions
-from livebode.preparation.transients import transient_event, transient_periods
+from livebode.language import Message
+from livebode.preparation import (
+    ROLES,
+    SlipSearch,
+    bridged,
+    role_spectra,
+    suspicions,
+    transient_event,
+    transient_periods,
+)
 
 _WINDOWS, _SECONDS, _SAMPLES_MAX = 32, 10.0, 1 << 22  # length of a stretch that is judged, whichever is longer
 _EXCITED_MIN = 16  # windows with power in it, to distinguish noise from a response
@@ -95,7 +101,8 @@ class LiveChecks:
             if self._stretch.samples >= self._size:
                 start, data = self._stretch.hand_out()
                 judged_at = block.stop + self._delay
-                self._complete = _CompleteStretch(start, _time_s(block, start), data, self._transient, judged_at)
+                time_s = _time_s(block, start)
+                self._complete = _CompleteStretch(start, time_s, data, block.channels, self._transient, judged_at)
             if self._complete is not None and block.stop >= self._complete.judged_at:
                 yield from self._findings()
                 self._begin_judging(block.stop)
@@ -141,12 +148,18 @@ class LiveChecks:
         if self._slips.begins_at is None:
             self._slips.begins_at = start
         for slip in self._slips.take(bridged(data[0])):
-            way, what = ("forward", "missing") if slip.missing > 0 else ("back", "repeated")
-            message = (
-                f"the phase of {name!r} jumps {way} by {counted(abs(slip.missing), 'sample')} at sample {slip.sample}, "
-                f"where the source reports no gap: samples are {what}, or the generator was restarted; the "
-                "responses of the windows around it are wrong; do not restart the generator, and let the sender number "
-                "each sample when it is taken"
+            forward = slip.missing > 0
+            message = Message(
+                "the phase of {channel} jumps {way} by {samples} at sample {at_sample}, where the source reports no "
+                "gap: {what}, or the generator was restarted; the responses of the windows around it are wrong; do not "
+                "restart the generator, and let the sender number each sample when it is taken",
+                channel=repr(name),
+                way=Message("forward") if forward else Message("back"),
+                samples=Message("1 sample")
+                if abs(slip.missing) == 1
+                else Message("{samples} samples", samples=abs(slip.missing)),
+                at_sample=slip.sample,
+                what=Message("samples are missing") if forward else Message("samples are repeated"),
             )
             details = {"missing_samples": slip.missing}
             yield Event("phase-slip", slip.sample, _time_s(block, slip.sample), message, details)
@@ -159,6 +172,7 @@ class _CompleteStretch:
     start: int
     time_s: float
     data: NDArray[np.float64]
+    channels: tuple[Channel, ...]
     transient: bool
     judged_at: int
 
@@ -182,7 +196,7 @@ def _judged(stretch: _CompleteStretch, settings: Settings, channels: list[str], 
         return _Judgement(excited=False, final=False)  # the next stretch is judged
     if spectra.windows < _EXCITED_MIN:
         return _Judgement(final=False)  # the excitation began in this stretch, not with the next one
-    doubts = suspicions(by_role, settings) if roles else []
+    doubts = suspicions(by_role, settings, stretch.channels) if roles else []
     events = [Event("roles-doubtful", start, time_s, one.sentence) for one in doubts]
     if stretch.transient and (periods := transient_periods(signals, settings)):
         events.append(transient_event(periods, settings, first=start, time_s=time_s, begun=begun))

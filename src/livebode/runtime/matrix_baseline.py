@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration import recorded_configuration
 from livebode.core import BaselineError, Lines, LivebodeError, MatrixResponses, counted
 from livebode.mimo import MatrixSettings, mean_matrix
 from livebode.records import RunRecord
@@ -15,12 +15,14 @@ _NAME_A_RUN = "specify the directory of a matrix run of the healthy machine"
 
 @dataclass(frozen=True, eq=False)
 class MatrixBaseline:
-    """The mean of the matrices of a run.
+    """The matrices of a run.
 
     Attributes
     ----------
     path
         Directory of the run.
+    matrices
+        All of them: their differences show how far the errors of the lines are alike.
     mean
         One row.
     estimator
@@ -28,6 +30,7 @@ class MatrixBaseline:
     """
 
     path: Path
+    matrices: MatrixResponses
     mean: MatrixResponses
     estimator: str
 
@@ -38,7 +41,8 @@ class MatrixBaseline:
             raise BaselineError("absent", f"there is no baseline {str(path)!r}", _NAME_A_RUN, path=str(path))
         try:
             run = RunRecord.open(path, matrix=True)
-            mean = mean_matrix(run.matrix())
+            matrices = run.matrix()
+            mean = mean_matrix(matrices)
         except LivebodeError as error:
             raise BaselineError(
                 "not-a-baseline",
@@ -48,7 +52,7 @@ class MatrixBaseline:
                 reason=str(error),
             ) from None
         tracking = recorded_configuration(run.summary).get("tracking", {})
-        return cls(path, mean, str(tracking.get("estimator", "joint")))
+        return cls(path, matrices, mean, str(tracking.get("estimator", "joint")))
 
     def check(self, settings: MatrixSettings) -> None:
         """BaselineError where a run with these settings cannot be compared with it."""

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from livebode.configuration.axis import Axis
-from livebode.core import ConfigError, Event, MatrixResponses
-from livebode.core.state import Stage
+from livebode.configuration import Axis
+from livebode.core import ConfigError, Event, MatrixResponses, Stage
+from livebode.language import Message
 from livebode.mimo import MatrixSettings
 from livebode.runtime.baseline_comparison import BaselineComparison, no_effect
 
 if TYPE_CHECKING:
     from livebode.mimo import MatrixMonitor
 
-_NOT_JUDGED = "Nothing of the run could be judged: no matrix has valid columns and enough repetitions."
-_NOT_USED = " monitoring.gantry has no effect without one."
+_NOT_JUDGED = Message("Nothing of the run could be judged: no matrix has valid columns and enough repetitions.")
+_NOT_USED = Message("monitoring.gantry has no effect without one.")
 
 
 class MatrixDetection(BaselineComparison["MatrixMonitor"]):
     """Passes a run's matrices to a MatrixMonitor, if there is one, and lists its alarms for run.json."""
 
     _stage = Stage("matrix-detection", 1)
-    _no_baseline = (
+    _no_baseline = Message(
         "Without a baseline no change can be detected; monitoring.baseline specifies a run of the healthy machine."
     )
 
@@ -35,7 +35,7 @@ class MatrixDetection(BaselineComparison["MatrixMonitor"]):
             self.restore(before.snapshot())
 
     def _result(self, monitor: MatrixMonitor) -> dict[str, Any]:
-        from livebode.monitoring.result_sentence import result_sentence  # with the simulation
+        from livebode.monitoring import result_sentence  # with the simulation
 
         found = monitor.summary()
         return found | {"message": result_sentence(found) if found["judged_s"] else _NOT_JUDGED}
@@ -55,17 +55,16 @@ def matrix_detection(axis: Axis, settings: MatrixSettings) -> MatrixDetection:
     """
     section = axis.monitoring
     if section.baseline is None:
-        return MatrixDetection(None, None, no_effect(section) + _NOT_USED * (section.gantry is not None))
-    from livebode.analysis.matrices import read_gantry  # with the simulation
-    from livebode.mimo import MatrixMonitor
-    from livebode.mimo.monitor import matrix_digest
+        return MatrixDetection(None, None, no_effect(section) + [_NOT_USED] * (section.gantry is not None))
+    from livebode.analysis import read_gantry  # with the simulation
+    from livebode.mimo import MatrixMonitor, matrix_digest
     from livebode.runtime.matrix_baseline import MatrixBaseline
 
     _check_noise(settings)
     baseline = MatrixBaseline.load(section.baseline)
     baseline.check(settings)
     monitor = MatrixMonitor(
-        baseline.mean,
+        baseline.matrices,
         false_alarm_interval_s=86400 * section.false_alarm_interval_days,
         description=None if section.gantry is None else read_gantry(section.gantry),
         noise_samples=settings.noise_samples,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from livebode.configuration.axis import Axis
-from livebode.configuration.recipe import recipe_id
-from livebode.core.clock import ClockKind, RunClock, iso_utc
+from livebode.configuration import Axis, recipe_id
+from livebode.core import ClockKind, RunClock, iso_utc
 from livebode.locations import Location, local_copy
-from livebode.records.content import content_sha256, joined_sha256
+from livebode.records import content_sha256, joined_sha256
+from livebode.sources import Log
 
 
 def provenance(axis: Axis, digests: Sequence[str] = ()) -> dict[str, Any]:
@@ -60,6 +60,18 @@ def recorded(spans: Sequence[RecordedSpan]) -> dict[str, Any]:
     ends = [_modified_s(span.place) for span in spans]
     begins = [end - (span.to_s - span.from_s) for end, span in zip(ends, spans)]
     return _entry(min(begins), max(ends), "file")
+
+
+def of_log(log: Log) -> dict[str, Any]:
+    """Entries of run.json under `found`: format and clock of a recording, and which part of it was used."""
+    found: dict[str, Any] = {"format": log.format, "rate_from": log.rate_origin, "clock": log.clock_kind}
+    return found | ({"part": {"first": log.first, "stop": log.stop}} if log.is_part else {})
+
+
+def dated(log: Log) -> Callable[[float], dict[str, Any]]:
+    """Entry ``recorded`` of run.json, from the time after the last sample of the recording."""
+    from_s = log.origin_s + log.first / log.rate_hz
+    return lambda to_s: recorded([RecordedSpan(log.path, log.clock_kind, from_s, to_s)])
 
 
 def recorded_live(clock: RunClock, from_s: float, to_s: float | None) -> dict[str, Any]:

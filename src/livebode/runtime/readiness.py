@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.configuration.ready import ReadyCondition
+from livebode.configuration import ReadyCondition
 from livebode.core import Block, Event, Responses, Stage, StatefulBase
-from livebode.estimation.set_aside import NOTHING, contains
+from livebode.estimation import NOTHING, contains
+from livebode.language import Message
 
 SUPPRESSED, ENDED = "suppressed", "suppression-ended"
 
@@ -104,9 +105,11 @@ class Readiness(StatefulBase):
     def _begun(self, block: Block, at: int) -> Event:
         self._reported = True
         channel, value, sample = self.condition.channel, self._value, block.start + at
-        message = (
-            f"{channel!r} is {value:g}: the machine is not ready; its response is not assessed, and alarms of the "
-            "response are suppressed"
+        message = Message(
+            "{of_channel} is {of_value:g}: the machine is not ready; its response is not assessed, and alarms of "
+            "the response are suppressed",
+            of_channel=repr(channel),
+            of_value=value,
         )
         details = {"channel": channel, "value": value if np.isfinite(value) else None, "since_s": self._since}
         return Event(SUPPRESSED, sample, block.origin_s + sample / block.rate_hz, message, details)
@@ -122,9 +125,11 @@ class Readiness(StatefulBase):
         since_s, self._since = self._since, None
         self._suppressed += end - self._begin
         time_s = block.origin_s + end / block.rate_hz
-        message = (
-            f"the machine is ready again: it was ready for a whole window of {self._window} samples; its response is "
-            f"assessed again, after {time_s - since_s:.3g} s"
+        message = Message(
+            "the machine is ready again: it was ready for a whole window of {window} samples; its response is "
+            "assessed again, after {after_s:.3g} s",
+            window=self._window,
+            after_s=time_s - since_s,
         )
         details = {"channel": self.condition.channel, "suppressed_since_s": since_s, "ready_sample": last}
         return [Event(ENDED, end, time_s, message, details)]

@@ -10,17 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.core import Channel, LivebodeError, RecordError
-from livebode.core.clock import RunClock
-from livebode.records import RunRecord
-from livebode.records.sample_table import channels_of
+from livebode.core import Channel, LivebodeError, RecordError, RunClock
+from livebode.records import RunRecord, channels_of
 from livebode.runtime.sender_numbers import NumberedFrom, SenderNumbers
-from livebode.sources.live import Batch, LiveSource, SourceSettings, make_source
-from livebode.sources.live.address import Address
-from livebode.sources.live.batch import VALUES_MAX, with_kinds
-from livebode.sources.live.replayable import ReplaySource, SenderSample
-from livebode.tables import Table
-from livebode.tables.parquet_footer import read_footer
+from livebode.sources.live import (
+    VALUES_MAX,
+    Address,
+    Batch,
+    LiveSource,
+    ReplaySource,
+    SenderSample,
+    SourceSettings,
+    make_source,
+    with_kinds,
+)
+from livebode.tables import Table, read_footer
 
 
 class RecordedRun:

@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol, Self
 
-from livebode.configuration.record_section import RecordSection
-from livebode.core import Block, Event, MatrixResponses, Responses
+from livebode.configuration import RecordSection
+from livebode.core import Block, Event
+from livebode.records import RunRecord
 from livebode.runtime.documents import Document
 
 
@@ -40,11 +41,8 @@ class Recorder(Protocol):
     def begun(self) -> str | None:
         """When the run that it continues began, as in run.json; None for a new one, or if nothing recorded it."""
 
-    def previous(self) -> Iterator[Responses]:
-        """The newest responses of the run that it continues."""
-
-    def previous_matrices(self) -> Iterator[MatrixResponses]:
-        """The same of a matrix run."""
+    def previous(self) -> RunRecord | None:
+        """The record that it continues; None for a new one."""
 
     def pieces(self, block: Block) -> Iterator[Block]:
         """The samples of a Block that are not in the record yet, in Blocks that are short enough for a commit."""

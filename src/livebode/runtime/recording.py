@@ -1,64 +1,51 @@
-"""The run on a recording."""
+"""A recording examined as a whole, before it is tracked."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from livebode.configuration.axis import NOT_RECORDED, Axis
-from livebode.configuration.recording import open_even_or_uneven
+from livebode.configuration import Axis, open_even_or_uneven, with_shared_names
 from livebode.core import Event
-from livebode.core.clock import RunClock, moments_by
-from livebode.estimation import Tracker
-from livebode.estimation.stream_estimator import Follower
-from livebode.fitting.drift import DriftTest
-from livebode.preparation.aligned import AlignedLog, slip_event, slips_of
-from livebode.preparation.early_spikes import early_spikes
-from livebode.preparation.part import configured_part
-from livebode.preparation.plan import make_follower, roles_in_doubt, window_in_doubt
-from livebode.preparation.steady import steady
+from livebode.estimation import Follower, Tracker, hum_events, hum_spans
+from livebode.fitting import DriftTest
+from livebode.preparation import (
+    AlignedLog,
+    configured_part,
+    early_spikes,
+    make_follower,
+    roles_in_doubt,
+    silences,
+    slip_event,
+    slips_of,
+    steady,
+    window_in_doubt,
+)
 from livebode.runtime.destination import Destination
-from livebode.runtime.pipeline import Pipeline
-from livebode.runtime.provenance import RecordedSpan, provenance, recorded
-from livebode.runtime.run_control import RunControl
-from livebode.runtime.run_loop import Outcome, RunLoop
-from livebode.runtime.uneven_recording import run_uneven
-from livebode.sources import Log
-from livebode.sources.uneven import UnevenLog
+from livebode.runtime.estimate import ExaminedRecording
+from livebode.runtime.provenance import dated
+from livebode.runtime.single_response import SingleResponse
+from livebode.sources import Log, UnevenLog
 
 
-def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
-    """Examine a recording as a whole, then track it."""
-    started = time.perf_counter()
+def examined_recording(axis: Axis, to: Destination) -> ExaminedRecording:
+    """Open a recording, and examine it as a whole."""
     opened = open_even_or_uneven(axis)
     if isinstance(opened, UnevenLog):
-        return run_uneven(axis, opened, to, control, started)
+        from livebode.runtime.uneven_recording import examined_uneven
+
+        return examined_uneven(axis, opened)
+    axis = with_shared_names(axis, opened)
     log = configured_part(axis, opened)
     follower = make_follower(axis, log)
     log = log.naming(axis.signals.named)
-    pipeline = Pipeline.of(axis, follower, log.channels)
-    log = log.naming(pipeline.channels)  # with the covariates of a baseline
+    estimate = SingleResponse.of(axis, follower, log.channels)
+    log = log.naming(estimate.channels)  # with the covariates of a baseline
     to.prepare()
-    of = examined(axis, log, pipeline.follower)
-    settings = pipeline.follower.settings
-    about = {"configuration": axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": of.found}
-    about |= provenance(axis)
+    of, settings = examined(axis, log, follower), follower.settings
     if settings.quantity == "plant" and settings.periodic and not settings.average:
-        pipeline = replace(pipeline, drift=DriftTest(settings.lines))
-    loop = RunLoop(
-        of.source, pipeline, to, about=about, segments=axis.record, started=started, control=control,
-        noticed=of.noticed, recorded=dated(log),
-    )  # fmt: skip
-    with moments_by(RunClock.of_kind(log.clock_kind)):
-        return loop.run()
-
-
-def dated(log: Log) -> Callable[[float], dict[str, Any]]:
-    """Entry ``recorded`` of run.json, from the time after the last sample of the recording."""
-    from_s = log.origin_s + log.first / log.rate_hz
-    return lambda to_s: recorded([RecordedSpan(log.path, log.clock_kind, from_s, to_s)])
+        estimate.drift = DriftTest(settings.lines)
+    return ExaminedRecording(axis, of.source, estimate, of.found, log.clock_kind, dated(log), of.noticed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +65,16 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     slips = slips_of(log, settings)
     if slips:
         noticed.append(slip_event(slips, settings))
-    source = AlignedLog(log, slips, log.first)
+    source = whole = AlignedLog(log, slips, log.first)
     if settings.periodic and not axis.tracking.all_periods and axis.motion is None:
         kept = steady(source, settings)
         source, noticed = replace(source, first=kept.first), noticed + kept.noticed
         if kept.left_out.size and isinstance(follower, Tracker):
             follower.leave_out(kept.left_out + shift)
     if isinstance(follower, Tracker):
+        spans = hum_spans(silences(whole, settings), settings.lines, average=settings.average)
+        noticed += hum_events(spans, settings.lines, source.first)
+        follower.know_hum([span.shifted(shift) for span in spans])
         follower.know_spikes(early_spikes(source, settings) + shift)
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
     found |= {"left_out_samples": source.first - log.first, "clock": log.clock_kind}

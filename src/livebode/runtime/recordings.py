@@ -1,34 +1,25 @@
-"""The run on several recordings of one machine, one after the other."""
+"""Several recordings of one machine, examined as a whole before they are tracked one after the other."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from livebode.configuration.axis import NOT_RECORDED, Axis
-from livebode.configuration.recording import open_recording
+from livebode.configuration import Axis, open_recording, with_shared_names
 from livebode.core import Block, Channel, Event, RecordingError
-from livebode.core.clock import RunClock, moments_by
-from livebode.estimation import Tracker
-from livebode.estimation.successive import SuccessiveTrackers
+from livebode.estimation import SuccessiveTrackers, Tracker
 from livebode.fitting import RecordingsMean
+from livebode.language import Message
 from livebode.locations import Location, local_copy
-from livebode.preparation.aligned import AlignedLog
-from livebode.preparation.checks import ChannelCheck
-from livebode.preparation.part import configured_part
-from livebode.preparation.plan import make_settings
-from livebode.preparation.recordings import check_same, realisations
-from livebode.records.content import content_sha256
+from livebode.preparation import AlignedLog, ChannelCheck, check_same, configured_part, make_settings, realisations
+from livebode.records import content_sha256
 from livebode.runtime.destination import Destination
-from livebode.runtime.pipeline import Pipeline
-from livebode.runtime.provenance import RecordedSpan, provenance, recorded
-from livebode.runtime.recording import Examined, examined
-from livebode.runtime.run_control import RunControl
-from livebode.runtime.run_loop import Outcome, RunLoop
-from livebode.sources import Log
-from livebode.sources.recording import located
+from livebode.runtime.estimate import ExaminedRecording
+from livebode.runtime.provenance import RecordedSpan, recorded
+from livebode.runtime.recording import Examined, examined, examined_recording
+from livebode.runtime.single_response import SingleResponse
+from livebode.sources import Log, located
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +40,10 @@ class _Part:
 
 @dataclass(frozen=True, eq=False)
 class SuccessiveRecordings:
-    """Several recordings as one source: the numbers of their samples follow each other, with a gap between them."""
+    """Several recordings as one source: the numbers of their samples follow each other, with a gap between them.
+
+    All have the rate of the first.
+    """
 
     sources: Sequence[AlignedLog]
     shifts: Sequence[int]
@@ -65,23 +59,27 @@ class SuccessiveRecordings:
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]:
         """The Blocks of all recordings; their times count from sample 0 of the first one."""
+        rate_hz = None
         for source, shift in zip(self.sources, self.shifts):
             begins = True
             for block in source.blocks(channels):
-                yield replace(block, start=block.start + shift, origin_s=0.0, gap=block.gap or begins)
+                rate_hz = rate_hz or block.rate_hz
+                number, gap = block.start + shift, block.gap or begins
+                yield replace(block, rate_hz=rate_hz, start=number, origin_s=0.0, gap=gap)
                 begins = False
 
 
-def run_recordings(axis: Axis, to: Destination, control: RunControl) -> Outcome:
-    """Examine each recording as a whole, then track them one after the other."""
-    started = time.perf_counter()
-    parts = _prepared(axis)
+def examined_recordings(axis: Axis, to: Destination) -> ExaminedRecording:
+    """Open a recording or several, and examine each as a whole; several are tracked one after the other."""
+    if len(axis.source.logs) == 1:
+        return examined_recording(axis, to)
+    axis, parts = _prepared(axis)
     sources, settings = [part.of.source for part in parts], parts[0].tracker.settings
     starts, differ = [part.first for part in parts], realisations(sources, settings)
-    follower = SuccessiveTrackers([part.tracker for part in parts], starts)
-    pipeline = replace(
-        Pipeline.of(axis, follower, parts[0].log.channels), recordings=RecordingsMean(starts, realisations=differ)
+    estimate = SingleResponse.of(
+        axis, SuccessiveTrackers([part.tracker for part in parts], starts), parts[0].log.channels
     )
+    estimate.recordings = RecordingsMean(starts, realisations=differ)
     found = parts[0].of.found | {
         "clock": "relative",
         "phase_slips": sum(part.of.found["phase_slips"] for part in parts),
@@ -90,31 +88,37 @@ def run_recordings(axis: Axis, to: Destination, control: RunControl) -> Outcome:
         "realisations": differ,
     }
     found.pop("part", None)
-    about = {"configuration": axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": found}
-    about |= provenance(axis, [part.sha256 for part in parts])
     date = recorded([_span(part) for part in parts])
-    noticed = [_named(event, part) for part in parts for event in part.of.noticed]
-    loop = RunLoop(
-        SuccessiveRecordings(sources, [part.shift for part in parts]), pipeline, to,
-        about=about, started=started, control=control, noticed=noticed, recorded=lambda _: date,
-    )  # fmt: skip
-    with moments_by(RunClock.of_kind("relative")):
-        return loop.run()
+    return ExaminedRecording(
+        axis,
+        SuccessiveRecordings(sources, [part.shift for part in parts]),
+        estimate,
+        found,
+        "relative",
+        lambda _: date,
+        [_named(event, part) for part in parts for event in part.of.noticed],
+        [part.sha256 for part in parts],
+    )
 
 
-def _prepared(axis: Axis) -> list[_Part]:
+def _prepared(axis: Axis) -> tuple[Axis, list[_Part]]:
+    """The parts, and the axis with names that all recordings have."""
     parts: list[_Part] = []
     for path in axis.source.logs:
         own = axis.model_copy(update={"source": axis.source.model_copy(update={"log": path})})
         with located(path):
-            log = configured_part(own, open_recording(own))
+            opened = open_recording(own)
+            if not parts:
+                axis, own = with_shared_names(axis, opened), with_shared_names(own, opened)
+            log = configured_part(own, opened)
             log = log.naming(list(dict.fromkeys([*axis.signals.named, *axis.monitoring.covariates])))
             settings = make_settings(own, log)
             if parts:
                 check_same(parts[0].log, parts[0].tracker.settings, log, settings)
+                settings = parts[0].tracker.settings
             sha256 = _sha256(path, parts)
             parts.append(_part(own, log, sha256, Tracker(settings), parts[-1].stop if parts else 0))
-    return parts
+    return axis, parts
 
 
 def _sha256(place: Location, before: Sequence[_Part]) -> str:
@@ -171,5 +175,5 @@ def _span(part: _Part) -> RecordedSpan:
 def _named(event: Event, part: _Part) -> Event:
     """The event of a recording in the numbers of the run."""
     name = part.log.path.name
-    details = event.details | {"recording": name}
-    return replace(event, sample=event.sample + part.shift, message=f"in {name}: {event.message}", details=details)
+    message = Message("in {recording}: {event}", recording=name, event=event)
+    return replace(event, sample=event.sample + part.shift, message=message)

@@ -6,9 +6,8 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import RecordSection
 from livebode.core import Event
-from livebode.runtime.sample_pipeline import SamplePipeline
 from livebode.sources.live import Health, LiveSource
 
 EVENTS_MAX = 64
@@ -25,7 +24,7 @@ class RunControl:
         self._lock = threading.Lock()
         self._events: list[Event] = []
         self._messages: list[tuple[str, str, dict[str, Any]]] = []
-        self._next: SamplePipeline | None = None
+        self._next: Any = None  # an Estimate, whose documents name this class
         self._record_section: RecordSection | None = None
         self._source: LiveSource | None = None
         self.ended = False
@@ -67,18 +66,18 @@ class RunControl:
         with self._lock:
             self._record_section = section
 
-    def change(self, pipeline: SamplePipeline, event: Event) -> None:
+    def change(self, estimate: Any, event: Event) -> None:
         """Finish the run after the present Block, with this event at its end, and continue in another one.
 
         The newest request is used.
         """
         with self._lock:  # at once: a Block between the two would follow the event
             self._messages.append((event.kind, event.message, dict(event.details)))
-            self._next = pipeline
+            self._next = estimate
 
     @property
     def changing(self) -> bool:
-        """Whether there is a pipeline to continue with."""
+        """Whether there is an estimate to continue with."""
         return self._next is not None
 
     @property
@@ -93,8 +92,8 @@ class RunControl:
         source = self.source
         return None if source is None else source.health
 
-    def take_next(self) -> SamplePipeline | None:
-        """The pipeline to continue with, once."""
+    def take_next(self) -> Any:
+        """The estimate to continue with, once; None if there is none."""
         with self._lock:
             taken, self._next = self._next, None
         return taken

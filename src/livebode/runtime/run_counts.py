@@ -6,10 +6,10 @@ import time
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
-from livebode.core import MatrixResponses, Responses
-from livebode.core.state import Stage, decode, encode, restore_parts
-from livebode.preparation.checks import ChannelCheck
+from livebode.core import Stage, decode, encode, restore_parts
+from livebode.preparation import ChannelCheck
 from livebode.runtime.continuing import PreviousRun
 from livebode.runtime.event_groups import EventGroups
 
@@ -56,11 +56,11 @@ class RunCounts:
     def run_s(self) -> float:
         return time.perf_counter() - self._started
 
-    def take(self, responses: Responses | MatrixResponses, tracked_s: float) -> None:
-        """Count the results of a step, and the tracker's processing time in seconds."""
-        self.responses += len(responses)
-        self.invalid += int(np.count_nonzero(~responses.valid.all(axis=tuple(range(1, responses.valid.ndim)))))
-        self.valid_lines += int(np.count_nonzero(responses.valid))
+    def take(self, valid: NDArray[np.bool_], tracked_s: float) -> None:
+        """Count the results of a step by where they are valid, and its processing time in seconds."""
+        self.responses += len(valid)
+        self.invalid += int(np.count_nonzero(~valid.all(axis=tuple(range(1, valid.ndim)))))
+        self.valid_lines += int(np.count_nonzero(valid))
         self.tracked_s += tracked_s
 
     def judge(self) -> None:

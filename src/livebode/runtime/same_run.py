@@ -8,8 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from livebode.configuration.axis import Axis
-from livebode.configuration.recorded import without_null
+from livebode.configuration import Axis, without_null
 from livebode.core import RecordError
 
 EARLIER = "earlier_versions"
@@ -80,6 +79,4 @@ def _configuration(summary: Mapping[str, Any]) -> tuple[dict[str, Any], bool]:
         axis = Axis.model_validate(given)
     except ValidationError:  # a demo, or another version has other keys
         return given, samples
-    # An earlier livebode recorded the paths of [monitoring] relative to the directory in which it was started.
-    axis = axis.model_copy(update={"monitoring": axis.monitoring.beside(Path())})
     return axis.model_dump(mode="json", by_alias=True, exclude_defaults=True), samples

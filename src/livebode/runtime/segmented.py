@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,47 +13,52 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
-from livebode.configuration.record_section import RecordSection
+from livebode.configuration import RecordSection
 from livebode.core import (
     Block,
     Channel,
     Event,
     LivebodeError,
-    MatrixResponses,
     RecordError,
-    Responses,
+    RunClock,
     Spectra,
     StateError,
     Stateful,
+    whole_files,
+    why,
+    writing,
 )
-from livebode.core.clock import RunClock
-from livebode.core.files import whole_files
-from livebode.core.writing import why, writing
-from livebode.records import COVARIANCE, MATRIX_RESPONSES, PARAMETERS, RESPONSES, RunRecord, to_json
-from livebode.records.inside import check_folder
-from livebode.records.matrix_run import is_matrix
-from livebode.records.removal import check_removable, remove
-from livebode.records.sample_table import samples_of
-from livebode.records.segments.journal import FOLDER
-from livebode.records.segments.limits import SegmentLimits
-from livebode.records.segments.lock import Lock
-from livebode.records.segments.shelf import Tiers, no_tiers
-from livebode.records.segments.store import Store
-from livebode.records.segments.writer import Writer
-from livebode.records.table_file import ColumnTable
-from livebode.records.tiers import Thinning
+from livebode.language import Message
+from livebode.records import (
+    FOLDER,
+    ColumnTable,
+    Lock,
+    RunRecord,
+    SegmentLimits,
+    Store,
+    Thinning,
+    Tiers,
+    Writer,
+    check_folder,
+    check_removable,
+    no_tiers,
+    remove,
+    remove_folder,
+    samples_of,
+    to_json,
+)
 from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
 from livebode.runtime.documents import Document, FitResults
 from livebode.runtime.run_control import StoppedError
 from livebode.runtime.same_run import check_same_run, earlier_versions
 from livebode.runtime.unwritten import Unwritten
+from livebode.sources.live import LiveSource
 
 FOUND_ON_THE_WAY = "clock", "left_out_samples", "numbering", "recorded"
 _PICTURES = "pictures"
 _INTERVAL_S = 0.5
 _PIECE_S = 0.25
 _AHEAD_S = 0.75  # tracking may be so far ahead of the record; with a piece 1 s: most data that a kill can cost
-_SEEN_AGAIN_BYTES = 256 << 20  # previous responses for a picture of a continued run, in addition to new ones
 
 
 class SegmentedRecord:
@@ -67,6 +73,8 @@ class SegmentedRecord:
         Directory of the run.
     section
         Settings of the record.
+    tables
+        Tables of the results.
     summary
         run.json at the beginning: configuration and findings.
     channels, rate_hz
@@ -85,6 +93,8 @@ class SegmentedRecord:
         Events that are not passed to `write_event` yet; they are stored with every commit.
     position
         Position of a live source, stored with every commit.
+    source
+        This source: what is recorded is reported to it.
     previous
         The run that this one continues with the next sample.
     """
@@ -94,6 +104,7 @@ class SegmentedRecord:
         path: Path,
         section: RecordSection,
         *,
+        tables: Mapping[str, ColumnTable],
         summary: Mapping[str, Any],
         channels: Sequence[Channel],
         rate_hz: float,
@@ -104,10 +115,11 @@ class SegmentedRecord:
         publish: Callable[[Event], None],
         waiting: Callable[[], Sequence[Event]] = tuple,
         position: StreamPosition | None = None,
+        source: LiveSource | None = None,
         previous: PreviousRun | None = None,
     ) -> None:
         self.path = path
-        self._position, self._waiting = position, waiting
+        self._position, self._source, self._waiting = position, source, waiting
         self._tracked: tuple[int, float] | None = None
         self._new, self._waited = False, waiting()
         self._first = (0, 0.0) if previous is None else (previous.sample, previous.time_s)
@@ -117,10 +129,12 @@ class SegmentedRecord:
         self._parts = dict(parts) | ({} if position is None else {SOURCE: position})
         self._force, self._again, self._ends, self._publish = force, again, ends, publish
         self._samples = samples_of(channels) if section.samples else None
-        tables = _tables(self._summary) | ({"samples": self._samples} if self._samples else {})
+        tables = dict(tables) | ({"samples": self._samples} if self._samples else {})
         self._reported: deque[Event] = deque()
         self._store = Store(path, tables, self._limits(section), self._reported.append, _tiers(self._summary))
         self._writer, self._unwritten = Writer(), Unwritten()
+        self._renewer, self._renewing = Writer(), threading.Lock()
+        self._renewed, self._to_renew = 0, 0
         self._due_from = 0
         self._piece = max(1, round(_PIECE_S * rate_hz))
         self._ahead_max = round(_AHEAD_S * rate_hz)
@@ -140,6 +154,7 @@ class SegmentedRecord:
                 self._due_from = self._store.last.sample if self._again else 0
             undo.callback(self._publish_reported)
             undo.callback(self._writer.wait)
+            undo.callback(self._renewer.wait)
             self._undo = undo.pop_all()
         self._begin_interval()
         self._publish_reported()
@@ -152,21 +167,23 @@ class SegmentedRecord:
 
     def take(self, document: Document) -> None:
         match document:
-            case Responses() if len(document):
-                self._unwritten.responses.append(document)
-            case MatrixResponses() if len(document):
-                self._unwritten.matrices.append(document)
-            case FitResults(parts):
-                self._unwritten.parameters.extend(part for part in parts if len(part))
             case Event():
                 self._unwritten.events.append(document)
                 self._new = True
+            case FitResults(parts):
+                self._unwritten.parameters.extend(part for part in parts if len(part))
+            case _:
+                self._unwritten.results.append(document)
 
     def stopped(self) -> Event:
         """Message for a run that stops here, before it is finished."""
         last = self._store.last
         assert last is not None
-        message = f"stopped at sample {last.sample}; the same command continues the run in {str(self.path)!r}"
+        message = Message(
+            "stopped at sample {at_sample}; the same command continues the run in {path}",
+            at_sample=last.sample,
+            path=repr(str(self.path)),
+        )
         return Event("record-stopped", last.sample, last.time_s, message)
 
     def limit(self, section: RecordSection) -> None:
@@ -181,18 +198,11 @@ class SegmentedRecord:
             budget_bytes=section.budget_bytes,
         )
 
-    def previous(self) -> Iterator[Responses]:
-        """The newest responses of the continued run."""
+    def previous(self) -> RunRecord | None:
+        """The record that it continues; None for a new one."""
         if self._continued or "continues" in self._more:
-            run = RunRecord.open(self.path, self._found_damaged)
-            newest = run.batches(_SEEN_AGAIN_BYTES)
-            yield next(newest, None) or run.responses()  # an empty batch contains the lines, unlike no run
-            yield from newest
-
-    def previous_matrices(self) -> Iterator[MatrixResponses]:
-        """The newest matrices of the continued run."""
-        if self._continued or "continues" in self._more:
-            yield from RunRecord.open(self.path, self._found_damaged, matrix=True).matrix_batches(_SEEN_AGAIN_BYTES)
+            return RunRecord.open(self.path, self._found_damaged, matrix=True)
+        return None
 
     @property
     def phase(self) -> float:
@@ -215,7 +225,9 @@ class SegmentedRecord:
     def renew(self, **found: Any) -> None:
         """Write findings during the run to run.json; if the disk is full, they are written at the end of the run."""
         self._more |= found
-        self._writer.add(partial(self._renew, self._named(self._summary)))
+        self._to_renew += 1
+        # run.json needs four syncs, for which no commit waits, except those of samples that it numbers.
+        (self._writer if "numbering" in found else self._renewer).add(self._renew)
 
     def pieces(self, block: Block) -> Iterator[Block]:
         """The samples of a Block that are not in the record yet, in pieces whose loss by a kill is short."""
@@ -271,12 +283,11 @@ class SegmentedRecord:
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
         """Draw the pictures, close open files and write run.json."""
-        check_folder(self.path, f".{_PICTURES}.partial/bode.png")  # rmtree would block at a pipe of that name
-        with (
-            writing(self.path, RecordError, unchanged=False),
-            whole_files(self.path, _PICTURES, locked=True) as folder,
-        ):
-            draw(folder)
+        check_folder(self.path, f".{_PICTURES}.partial/bode.png")
+        with writing(self.path, RecordError, unchanged=False):
+            remove_folder(self.path, f".{_PICTURES}.partial")  # the remainder of a kill
+            with whole_files(self.path, _PICTURES, locked=True) as folder:
+                draw(folder)
         self._wait()
         last = self._store.last
         assert last is not None
@@ -296,6 +307,8 @@ class SegmentedRecord:
 
     def _due(self, sample: int) -> bool:
         """Whether a commit is due when the next sample has this number."""
+        if self._source is not None and self._source.asks_commit:
+            return True
         limits = self._store.limits
         long = time.monotonic() - self._committed_s >= limits.interval_s
         return long or sample - self._committed >= limits.interval_samples
@@ -303,6 +316,8 @@ class SegmentedRecord:
     def _commit(self, sample: int, time_s: float) -> None:
         self._committed, self._committed_s = sample, time.monotonic()
         self._new, self._waited = False, self._waiting()
+        if self._source is not None:
+            self._source.asks_commit = False
         written, self._unwritten = self._unwritten, Unwritten()
         job = partial(self._write, written, sample, time_s, self._states(), self._waited)
         # A recording is read while its record is written; a machine is waited for.
@@ -312,14 +327,18 @@ class SegmentedRecord:
         self, written: Unwritten, sample: int, time_s: float, states: Mapping[str, bytes], waiting: Sequence[Event]
     ) -> None:
         written.write(self._store, self._samples)
-        self._store.commit(sample, time_s, states, waiting)
+        if self._store.commit(sample, time_s, states, waiting) and self._source is not None:
+            self._source.record(sample)
         self._reached = sample  # also if the record is paused: the store holds it, within its limit
 
-    def _renew(self, summary: dict[str, Any]) -> None:
-        with contextlib.suppress(LivebodeError):
-            self._store.renew(summary)
+    def _renew(self) -> None:
+        with self._renewing, contextlib.suppress(LivebodeError):
+            if self._renewed < self._to_renew:
+                self._renewed = self._to_renew
+                self._store.renew(self._named(self._summary))
 
     def _wait(self) -> None:
+        self._renewer.wait()
         self._writer.wait()
         self._writer.check()
         self._publish_reported()
@@ -351,12 +370,6 @@ class SegmentedRecord:
 
     def _named(self, summary: dict[str, Any]) -> dict[str, Any]:
         return self._more | summary
-
-
-def _tables(summary: Mapping[str, Any]) -> dict[str, ColumnTable]:
-    if is_matrix(summary):
-        return {"responses": MATRIX_RESPONSES, "covariance": COVARIANCE}
-    return {"responses": RESPONSES, "parameters": PARAMETERS}
 
 
 def _tiers(summary: Mapping[str, Any]) -> Tiers:

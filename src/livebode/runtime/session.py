@@ -10,10 +10,9 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 
-from livebode.configuration.axes import Axes, ConfigurationFile
-from livebode.configuration.axis import Axis
-from livebode.core import ConfigError, Event, LivebodeError
-from livebode.core.ending import ENDING, Handler, handled
+from livebode.configuration import Axes, Axis, ConfigurationFile
+from livebode.core import ENDING, ConfigError, Event, Handler, LivebodeError, handled
+from livebode.language import Message
 from livebode.runtime.allocation import FreeMemory, share_between_threads
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
@@ -143,14 +142,15 @@ class Session:
             changes = self._checked(axes)
             applied = self._prepare(axes)
         except (LivebodeError, MemoryError) as error:
-            why = str(error) or "there is not enough memory for it"
+            why = error if str(error) else "there is not enough memory for it"
             self._report_to_axes(
-                "configuration-refused", f"configuration rejected: {why}; the previous one stays active"
+                "configuration-refused",
+                Message("configuration rejected: {why}; the previous one stays active", why=why),
             )
             return
         if axes == {name: thread.axis for name, thread in self.threads.items()}:
             if asked:
-                self._report_to_axes("configuration-applied", "the configuration is the same", record=False)
+                self._report_to_axes("configuration-applied", Message("the configuration is the same"), record=False)
             return
         applied()
         self._apply(axes, changes)
@@ -164,7 +164,9 @@ class Session:
         self._reload_asked.set()
         if self._postponed != name:
             self._postponed = name
-            message = f"axis {name} was removed, its run is being finished; the configuration is applied after that"
+            message = Message(
+                "axis {axis} was removed, its run is being finished; the configuration is applied after that", axis=name
+            )
             self._report_to_axes("configuration-postponed", message, record=False)
 
     def _checked(self, axes: Axes) -> dict[str, ChangeRequest | None]:
@@ -194,13 +196,13 @@ class Session:
                 thread.axis = axes[name]
                 self._publish(name, change.event)
         for name in [name for name in self.threads if name not in axes]:
-            self._publish(name, Event("configuration-applied", 0, 0.0, "the axis was removed and ends"))
+            self._publish(name, Event("configuration-applied", 0, 0.0, Message("the axis was removed and ends")))
             self.taken_out.append(self.threads.pop(name))
             self.taken_out[-1].end()
         for name, axis in axes.items():
             old = self.threads.get(name)
             if old is None or (not old.alive and old.axis != axis):
-                self._publish(name, Event("configuration-applied", 0, 0.0, "the axis begins"))
+                self._publish(name, Event("configuration-applied", 0, 0.0, Message("the axis begins")))
                 self._add(name, axis, replaces=False).start()
 
     def _report_to_axes(self, kind: str, message: str, *, record: bool = True) -> None:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from livebode.core import Event, MatrixResponses, Responses
+from livebode.language import Message
 from livebode.runtime.fit_budget import FitBudget
 from livebode.sources.live import LiveSource
 
@@ -24,8 +25,8 @@ REPORT_S = 10.0
 class LoadShedding:
     """Decides which work a run has time for: always samples and responses, then monitoring, then fits.
 
-    If the sender waits, no samples can be lost and nothing is omitted, except after a request to end: then the backlog
-    is tracked as fast as possible.
+    Samples that are read on demand cannot be lost and nothing is omitted, except after a request to end: then the
+    backlog is tracked as fast as possible.
 
     Parameters
     ----------
@@ -49,11 +50,11 @@ class LoadShedding:
     @property
     def behind_s(self) -> float:
         """Backlog in seconds of machine time, if it can cause lost samples or delay the end."""
-        return self._source.waiting_s if not self._source.waits or self._ended() else 0.0
+        return self._source.waiting_s if self._limited else 0.0
 
     @property
     def _limited(self) -> bool:
-        return not self._source.waits or self._ended()
+        return not self._source.on_demand or self._ended()
 
     def monitors(self) -> bool:
         """Whether there is time for monitoring."""
@@ -99,16 +100,24 @@ class LoadShedding:
             if behind_s < ALARM_S:
                 return []
             self._alarm_since_s, self._longest_s = time_s, behind_s
-            message = (
-                f"tracking is {behind_s:.1f} s behind the machine; fits and monitoring are omitted, and samples are "
-                "lost when the queue is full; use a longer tracking.hop, fewer lines or fewer axes on this computer"
+            full = Message("samples are lost when the queue is full")
+            if self._source.waits:
+                full = Message("the sender waits when the queue is full")
+            message = Message(
+                "tracking is {backlog_s:.1f} s behind the machine; fits, and from 15 s on monitoring, are omitted; "
+                "{when_full}; {advice}",
+                backlog_s=behind_s,
+                when_full=full,
+                advice=self._source.backlog_cause.advice,
             )
-            return [Event("backlog", sample, time_s, message, {"backlog_s": behind_s})]
+            return [Event("backlog", sample, time_s, message)]
         self._longest_s = max(self._longest_s, behind_s)
         if behind_s > CLEARED_S:
             return []
         since_s, self._alarm_since_s = self._alarm_since_s, None
-        message = f"tracking has caught up; the largest backlog was {self._longest_s:.1f} s"
+        message = Message(
+            "tracking has caught up; the largest backlog was {longest_s:.1f} s", longest_s=self._longest_s
+        )
         details = {"backlog_s": behind_s, "longest_s": self._longest_s, "duration_s": time_s - since_s}
         return [Event("backlog-cleared", sample, time_s, message, details)]
 
@@ -118,6 +127,10 @@ class LoadShedding:
         fits, judged = self._left_out["fits"], self._left_out["monitoring"]
         details = {"fits": fits, "monitoring": judged, "first_response": self._since, "backlog_s": self.behind_s}
         self._reported_s, self._since, self._left_out = time_s, None, {"fits": 0, "monitoring": 0}
-        message = f"no time for the fits of {fits} responses" + f" and the monitoring of {judged}" * bool(judged)
-        message += "; a simpler model or a longer tracking.hop needs less"
+        omitted = Message("no time for the fits of {fits} responses", fits=fits)
+        if judged:
+            omitted = Message(
+                "no time for the fits of {fits} responses and the monitoring of {judged}", fits=fits, judged=judged
+            )
+        message = Message("{omitted}; a simpler model or a longer tracking.hop needs less", omitted=omitted)
         return [Event("thinned", sample, time_s, message, details)]

@@ -11,7 +11,7 @@ from livebode.runtime.event_groups import EventGroups
 from livebode.runtime.recorder import Recorder
 from livebode.sources.live import KINDS
 
-_URGENT = {"change", "backlog", "doubtful", "roles-doubtful", "window-doubtful", "baseline-unknown"}
+_URGENT = {"change", "backlog", "doubtful", "roles-doubtful", "window-doubtful", "baseline-unknown", "not-monitored"}
 _LOGGED_ELSEWHERE = {*KINDS, "configuration-applied", "configuration-refused"}
 _logger = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from livebode.core import LivebodeError
-from livebode.records.summary_file import read_summary
+from livebode.records import read_summary
 
 
 def newest(directory: Path) -> Path:

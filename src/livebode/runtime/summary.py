@@ -9,13 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.loop_report import loop_report
-from livebode.core import Lines, PlantKinds, Responses
-from livebode.core.clock import moment
-from livebode.core.state import ENCODING
-from livebode.estimation.stream_estimator import Follower
-from livebode.fitting import Fit, RecordingsMean
-from livebode.fitting.drift import Drift
+from livebode.analysis import loop_report
+from livebode.core import ENCODING, Lines, PlantKinds, Responses, moment
+from livebode.estimation import Follower
+from livebode.fitting import Drift, Fit, RecordingsMean
 from livebode.kernel import instruction_set
 from livebode.runtime.fits import Fits
 from livebode.runtime.run_counts import RunCounts

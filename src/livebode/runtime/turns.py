@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from contextvars import copy_context
 from math import inf
 
-from livebode.sources.live.datagrams import receiver
+from livebode.sources.live import receiver
 
 TICK_S = 0.1
 """An axis without samples has a step in this interval."""

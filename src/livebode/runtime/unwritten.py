@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
-from livebode.core import Block, Event, MatrixResponses, Parameters, Responses
-from livebode.records import as_batch, covariance_rows, matrix_rows, parameter_rows
-from livebode.records.sample_table import as_rows
-from livebode.records.segments.store import Store
-from livebode.records.table_file import ColumnTable
+from livebode.core import Block, Event, Parameters
+from livebode.records import ColumnTable, Store, as_rows, result_rows
 
 
 @dataclass(frozen=True)
@@ -16,8 +14,7 @@ class Unwritten:
     """Blocks, results and events since the last commit, each in its order."""
 
     blocks: list[Block] = field(default_factory=list)
-    responses: list[Responses] = field(default_factory=list)
-    matrices: list[MatrixResponses] = field(default_factory=list)
+    results: list[Any] = field(default_factory=list)
     parameters: list[Parameters] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
 
@@ -25,13 +22,9 @@ class Unwritten:
         """Write them with the next commit of the store; `samples` is the table of the blocks."""
         if self.blocks and samples is not None:
             store.write("samples", as_rows(self.blocks, samples))
-        if self.responses:
-            store.write("responses", as_batch(Responses.join(self.responses)))
-        if self.matrices:
-            matrices = MatrixResponses.join(self.matrices)
-            store.write("responses", matrix_rows(matrices))
-            store.write("covariance", covariance_rows(matrices))
-        for parameters in self.parameters:
-            store.write("parameters", parameter_rows(parameters))
+        joined = [type(self.results[0]).join(self.results)] if self.results else []
+        for results in (*joined, *self.parameters):
+            for table, rows in result_rows(results).items():
+                store.write(table, rows)
         for event in self.events:
             store.write_event(event)

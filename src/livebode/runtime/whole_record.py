@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self
 
-from livebode.configuration.record_section import RecordSection
-from livebode.core import Block, Event, MatrixResponses, Responses
-from livebode.records import RunDirectory
+from livebode.configuration import RecordSection
+from livebode.core import Block, Event
+from livebode.records import ColumnTable, RunDirectory, RunRecord
 from livebode.runtime.documents import Document, FitResults
 
 
@@ -21,11 +21,8 @@ class RecordInOnePiece:
     numbering = ()
     begun = None
 
-    def previous(self) -> Iterator[Responses]:
-        return iter(())
-
-    def previous_matrices(self) -> Iterator[MatrixResponses]:
-        return iter(())
+    def previous(self) -> RunRecord | None:
+        return None
 
     def pieces(self, block: Block) -> Iterator[Block]:
         yield block
@@ -55,9 +52,9 @@ class RecordInOnePiece:
 class WholeRecord(RecordInOnePiece):
     """Writes the documents of a run to a `RunDirectory`; an exception leaves nothing behind."""
 
-    def __init__(self, path: Path, *, force: bool, responses: bool = True, matrix: bool = False) -> None:
+    def __init__(self, path: Path, tables: Mapping[str, ColumnTable], *, force: bool) -> None:
         self.path = path
-        self._directory = RunDirectory(path, force=force, responses=responses, matrix=matrix)
+        self._directory = RunDirectory(path, tables, force=force)
 
     def __enter__(self) -> Self:
         self._directory.__enter__()
@@ -68,14 +65,13 @@ class WholeRecord(RecordInOnePiece):
 
     def take(self, document: Document) -> None:
         match document:
-            case Responses():
-                self._directory.write(document)
-            case MatrixResponses():
-                self._directory.write_matrices(document)
-            case FitResults(parts):
-                self._directory.write_parameters(*parts)
             case Event():
                 self._directory.write_event(document)
+            case FitResults(parts):
+                for part in parts:
+                    self._directory.write(part)
+            case _:
+                self._directory.write(document)
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
         self._directory.finish(summary, draw)

@@ -6,14 +6,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from livebode.core.model import Algebra
-from livebode.simulation.linear import StateSpace
+from livebode.arrays import Complex, Floats
+from livebode.core import Algebra
+from livebode.simulation._linear import StateSpace
 from livebode.simulation.settings import Drive, Sensor
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +22,7 @@ class ClosedLoop:
 
     Examples
     --------
-    >>> from livebode.simulation.linear import linear
+    >>> from livebode.simulation._linear import linear
     >>> from livebode.simulation.mechanics import Mechanics, Spans
     >>> from livebode.simulation.settings import Friction
     >>> belt = Mechanics()

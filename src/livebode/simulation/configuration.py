@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import SimulationError, UsageError
+from livebode.simulation._linear import StateSpace, linear
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.faults import Condition, Fault, SoftSpot, condition_at
-from livebode.simulation.linear import StateSpace, linear
 from livebode.simulation.mechanics import Mechanics, Spans
 from livebode.simulation.motion import Motion, Standstill
 from livebode.simulation.settings import Drive, Friction, Limits, Sensor
 from livebode.simulation.values import count, nonnegative
 
-Floats = NDArray[np.float64]
 SPOTS_MAX = 16
 RUN_IN_S_MAX = 600.0
 SUBSTEPS_MAX = 1000

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
 from livebode.simulation.mechanism import LinearMechanism
 from livebode.simulation.motor_loop import MotorLoop
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)

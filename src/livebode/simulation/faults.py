@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import UsageError
 from livebode.simulation.values import nonnegative, positive
-
-Floats = NDArray[np.float64]
 
 
 @dataclass

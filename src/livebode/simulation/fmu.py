@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -12,19 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, SimulationError, UsageError, nearest_name
-from livebode.core.installing import not_installed
+from livebode.arrays import Floats
+from livebode.core import Block, Channel, SimulationError, UsageError, nearest_name, not_installed, remove_created
 from livebode.simulation.configuration import controller_settings
+from livebode.simulation.controller import Controller, Now
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
 from livebode.simulation.divergence import diverged
 from livebode.simulation.motion import Motion, Standstill
 from livebode.simulation.settings import Drive, Limits, Sensor
-from livebode.simulation.twin import Controller, Now
 from livebode.simulation.values import positive
 
-Floats = NDArray[np.float64]
 _NO_FAULT = (1.0, 1.0, 1.0, 0.0, 1.0, 0.0)  # the FMU has its own
 
 
@@ -192,7 +189,7 @@ class _Instance:
         try:
             self._fmu = fmpy.simulation.instantiate_fmu(self._folder, description, "CoSimulation")
         except Exception as error:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            remove_created(Path(self._folder))
             raise SimulationError(
                 "fmu-unusable",
                 f"{path} cannot be started: {error}",
@@ -220,7 +217,7 @@ class _Instance:
         with suppress(Exception):
             self._fmu.terminate()
         self._fmu.freeInstance()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        remove_created(Path(self._folder))
 
 
 def _fmpy() -> Any:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
 
 _TERMS = 18  # of the series: the rest is below 1e-21 for a norm of at most 1/2
 

@@ -8,12 +8,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Lt
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Floats
 from livebode.core import SimulationError, UsageError
 from livebode.simulation.values import NonNegative, Positive, nonnegative, positive
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

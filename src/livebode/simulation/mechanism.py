@@ -5,12 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex, Floats
 from livebode.simulation.hold import held
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 class LinearMechanism(ABC):

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import UsageError
 from livebode.simulation.mechanism import LinearMechanism
 from livebode.simulation.motor_loop import MotorLoop
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

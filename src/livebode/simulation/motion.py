@@ -10,13 +10,11 @@ from math import ceil, inf, isnan, sqrt
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import UsageError
 from livebode.simulation.settings import Limits
 from livebode.simulation.values import NonNegative, Positive, nonnegative, positive
-
-Floats = NDArray[np.float64]
 
 
 class Motion(Protocol):

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import PID, Block, Channel, UsageError
 from livebode.simulation.mechanism import LinearMechanism
-
-Floats = NDArray[np.float64]
 
 _TOGETHER = 32  # ticks that one matrix product advances
 _AT_REST = 1e-7  # distance from 1 of an eigenvalue that is a position; a double one is off by 1e-8

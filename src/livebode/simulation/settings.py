@@ -136,8 +136,8 @@ class Drive:
         """Ticks during which one output of the position controller is held."""
         return round(self.rate_hz / self.position_rate_hz)
 
-    def loop(self) -> Loop:
-        """The description of this drive for an estimator.
+    def loop(self, *, velocity_differenced: bool = False) -> Loop:
+        """The description of this drive for an estimator; whether its velocity is a difference, the sensor decides.
 
         >>> Drive().loop().feedback_at(100.0).round(4)
         np.complex128(0.2309-0.0022j)
@@ -150,9 +150,8 @@ class Drive:
             delay_ticks=self.delay_ticks,
         )
         ratio = round(self.velocity_rate_hz / self.position_rate_hz)
-        return Loop(
-            Cascade(velocity, PID(gain=self.position_gain_per_s, rate_hz=self.position_rate_hz, rate_divider=ratio))
-        )
+        position = PID(gain=self.position_gain_per_s, rate_hz=self.position_rate_hz, rate_divider=ratio)
+        return Loop(Cascade(velocity, position, velocity_differenced))
 
 
 def _divides(slow_name: str, slow_hz: float, fast_name: str, fast_hz: float) -> None:

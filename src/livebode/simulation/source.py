@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Block, Channel, UsageError
 from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
@@ -17,8 +17,6 @@ from livebode.simulation.delivery import CHANNELS, checked_block_samples, delive
 from livebode.simulation.divergence import diverged
 from livebode.simulation.faults import Condition
 from livebode.simulation.truth import Truth
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,16 +6,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
+from livebode.simulation._linear import Sampled, StateSpace
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.faults import Condition
-from livebode.simulation.linear import Sampled, StateSpace
 
 if TYPE_CHECKING:
     from livebode.simulation.configuration import BeltAxis
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

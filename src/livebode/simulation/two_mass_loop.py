@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.simulation.hold import held
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 RATE_HZ = 4000.0
 JS, ML, KEFF, BS, R = 0.0028, 6.7, 5.0e5, 130.0, 0.019  # Table I at 0.8 m
 KVC, TI, KPC = 0.2308, 0.2, 1.0

@@ -1,10 +1,9 @@
-"""Where samples come from: recordings of every usual format, as Blocks."""
+"""Where samples come from: recordings of every usual format, as Blocks.
 
-from livebode.sources.log import Log
-from livebode.sources.opening import open_log
-from livebode.sources.recording import Skipped
-from livebode.sources.sinumerik import SinumerikSpectra, sinumerik_spectra
-from livebode.sources.steps import Gap
-from livebode.sources.timing import Timing
+A reader of another package (docs/how-to/plugin.md) is a `Format` with a subclass of `Recording`, or of
+`DelimitedRecording` for a text table; its errors are `damaged`, `truncated`, `oversized` and `missing`.
+"""
 
-__all__ = ["Gap", "Log", "SinumerikSpectra", "Skipped", "Timing", "open_log", "sinumerik_spectra"]
+from livebode.on_first_use import on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

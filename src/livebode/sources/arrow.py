@@ -11,10 +11,7 @@ from livebode.sources.recording import Recording
 def open_arrow(path: Path) -> Recording:
     """The recording in an Arrow file; ExtraError if PyArrow is not installed."""
     try:
-        from livebode.sources.arrow_ipc import ArrowRecording
+        from livebode.sources.pyarrow_files import ArrowRecording
     except ModuleNotFoundError as error:
         raise missing(path, "pyarrow", "parquet") from error
     return ArrowRecording(path)
-
-
-READER = open_arrow

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from livebode.core import RecordingError
+from livebode.tables import PACKED_MAX
 
 
 def damaged(message: str, **facts: object) -> RecordingError:
@@ -18,3 +21,10 @@ def truncated(message: str, **facts: object) -> RecordingError:
 def oversized(message: str, limit: int, **facts: object) -> RecordingError:
     """The error for more columns, parts or bytes than are read."""
     return RecordingError("too-large", message, "check that this is a recording", limit=limit, **facts)
+
+
+def check_packed(path: Path, values: int) -> None:
+    """RecordingError if a file declares more numbers than any compression fits into it."""
+    stored = path.stat().st_size
+    if 8 * values > PACKED_MAX * stored:
+        raise damaged(f"it declares {values} numbers in {stored} bytes", declared=values, size_bytes=stored)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -17,7 +18,8 @@ from livebode.sources.locate import locate
 from livebode.sources.recording import Chunk, Column, Recording, Skipped
 from livebode.sources.rows import ROW_BYTES_MAX, RowError, RowReader
 from livebode.sources.tidy import Tidied
-from livebode.sources.units import split_units
+from livebode.sources.timing import time_rank
+from livebode.sources.units import SECONDS, split_units
 from livebode.sources.whole_lines import whole_lines
 
 _PIECE_BYTES = 4 << 20
@@ -43,6 +45,11 @@ class DelimitedRecording(Recording):
             elif headings[at]:
                 skipped.append(Skipped(name, "it contains text"))
         self.columns, self.skipped = tuple(columns), tuple(skipped)
+        if self._dialect.period_s:
+            self.scalars = {"dt": self._dialect.period_s}
+        if columns and columns[0].unit.casefold() in SECONDS and all(time_rank(column) is None for column in columns):
+            # The time of an oscilloscope: "x-axis", "X" or "Source", above "second".
+            self.columns = (replace(columns[0], clock=True), *columns[1:])
 
     def find_dialect(self, path: Path) -> Dialect:
         """Layout of the table; a format that declares its own replaces this."""
@@ -93,6 +100,3 @@ class DelimitedRecording(Recording):
                 yield io.BufferedReader(Tidied(file, self._dialect), 1 << 20)
             else:
                 yield file
-
-
-READER = DelimitedRecording

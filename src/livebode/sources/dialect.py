@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from livebode.core import RecordingError
-from livebode.sources.cells import EMPTY, CellKind, is_comment, is_value, kind_of, zoned
+from livebode.sources.cells import EMPTY, CellKind, is_comment, is_number, is_value, is_word, kind_of, zoned
 from livebode.sources.comment_header import find_comment_header
 from livebode.sources.damage import oversized
-from livebode.sources.header import find_header, fits
+from livebode.sources.header import find_header, fits, no_values
+from livebode.sources.preamble import keyed_header, stated_period_s
 from livebode.sources.recording import COLUMNS_MAX
 
 SAMPLE_BYTES = 1 << 18
@@ -46,6 +47,8 @@ class Dialect:
         One for each column: its name including the unit, the unit from a row of units, and the kind of its values.
     zone
         Time zone of dates that contain one.
+    period_s
+        Time from sample to sample, as the lines above the table say.
     untidy
         True if there are comments between the rows, or a blank or Ctrl-Z at the end.
     ragged
@@ -62,6 +65,7 @@ class Dialect:
     units: tuple[str, ...] = ()
     kinds: tuple[CellKind, ...] = ()
     zone: str | None = None
+    period_s: float | None = None
     untidy: bool = False
     ragged: bool = False
 
@@ -167,7 +171,8 @@ def find_dialect(path: Path) -> Dialect:
     above = sample.text[: best.start.at]
     dialect = best.dialect if best.score[1] else with_comment_header(best.dialect, above)
     ends_by_word = not dialect.spaced and sample.end.rstrip().endswith(b"\nEOF")
-    return sample.placed(replace(dialect, ragged=ends_by_word), best.start)
+    period_s = dialect.period_s or stated_period_s(above)
+    return sample.placed(replace(dialect, ragged=ends_by_word, period_s=period_s), best.start)
 
 
 def ends_blank(end: bytes) -> bool:
@@ -243,7 +248,20 @@ def lay_out(lines: list[Line], delimiter: str, decimal: str) -> Layout | None:
     rows_like = [at for at, (_, cells) in enumerate(table) if len(cells) == width and numeric[at]]
     columns = [[table[at][1][column] for at in rows_like] for column in range(width)]
     kinds = tuple(kind_of(cells, decimal) for cells in columns)
-    start, header, units = find_header([cells for _, cells in table], kinds, decimal, trailing=not any(columns[-1]))
+    cells_of = [cells for _, cells in table]
+    trailing = not any(columns[-1])
+    start, header, units = find_header(cells_of, kinds, decimal, trailing=trailing, blank=without_values(columns))
+    if (last := last_words(cells_of, width, start, decimal)) is not None:
+        # A preamble as wide as the table: its cells do not show what the columns contain.
+        columns = [[cells[at] for cells in cells_of[last + 1 :] if len(cells) == width] for at in range(width)]
+        kinds = tuple(kind_of(cells, decimal) for cells in columns)
+        trailing = not any(columns[-1])
+        from_, blank = max(last - 1, 0), without_values(columns)
+        start, header, units = find_header(cells_of[from_:], kinds, decimal, trailing=trailing, blank=blank)
+        start += from_
+    keyed, keyed_units = keyed_header(cells_of[:start], width) if not any(columns[0]) else ([], [])
+    if keyed:
+        header, units = keyed, keyed_units
     rows = table[start:]
     share = round(values_share(columns, decimal) * fitting_share([cells for _, cells in table], kinds, decimal), 2)
     headings = tuple(heading or f"c{at}" for at, heading in enumerate(header or [""] * width, start=1))
@@ -251,7 +269,38 @@ def lay_out(lines: list[Line], delimiter: str, decimal: str) -> Layout | None:
     if len(kinds) > 1 and not any(columns[-1]) and not (header and header[-1]):  # each line ends with a delimiter
         kinds, headings = (*kinds[:-1], CellKind.TEXT), (*headings[:-1], "")
     dialect = replace(dialect, headings=headings, units=tuple(units or [""] * width), kinds=kinds, zone=zone)
+    dialect = without_statements(dialect, without_values(columns)) if header else dialect
     return Layout((share, bool(header), width), dialect, rows[0][0]) if rows else None
+
+
+def without_statements(dialect: Dialect, blank: list[int]) -> Dialect:
+    """The dialect without those blank columns whose heading or unit is a statement, as Rigol's Increment or "tInc = 1".
+
+    A column for the time is blank in such a table too.
+    """
+    kinds, headings, period_s = list(dialect.kinds), list(dialect.headings), dialect.period_s
+    for at in blank:
+        name, value = headings[at].casefold(), dialect.units[at]
+        period_s = float(value) if name == "increment" and is_number(value) else period_s
+        if is_number(value) or "=" in name or (name.startswith("time") and any("=" in one for one in dialect.headings)):
+            kinds[at], headings[at] = CellKind.TEXT, ""
+    return replace(dialect, kinds=tuple(kinds), headings=tuple(headings), period_s=period_s)
+
+
+def without_values(columns: list[list[str]]) -> list[int]:
+    """Columns without a value in the second half of the rows."""
+    return [at for at, cells in enumerate(columns) if not any(cells[len(cells) // 2 :])]
+
+
+def last_words(table: list[list[str]], width: int, start: int, decimal: str) -> int | None:
+    """The last row of words, as wide as the table, behind its supposed start and before most of its rows; else None."""
+    behind = range(start, len(table) - len(table) // 2)
+    words = [
+        at
+        for at in behind
+        if len(table[at]) == width and any(map(is_word, table[at])) and no_values(table[at], decimal)
+    ]
+    return words[-1] if words else None
 
 
 def with_blank_rows(table: list[tuple[Line, list[str]]], decimal: str) -> list[tuple[Line, list[str]]]:

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import Channel
 from livebode.sources.quantities import Quantity, derivative, product, quotient, sum_of
 from livebode.sources.units import split_unit
-
-Floats = NDArray[np.float64]
 
 TEXT_MAX, DEPTH_MAX = 200, 16
 _QUOTED = re.compile("`([^`]*)`")

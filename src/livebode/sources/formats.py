@@ -1,45 +1,54 @@
-"""Format of a file, detected from its content. A new format is one line in FORMATS."""
+"""Format of a file, detected from its content."""
 
 from __future__ import annotations
 
 import codecs
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
-from importlib import import_module
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from livebode.core import LivebodeError, RecordingError
 from livebode.locations import Location, shared_copy
-from livebode.sources.bag import parts_of
-from livebode.sources.dbc import no_frames
+from livebode.plugins import loaded, tables, wings_left_out
+from livebode.sources.naming import NAMED_BY_FILE, without_file
 from livebode.sources.recording import Recording, contained, located
-from livebode.sources.svdxdata import is_project
 
 HEAD_BYTES = 1024
-MDF_MAGIC = b"MDF     ", b"UnFinMF "
-ULOG_MAGIC = b"ULog\x01\x12\x35"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
 @dataclass(frozen=True)
 class Format:
-    """A format: its file name endings, a test of its first bytes, and the class that reads it.
+    """A format of recordings.
 
-    The class is named by module so that h5py and the like are imported only for the files that need them. With
-    `takes_dbc` it is called with the file that defines the signals in CAN frames, with `takes_directory` with the
-    directory of a bag whose first file it matches.
+    Attributes
+    ----------
+    title
+        Its name in messages.
+    suffixes
+        Endings of its files, for messages.
+    matches
+        Whether a file is in this format, from its first `HEAD_BYTES` bytes.
+    reader
+        "module:name" of what is called with the path and returns a `Recording`; h5py and the like are imported only
+        for the files that need them.
+    takes_dbc
+        It is also called with the file that defines the signals in CAN frames.
+    parts
+        "module:name" of what lists the files of a directory that is one recording, in their order; none of another
+        directory. The reader is called with the directory whose first file matches. Empty: a recording is one file.
     """
 
     title: str
     suffixes: tuple[str, ...]
     matches: Callable[[bytes], bool]
-    module: str
+    reader: str
     takes_dbc: bool = False
-    takes_directory: bool = False
+    parts: str = ""
 
     def open(self, path: Path, dbc: Path | None = None) -> Recording:
-        reader: Callable[..., Recording] = import_module(f"livebode.sources.{self.module}").READER
+        reader: Callable[..., Recording] = loaded(self.reader)
         if dbc is not None and not self.takes_dbc:
             raise no_frames(path, self.title)
         with contained(path, self.title):
@@ -58,28 +67,10 @@ def is_text(head: bytes) -> bool:
     return bool(head) and not any(byte < 9 or 13 < byte < 27 for byte in body)
 
 
-def is_xml(head: bytes) -> bool:
-    return head.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<")
-
-
-TWINCAT = re.compile(
-    rb"(?:\xef\xbb\xbf)?Name([\t;,|: ])[^\r\n]*\r?\n"
-    rb"(?:File|SymbolComment|Data-Type|SampleTime\[ms\]|NetI[dD]|SymbolName)\1"
-)
-"""First two lines of a TwinCAT export: of its file, or of its channels where the file's own lines were left out."""
-
-
-CODESYS = re.compile(rb"(?:\xef\xbb\xbf)?\[key\];[ \t]*\[value\]\s*\n")
-
-
 def is_wav(head: bytes) -> bool:
     return head.startswith((b"RIFF", b"RIFX", b"RF64")) and head[8:12] == b"WAVE"
 
 
-ASC_HEAD = re.compile(
-    rb"(?:\s*//[^\n]*\n)*\s*(?:date\s[^\n]*\n\s*)?base\s+(?:hex|dec)\s+timestamps\s+(\w+)", re.IGNORECASE
-)
-"""First lines of a text log of Vector, with the kind of its timestamps."""
 ARROW_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
 
 _FOREIGN = (
@@ -93,32 +84,42 @@ _FOREIGN = (
     (b"Rar!", "a RAR archive", "unpack it first"),
 )
 """What a person may name by mistake: first bytes, what it is, and what to do."""
+_NOT_A_TABLE = re.compile(
+    rb"(?:\xef\xbb\xbf)?(?:\s*<|LabVIEW Measurement|\[key\];[ \t]*\[value\]|"
+    rb"(?i:(?:\s*//[^\n]*\n)*\s*(?:date\s[^\n]*\n\s*)?base\s+(?:hex|dec)\s+timestamps)|"
+    rb"Name([\t;,|: ])[^\r\n]*\r?\n(?:File|SymbolComment|Data-Type|SampleTime\[ms\]|NetI[dD]|SymbolName)\1)"
+)
+"""Text of programs that is read as CSV with wrong names, or not at all, where the wing drives was left out."""
+_JSON = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:\{\s*\"|\[\s*[\[{\"])")
 _ZIPPED_OFFICE = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/")
 _NAME_IN_ZIP = 30  # where the name of its first file begins
 
+
+def _begins(magic: bytes | tuple[bytes, ...]) -> Callable[[bytes], bool]:
+    return lambda head: head.startswith(magic)
+
+
+def _own(reader: str) -> str:
+    return f"livebode.sources.{reader}"
+
+
 FORMATS = (
-    Format("Parquet", (".parquet", ".pq"), lambda head: head.startswith(b"PAR1"), "parquet"),
-    Format("Arrow", (".arrow", ".feather", ".ipc"), lambda head: head.startswith(ARROW_MAGIC), "arrow"),
-    Format("MATLAB", (".mat",), lambda head: head.startswith(b"MATLAB 5.0 MAT-file"), "matlab"),
-    Format("MATLAB 7.3", (".mat",), lambda head: head[512:].startswith(HDF5_MAGIC), "matlab73"),
-    Format("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), lambda head: head.startswith(HDF5_MAGIC), "hdf5"),
-    Format("NPZ", (".npz",), lambda head: head.startswith(b"PK\x03\x04"), "npz"),
-    Format("TDMS", (".tdms",), lambda head: head.startswith(b"TDSm"), "tdms"),
-    Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith(MDF_MAGIC), "mdf", takes_dbc=True),
-    Format("ULog", (".ulg", ".ulog"), lambda head: head.startswith(ULOG_MAGIC), "ulog"),
-    Format("WAV", (".wav",), is_wav, "wav"),
-    Format("MCAP", (".mcap",), lambda head: head.startswith(b"\x89MCAP0\r\n"), "mcap", takes_directory=True),
-    Format("ROS 2 bag", (".db3",), lambda head: head.startswith(b"SQLite format 3\0"), "rosbag", takes_directory=True),
-    Format("BLF", (".blf",), lambda head: head.startswith(b"LOGG"), "blf", takes_dbc=True),
-    Format("ASC", (".asc",), lambda head: ASC_HEAD.match(head) is not None, "asc", takes_dbc=True),
-    Format("TwinCAT Scope project", (".svdx",), is_project, "svdx"),
-    Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
-    Format("TwinCAT Scope export", (".csv", ".txt"), lambda head: TWINCAT.match(head) is not None, "twincat"),
-    Format("CODESYS trace", (".csv", ".txt"), lambda head: CODESYS.match(head) is not None, "codesys"),
-    Format("LabVIEW LVM", (".lvm",), lambda head: head.startswith(b"LabVIEW Measurement"), "lvm"),
-    Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, "delimited"),
+    Format("Parquet", (".parquet", ".pq"), _begins(b"PAR1"), _own("parquet:open_parquet")),
+    Format("Arrow", (".arrow", ".feather", ".ipc"), _begins(ARROW_MAGIC), _own("arrow:open_arrow")),
+    Format("MATLAB", (".mat",), _begins(b"MATLAB 5.0 MAT-file"), _own("matlab:MatlabRecording")),
+    Format("MATLAB 7.3", (".mat",), lambda head: head[512:].startswith(HDF5_MAGIC), _own("matlab73:Matlab73Recording")),
+    Format("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), _begins(HDF5_MAGIC), _own("hdf5:Hdf5Recording")),
+    Format("NPZ", (".npz",), _begins(b"PK\x03\x04"), _own("npz:NpzRecording")),
+    Format("TDMS", (".tdms",), _begins(b"TDSm"), _own("tdms:TdmsRecording")),
+    Format("WAV", (".wav",), is_wav, _own("wav:WavRecording")),
+    Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, _own("delimited:DelimitedRecording")),
 )  # fmt: skip
-"""All formats; the first that matches reads the file."""
+"""livebode's formats; of all, the first that matches reads the file."""
+
+
+def all_formats() -> list[Format]:
+    """All formats in the order in which they are tried: those of plug-ins first, because any text may be CSV."""
+    return [format_ for table in reversed(tables("readers")) for format_ in table]
 
 
 def open_recording(place: Location, dbc: Path | None = None) -> Recording:
@@ -135,24 +136,41 @@ def open_recording(place: Location, dbc: Path | None = None) -> Recording:
         Where the package that reads its format, or its storage, is not installed.
     """
     if isinstance(place, Path):
-        return _opened(place, dbc)
+        return _with_short_names(_opened(place, dbc))
     copy = shared_copy(place)
     with located(copy.path):
         recording = _opened(copy.path, dbc)
     recording.copy = copy
+    return _with_short_names(recording)
+
+
+def _with_short_names(recording: Recording) -> Recording:
+    """Names that contain that of the file, as dSPACE writes them, have an alias that other files have too."""
+    if recording.format not in NAMED_BY_FILE:
+        return recording
+    file, columns = recording.place.name, []
+    for column in recording.columns:
+        short = without_file(column.name, file)
+        aliases = column.aliases if short == column.name else (*column.aliases, short)
+        columns.append(replace(column, aliases=aliases))
+    recording.columns = tuple(columns)
     return recording
 
 
 def _opened(path: Path, dbc: Path | None) -> Recording:
     first, head = read_head(path)
     _refuse_foreign(first, head)
-    for format_ in FORMATS:
-        if format_.matches(head) and (format_.takes_directory or first == path):
+    formats = all_formats()
+    for format_ in formats:
+        if format_.matches(head) and (format_.parts or first == path):
+            if format_ is FORMATS[-1] and _NOT_A_TABLE.match(head) and wings_left_out("readers"):
+                break
             return checked(format_.open(path, dbc))
     path = first
     suffix = path.suffix.lower()
-    named = [format_.title for format_ in FORMATS if suffix in format_.suffixes]
-    if named:
+    named = [format_.title for format_ in formats if suffix in format_.suffixes]
+    left_out = " and ".join(wings_left_out("readers"))
+    if named and not left_out:
         raise RecordingError(
             "format-unknown",
             f"{path} is not {' or '.join(named)}, although its ending is {suffix}: it begins with {head[:8]!r}",
@@ -161,11 +179,13 @@ def _opened(path: Path, dbc: Path | None) -> Recording:
             suffix=suffix,
             beginning=head[:8].hex(),
         )
-    known = " ".join(dict.fromkeys(suffix for format_ in FORMATS for suffix in format_.suffixes))
+    known = " ".join(dict.fromkeys(suffix for format_ in formats for suffix in format_.suffixes))
     raise RecordingError(
         "format-unknown",
         f"the format of {path} is not supported (it begins with {head[:8]!r})",
-        f"convert it to one of: {known}",
+        f"install the wing {left_out} of livebode, or save its table as CSV"
+        if left_out
+        else f"convert it to one of: {known}",
         path=str(path),
         suffix=suffix,
         beginning=head[:8].hex(),
@@ -177,6 +197,8 @@ def _refuse_foreign(path: Path, head: bytes) -> None:
     found = next(((what, remedy) for magic, what, remedy in _FOREIGN if head.startswith(magic)), None)
     if head.startswith(b"PK\x03\x04") and head[_NAME_IN_ZIP:].startswith(_ZIPPED_OFFICE):
         found = "an Excel workbook (.xlsx) or another Office document", "save its table as CSV"
+    if _JSON.match(head):
+        found = "JSON, as of a configuration or of results", "name the recording itself"
     if found is not None:
         raise RecordingError(
             "format-unknown",
@@ -189,9 +211,9 @@ def _refuse_foreign(path: Path, head: bytes) -> None:
 
 
 def read_head(path: Path) -> tuple[Path, bytes]:
-    """The file, of a bag its first one, and its first bytes."""
+    """The file, of a directory that is one recording its first one, and its first bytes."""
     try:
-        path, *_ = parts_of(path)
+        path = _first_part(path) if path.is_dir() else path
         if path.exists() and not path.is_file():
             raise RecordingError(
                 "not-a-file", f"{path} is not a regular file", "write the recording to a file first", path=str(path)
@@ -210,6 +232,24 @@ def read_head(path: Path) -> tuple[Path, bytes]:
     if not head:
         raise RecordingError("empty", f"{path} is empty", "check that the recording is complete", path=str(path))
     return path, head
+
+
+def _first_part(directory: Path) -> Path:
+    for lister in dict.fromkeys(format_.parts for format_ in all_formats() if format_.parts):
+        for part in loaded(lister)(directory):
+            return Path(part)
+    raise RecordingError("not-a-file", f"{directory} is a directory", "name the file in it", path=str(directory))
+
+
+def no_frames(path: Path, title: str) -> RecordingError:
+    """The error for a DBC that is given with a file without CAN frames."""
+    return RecordingError(
+        "no-frames",
+        f"{path} is {title}, which has no CAN frames, but dbc is given",
+        "omit dbc, or check that the file is complete",
+        path=str(path),
+        argument="dbc",
+    )
 
 
 def checked(recording: Recording) -> Recording:

@@ -11,15 +11,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core.installing import not_installed
+from livebode.core import not_installed
 from livebode.sources.arrays import array_columns
 from livebode.sources.damage import oversized
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+from livebode.tables import PACKED_MAX
 
 UNIT_ATTRIBUTES = "unit", "units", "Unit", "Units"
 CHUNK_BYTES_MAX = 1 << 28
-PACKED_MAX = 100_000
-"""Highest plausible compression ratio of a recording; a dataset that declares more is damaged."""
+DEPTH_MAX = 32
+PARTS_MAX = 2 * COLUMNS_MAX
 
 
 class Hdf5Recording(Recording):
@@ -57,14 +58,27 @@ def datasets(file: Any) -> list[tuple[str, Any]]:
     """Path and dataset of everything in the file itself, each once."""
     h5py = import_h5py(Path(file.filename))
     found: list[tuple[str, Any]] = []
+    known = {h5py.h5o.get_info(file.id).addr}
 
-    def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset):
-            found.append((name, item))
-        if len(found) > COLUMNS_MAX:
-            raise oversized(f"the file has more than {COLUMNS_MAX} datasets", COLUMNS_MAX)
+    def visit(group: Any, place: str, depth: int) -> None:
+        if depth > DEPTH_MAX:
+            raise oversized(f"the file is nested deeper than {DEPTH_MAX} levels at {place!r}", DEPTH_MAX, part=place)
+        for name in group:
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                continue
+            item = group[name]
+            address = h5py.h5o.get_info(item.id).addr
+            if address in known:
+                continue
+            known.add(address)
+            if len(known) > PARTS_MAX:
+                raise oversized(f"the file has more than {PARTS_MAX} datasets and groups", PARTS_MAX)
+            if isinstance(item, h5py.Dataset):
+                found.append((f"{place}{name}", item))
+            elif isinstance(item, h5py.Group):
+                visit(item, f"{place}{name}/", depth + 1)
 
-    file.visititems(visit)
+    visit(file, "", 0)
     return found
 
 
@@ -120,6 +134,3 @@ def attribute_numbers(file: Any) -> dict[str, float]:
         if array.size == 1 and array.dtype.kind in "fiu":
             numbers[key] = float(array.ravel()[0])
     return numbers
-
-
-READER = Hdf5Recording

@@ -45,7 +45,7 @@ def check_line(path: Path, dialect: Dialect, columns: Sequence[int], number: int
         return RecordingError(
             "line-ragged",
             f"line {number} of {path} has {len(cells)} cells, the others {dialect.width}",
-            "repair or delete this line",
+            f"repair this line, or {_of_a_mark(dialect)}",
             path=str(path),
             line=number,
             cells=len(cells),
@@ -59,10 +59,21 @@ def check_line(path: Path, dialect: Dialect, columns: Sequence[int], number: int
             return RecordingError(
                 "cell-not-a-number",
                 f"line {number} of {path}, column {name!r}: {cell[:40]!r} is not a number",
-                "correct it or leave it empty",
+                "correct it, or leave it empty if this is not the time"
+                if any(is_number(other, dialect.decimal) or is_moment(other) for other in cells)
+                else _of_a_mark(dialect),
                 path=str(path),
                 line=number,
                 channel=name,
                 value=cell[:40],
             )
     return None
+
+
+def _of_a_mark(dialect: Dialect) -> str:
+    """Remedy for a line that a logger writes where samples are missing: without a time, it alone shows the gap."""
+    row = (" " if dialect.spaced else dialect.delimiter).join(["nan"] * dialect.width)
+    return (
+        f"delete this line if the time continues to rise behind it, replace it by {row!r} if there is no column of "
+        "time, or else split the file there"
+    )

@@ -9,12 +9,11 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, QuantityKind, RecordingError, UsageError
-from livebode.core.clock import ClockKind
+from livebode.core import Block, Channel, ClockKind, QuantityKind, RecordingError, UsageError
 from livebode.locations import Location
 from livebode.sources.computed import computed_blocks
 from livebode.sources.expressions import Expression
-from livebode.sources.naming import explained, found_channel, resolve
+from livebode.sources.naming import NAMED_BY_FILE, explained, found_channel, resolve, without_file
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
 
@@ -256,6 +255,15 @@ class Log:
             return bool(self._found([name]))
         except RecordingError:
             return False
+
+    def shared_name(self, name: str) -> str:
+        """The name without that of the file, if it still means the same: recordings of a series have it in common."""
+        short = without_file(name, self.path.name) if self.format in NAMED_BY_FILE else name
+        return short if short == name or (self.has(short) and self._means(short) == self._means(name)) else name
+
+    def _means(self, name: str) -> set[str]:
+        found = self._found([name])[name]
+        return {column.name for column in ([found] if isinstance(found, Column) else self._columns_of(found).values())}
 
     def naming(self, names: Sequence[str]) -> Log:
         """The same recording, whose `channels` also list these names: paths, aliases and expressions."""

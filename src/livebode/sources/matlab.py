@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.installing import needing
+from livebode.core import needing
 from livebode.sources.arrays import array_columns
 from livebode.sources.damage import oversized
 from livebode.sources.friendly import with_friendly_names
@@ -121,6 +121,3 @@ class MatlabCollector:
         self.arrays[name] = value
         if value.size == 1 and value.dtype.kind in "fiub":
             self.scalars[name] = float(value.ravel()[0])
-
-
-READER = MatlabRecording

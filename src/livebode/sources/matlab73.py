@@ -10,10 +10,8 @@ import numpy as np
 
 from livebode.sources.damage import oversized
 from livebode.sources.friendly import with_friendly_names
-from livebode.sources.hdf5 import add_dataset, dataset_chunks, import_h5py
+from livebode.sources.hdf5 import DEPTH_MAX, add_dataset, dataset_chunks, import_h5py
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
-
-DEPTH_MAX = 32
 
 
 class Matlab73Recording(Recording):
@@ -94,6 +92,3 @@ def text_of(item: Any) -> str:
     if item.size > 10_000 or item.dtype.kind not in "iu":
         return ""
     return "".join(chr(code) for code in np.asarray(item[()]).ravel().tolist() if 0 < code < 0x110000)
-
-
-READER = Matlab73Recording

@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import PurePath
 
 from livebode.core import RecordingError, nearest_name
 from livebode.sources.expressions import Expression, ExpressionSyntaxError, parse_expression
 from livebode.sources.recording import Column, Skipped
 from livebode.sources.units import split_unit
 
+NAMED_BY_FILE = ("mat", "csv", "parquet", "arrow", "npz", "hdf5")
+"""Formats of programs that name a variable as the file; elsewhere the beginning of a name is a topic or a group."""
 _WORD = re.compile(r"[\w.]+")  # without anything that computes
 
 
@@ -52,6 +55,15 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
     raise RecordingError(
         "channel-unknown", f"there is no channel {name!r}", nearest_name(name, names), channel=name, channels=names
     )
+
+
+def without_file(name: str, file: str) -> str:
+    """The name without that of the file at its beginning, or at that of a channel in an expression.
+
+    >>> without_file("meas1.Y(3).Data - meas1.Y(4).Data", "meas1.mat"), without_file("meas10.speed", "meas1.mat")
+    ('Y(3).Data - Y(4).Data', 'meas10.speed')
+    """
+    return re.sub(rf"(?<![\w.]){re.escape(PurePath(file).stem)}\.(?=\w)", "", name)
 
 
 @contextmanager

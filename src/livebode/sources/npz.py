@@ -121,6 +121,3 @@ def read_header(file: IO[bytes], info: zipfile.ZipInfo) -> Member:
             shape=list(shape),
         )
     return member
-
-
-READER = NpzRecording

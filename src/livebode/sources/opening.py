@@ -4,23 +4,37 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from livebode.core import QuantityKind, RecordingError, UsageError
-from livebode.core.clock import ClockKind
+from livebode.core import ClockKind, QuantityKind, RecordingError, UsageError
 from livebode.locations import Url, location
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import explained, in_file, resolve
 from livebode.sources.recording import Column, Recording, guarded, located
-from livebode.sources.timing import Clock, clock_from_time, find_time, rate_column, rate_in_column, rate_in_file
+from livebode.sources.timing import (
+    JITTER_MAX,
+    Clock,
+    clock_from_time,
+    find_time,
+    rate_column,
+    rate_in_column,
+    rate_in_file,
+)
 from livebode.sources.units import split_unit
 
 _logger = logging.getLogger(__name__)
+
+_FREQUENCY = re.compile(r"f|freq\w*|frequenz|hz|hertz", re.IGNORECASE)
+_HERTZ = ("", "hz", "khz", "mhz", "rad/s")
+_UNNAMED = re.compile(r"c\d+")  # of a table without a header
+_COLUMNS_TRIED = 8
+_STEP_S_MAX = 0.1  # of a time in seconds; larger steps are rather milliseconds
 
 
 def open_log(
@@ -154,14 +168,48 @@ def find_clock(
         return Clock(rate_hz, "given")
     stated = stated or rate_by_column(recording)
     if stated is None:
-        raise RecordingError(
-            "rate-missing",
-            f"{recording.path} has neither a time column nor a rate",
-            "give rate_hz, or name the time column",
-            path=str(recording.path),
-            argument="rate_hz",
-        )
+        raise without_rate(recording)
     return Clock(*stated)
+
+
+def without_rate(recording: Recording) -> RecordingError:
+    """The error of a recording without a rate: it may be a spectrum, or have a time whose name does not say so."""
+    path = str(recording.path)
+    starts = _starts(recording, recording.columns[:_COLUMNS_TRIED])
+    first = recording.columns[0]
+    if _FREQUENCY.fullmatch(first.name) and first.unit.casefold() in _HERTZ and _rises(starts[0]):
+        return RecordingError(
+            "spectrum",
+            f"{path} is a spectrum over {first.name!r} ({first.unit or 'no unit'}), not a recording of samples",
+            "record or export the samples over time",
+            path=path,
+            channel=first.name,
+        )
+    remedy, offered = "give rate_hz, or name the time column", None
+    for column, values in zip(recording.columns, starts):
+        steps = np.diff(values)
+        if _UNNAMED.fullmatch(column.name) and _rises(values) and np.ptp(steps) <= 2 * JITTER_MAX * steps.mean():
+            offered = f"{column.name} [{'ms' if steps.mean() >= _STEP_S_MAX else 's'}]"
+            remedy = f"give rate_hz; or name the time column: {column.name!r} rises evenly (time = {offered!r})"
+            break
+    message = f"{path} has neither a time column nor a rate"
+    return RecordingError("rate-missing", message, remedy, path=path, argument="rate_hz", time=offered)
+
+
+def _starts(recording: Recording, columns: Sequence[Column]) -> list[np.ndarray]:
+    """The first values of each column; none where it cannot be read."""
+    found = []
+    for column in columns:
+        try:
+            (values,) = next(guarded(recording.chunks([column], 1 << 10), recording.path, recording.format), [()])
+        except RecordingError:
+            values = ()
+        found.append(np.asarray(values[: 1 << 10], dtype=np.float64))
+    return found
+
+
+def _rises(values: np.ndarray) -> bool:
+    return values.size > 2 and bool(np.all(np.diff(values) > 0))
 
 
 def rate_by_column(recording: Recording) -> tuple[float, str] | None:

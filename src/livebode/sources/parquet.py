@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import ClassVar
 
 from livebode.sources.columnar import Content, StoredColumn, columns_of, scalars_of
+from livebode.sources.damage import check_packed
 from livebode.sources.extras import missing
 from livebode.sources.recording import Chunk, Column, Recording
-from livebode.tables import STRING
-from livebode.tables.parquet_file import ParquetFile
-from livebode.tables.parquet_format import WRITER
+from livebode.tables import STRING, WRITER, ParquetFile
 
 _END_BYTES = 1 << 16  # a footer ends with its writer, and three bytes for each column
 
@@ -30,6 +29,7 @@ class ParquetRecording(Recording):
             StoredColumn(one.name, Content.OTHER if one.kind == STRING else Content.NUMBER, one.kind, one.metadata)
             for one in schema
         ]
+        check_packed(path, rows * len(stored))
         self.columns, self.skipped = columns_of(stored, rows)
         self.scalars = scalars_of(schema.metadata.items())
         self._names = schema.names
@@ -55,7 +55,7 @@ def open_parquet(path: Path) -> Recording:
     if _is_own(path):
         return ParquetRecording(path)
     try:
-        from livebode.sources.foreign_parquet import ForeignParquetRecording
+        from livebode.sources.pyarrow_files import ForeignParquetRecording
     except ModuleNotFoundError as error:
         raise missing(path, "pyarrow", "parquet") from error
     return ForeignParquetRecording(path)
@@ -70,6 +70,3 @@ def _is_own(path: Path) -> bool:
             return ParquetFile(content).footer.writer == WRITER
         except ValueError:  # PyArrow reads more forms of a footer, and states what is wrong with it
             return False
-
-
-READER = open_parquet

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
 
 GAP_STEPS = 6.0
 """Steps, in the median of a clock, over which nothing is interpolated."""

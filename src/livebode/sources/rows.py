@@ -9,10 +9,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.kernel import MOMENT, NO_MOMENT, NUMBER, SKIPPED, TableLayout, read_rows
 from livebode.sources.cells import EMPTY, CellKind, is_number, moment_ns
 from livebode.sources.dialect import BLANK, Dialect
 from livebode.sources.recording import Chunk
+from livebode.tables import MOMENT, NO_MOMENT, NUMBER, SKIPPED, TableLayout, read_rows
 
 ROW_BYTES_MAX = 1 << 20
 _ROWS = 65528  # columns of so many doubles do not begin at the same place of a cache

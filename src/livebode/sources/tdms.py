@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core.installing import not_installed
+from livebode.core import not_installed
 from livebode.sources.damage import damaged, oversized, truncated
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 from livebode.sources.rounding import exact_rate_hz
@@ -109,6 +109,3 @@ def opened(path: Path) -> Iterator[Any]:
     # With a path it would read the index file next to it, which may belong to another recording.
     with path.open("rb") as raw, nptdms.TdmsFile.open(raw) as file:
         yield file
-
-
-READER = TdmsRecording

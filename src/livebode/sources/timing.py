@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import RecordingError, nearest_name
-from livebode.core.clock import ClockKind, clock_kind_of
+from livebode.core import ClockKind, RecordingError, clock_kind_of, nearest_name
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.steps import Gap, Steps

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, QuantityKind, RecordingError, UsageError
-from livebode.core.clock import ClockKind, clock_kind_of
+from livebode.arrays import Floats
+from livebode.core import Block, Channel, ClockKind, QuantityKind, RecordingError, UsageError, clock_kind_of
 from livebode.locations import Url, location
 from livebode.sources.expressions import Expression
 from livebode.sources.formats import open_recording
@@ -26,8 +26,6 @@ from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.stamps import Stamps, stamps_of
 from livebode.sources.timing import Clock, find_time, rate_in_file
 from livebode.sources.units import split_unit
-
-Floats = NDArray[np.float64]
 
 _ROWS = 1 << 14
 UNEVEN = "recording.clocks-differ", "recording.time-jitter", "recording.time-irregular"

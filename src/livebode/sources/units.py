@@ -6,7 +6,11 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from livebode.core import read_unit
+
 BRACKETED = re.compile(r"\[.*\]|\(.*\)")
+IN_UNIT = re.compile(r"(?:(?P<name>.*\S)\s+)?in (?P<unit>\S+)")
+"""A heading of Rohde & Schwarz: "in s", "C1 in V"."""
 OPENING = {"]": "[", ")": "("}
 
 UNIT_IN_FRONT = re.compile(r"(?P<unit>[mun]?s)_(?:today|time|timestamp)", re.IGNORECASE)
@@ -21,21 +25,34 @@ SECONDS = {
 """Length of each unit of time in seconds."""
 
 
+def is_unit(text: str) -> bool:
+    """Whether it is a usual unit: of time, of the kinds of quantities, or V.
+
+    >>> is_unit("mV"), is_unit("rad/s"), is_unit("sec"), is_unit("k"), is_unit("")
+    (True, True, True, False, False)
+    """
+    return text.casefold() in SECONDS or text in ("V", "mV") or read_unit(text).kind != "other"
+
+
 def split_unit(text: str) -> tuple[str, str]:
     """Name and unit of a heading; the unit is empty if there is none.
 
-    Square brackets may touch the name, round ones need a space before them; a number in brackets is an index. A unit
-    may contain brackets itself.
+    Square brackets may touch the name, round ones need a space before them or a usual unit in them; a number in
+    brackets is an index. A unit may contain brackets itself.
 
     >>> split_unit("speed [rad/s]"), split_unit("i_q (A)"), split_unit("u[2]"), split_unit("Y(1)")
     (('speed', 'rad/s'), ('i_q', 'A'), ('u[2]', ''), ('Y(1)', ''))
     >>> split_unit("a [m/(s^2)]"), split_unit("x (N (rms))")
     (('a', 'm/(s^2)'), ('x', 'N (rms)'))
+    >>> split_unit("Time(s)"), split_unit("C1 in V"), split_unit("in s"), split_unit("f(s)")
+    (('Time', 's'), ('C1', 'V'), ('time', 's'), ('f(s)', ''))
     """
     text = text.strip()
+    if (written := IN_UNIT.fullmatch(text)) and is_unit(written["unit"]):
+        return written["name"] or "time", written["unit"]
     at = last_bracket(text)
     name, unit = text[:at].rstrip(), text[at + 1 : -1].strip()
-    touches = len(name) == at
+    touches = len(name) == at and not (len(name) > 1 and is_unit(unit))
     if not name or (text[-1] == ")" and touches) or re.fullmatch(r"[\d\s,:;]+", unit):
         return text, ""
     return name, unit

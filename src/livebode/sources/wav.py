@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, ClassVar
 
-from livebode.core.installing import needing
+from livebode.core import needing
 from livebode.sources.damage import damaged, oversized, truncated
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording
 
@@ -126,6 +126,3 @@ def samples_at(order: str, format_: bytes, at: int, size: int, file_bytes: int) 
     if size % frame_bytes:
         raise damaged(f"its samples have {size} bytes, not a multiple of {frame_bytes}", size=size)
     return WavLayout(order, format_, at, frame_bytes, size // frame_bytes)
-
-
-READER = WavRecording

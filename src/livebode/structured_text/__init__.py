@@ -1,24 +1,5 @@
-"""IEC 61131-3 Structured Text: the excitation, the sliding DFT and the ring that livebode reads, as function blocks."""
+"""IEC 61131-3 Structured Text: valid names, pieces of text, and the excitation as a function block."""
 
-from livebode.structured_text.multisine import PERIOD_MAX, SMALLEST, multisine
-from livebode.structured_text.names import as_name, check_name
-from livebode.structured_text.project import Project, check_signals
-from livebode.structured_text.ring import ring_block, ring_type
-from livebode.structured_text.sliding_dft import sliding_dft
-from livebode.structured_text.text import check_rate
-from livebode.structured_text.twincat import twincat
+from livebode.on_first_use import on_first_use
 
-__all__ = [
-    "PERIOD_MAX",
-    "SMALLEST",
-    "Project",
-    "as_name",
-    "check_name",
-    "check_rate",
-    "check_signals",
-    "multisine",
-    "ring_block",
-    "ring_type",
-    "sliding_dft",
-    "twincat",
-]
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

@@ -32,7 +32,7 @@ def comment(text: str) -> str:
 
 
 def section(kind: str, declared: Iterable[Declared]) -> str:
-    """VAR_... to END_VAR, aligned."""
+    """Declarations from `VAR_…` to `END_VAR`, aligned."""
     rows = list(declared)
     width = min(max(len(name) for name, _, _ in rows), 14)
     types = max(len(of) for _, of, _ in rows) + 1

@@ -1,7 +1,10 @@
-"""Tables in memory: NumPy columns with a schema, and their exchange with all that reads Arrow."""
+"""Tables in memory, and their files: flat Parquet, messages of Arrow IPC and delimited text, by code of the house.
 
-from livebode.tables.schema import STRING, Field, Schema
-from livebode.tables.table import Table
-from livebode.tables.text import Text
+A table is NumPy columns with a schema; all that reads Arrow exchanges it without a copy. `from_numpy`, `text` and
+`to_numpy` convert columns to PyArrow's arrays and back. docs/decisions/0013-parquet-arrow-text.md says why the code is
+livebode's own; what is behind these names, no other package imports.
+"""
 
-__all__ = ["STRING", "Field", "Schema", "Table", "Text"]
+from livebode.on_first_use import on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.tables.record_batch import buffers_of
-from livebode.tables.schema import KINDS, STRING, Field, Schema
-from livebode.tables.table import Column, Table
-from livebode.tables.text import Text
+from livebode.tables.arrow_ipc import buffers_of
+from livebode.tables.table import KINDS, STRING, Column, Field, Schema, Table, Text
 
 try:
     import nanoarrow as na

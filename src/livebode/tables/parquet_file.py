@@ -14,11 +14,8 @@ from typing import BinaryIO
 import numpy as np
 
 from livebode.tables.parquet_footer import ColumnChunk, Footer, ParquetColumn, read_footer
-from livebode.tables.parquet_foreign import foreign_column
 from livebode.tables.parquet_pages import ForeignFormError, column_of, joined
-from livebode.tables.schema import STRING, Field, Schema
-from livebode.tables.table import Column, Table
-from livebode.tables.text import Text
+from livebode.tables.table import STRING, Column, Field, Schema, Table, Text
 
 _GROUP_VALUES_MAX = 1 << 27  # 1 GiB of numbers
 
@@ -95,7 +92,7 @@ class ParquetFile:
             try:
                 return column_of(self._bytes(chunk), chunk, column)
             except ForeignFormError as form:
-                return foreign_column(self.content, group, column.name, chunk.values, str(form))
+                return _foreign_column(self.content, group, column.name, chunk.values, str(form))
         except ValueError as error:
             raise ValueError(f"column {column.name!r} is not read: {error}") from None
 
@@ -110,3 +107,27 @@ def _as_found(field: Field, column: Column) -> Field:
     """Integers with nulls are doubles now."""
     kind = STRING if isinstance(column, Text) else column.dtype.name
     return field if kind == field.kind else Field(field.name, kind, field.metadata)
+
+
+def _foreign_column(content: bytes | BinaryIO, group: int, name: str, rows: int, form: str) -> Column:
+    """The values of a column with so many rows in a form that livebode does not write, by PyArrow.
+
+    Raises
+    ------
+    ValueError
+        If PyArrow is not installed, or does not find a value for each row; it begins with `form`, a sentence.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ModuleNotFoundError:
+        raise ValueError(f"{form}, which needs PyArrow: install livebode[parquet]") from None
+    source = io.BytesIO(content) if isinstance(content, bytes) else content
+    try:
+        file = pq.ParquetFile(source, page_checksum_verification=True)
+        found = Table.from_arrow(file.read_row_group(group, columns=[name], use_threads=False)).columns
+    except (pa.ArrowException, OSError, TypeError) as error:
+        raise ValueError(f"{form}, and PyArrow does not read it: {str(error).splitlines()[0]}") from None
+    if len(found) != 1 or len(found[0]) != rows:
+        raise ValueError(f"{form}, and has not one value for each row")
+    return found[0]

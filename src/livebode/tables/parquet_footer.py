@@ -14,9 +14,9 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
+from livebode.tables.arrow_ipc import schema_from_message
 from livebode.tables.parquet_format import ARROW_SCHEMA, BYTE_ARRAY, FORMS, MAGIC, OPTIONAL, REPEATED, REQUIRED
-from livebode.tables.schema import STRING, Field, Schema
-from livebode.tables.schema_message import schema_from_message
+from livebode.tables.table import STRING, Field, Schema
 from livebode.tables.thrift_compact import BINARY, I32, I64, LIST, STRUCT, Struct, decode, field
 
 _FOOTER_BYTES_MAX = 1 << 23
@@ -29,6 +29,8 @@ _TYPE, _REPETITION, _NAME, _CHILDREN, _CONVERTED = (
 )  # fmt: skip
 _LOGICAL = field(10, STRUCT)
 _WRITER, _KEY, _VALUE = field(6, BINARY), field(1, BINARY), field(2, BINARY)
+PACKED_MAX = 100_000
+"""Highest plausible compression ratio of a recording; what declares more is damaged."""
 _CHUNKS, _SIZE, _GROUP_ROWS = field(1, LIST), field(2, I64), field(3, I64)
 _OTHER_FILE, _ABOUT = field(1, BINARY), field(3, STRUCT)
 _CODEC, _VALUES, _UNCOMPRESSED, _COMPRESSED = field(4, I32), field(5, I64), field(6, I64), field(7, I64)
@@ -132,6 +134,8 @@ class Footer:
             raise ValueError(f"column {column.name!r} has {values} values in {self.groups[group].rows} rows")
         if not len(MAGIC) <= begin <= begin + stored <= self.begin:
             raise ValueError(f"column {column.name!r} is outside of the file")
+        if 8 * values > PACKED_MAX * stored:
+            raise ValueError(f"column {column.name!r} has {values} values in {stored} bytes")
         if column.kind is None or physical != FORMS[column.kind].physical:
             raise ValueError(f"column {column.name!r} is of type {physical}")
         return ColumnChunk(physical, codec, values, begin, stored)

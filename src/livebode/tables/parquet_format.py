@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from livebode.tables.schema import STRING
+from livebode.tables.table import STRING
 
 MAGIC = b"PAR1"
 ARROW_SCHEMA = "ARROW:schema"

@@ -26,12 +26,11 @@ from livebode.tables.parquet_format import (
     RLE_DICTIONARY,
     UNCOMPRESSED,
 )  # fmt: skip
-from livebode.tables.schema import STRING
-from livebode.tables.table import Column
-from livebode.tables.text import Text
+from livebode.tables.table import STRING, Column, Text
 from livebode.tables.thrift_compact import I32, STRUCT, Struct, decode, field
 
 _TEXT_BYTES_MAX = 1 << 26
+_WORDS_MAX = 1 << 20  # other programs limit a dictionary to 1 MiB
 _LZ4_RATIO_MAX = 255  # each byte of a block adds at most so many
 _KIND, _SIZE, _STORED, _CRC = (field(number, I32) for number in range(1, 5))
 _DATA, _DICTIONARY = field(5, STRUCT), field(7, STRUCT)
@@ -109,7 +108,8 @@ class _Pages:
         words = about.get(_VALUES, -1)
         if self._words is not None or about.get(_ENCODING) not in (PLAIN, PLAIN_DICTIONARY):
             raise ValueError("a column has two dictionaries, or one of an unknown encoding")
-        if not 0 <= words <= self._chunk.values:
+        # The words of categories are in every row group, also in one that has fewer rows.
+        if not 0 <= words <= max(self._chunk.values, _WORDS_MAX):
             raise ValueError(f"a dictionary declares {words} words")
         return self._plain(self._uncompressed(header, body, words), words)
 

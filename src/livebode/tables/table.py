@@ -1,16 +1,163 @@
-"""Table: NumPy columns of equal length with a schema."""
+"""Tables in memory: NumPy columns of equal length with names, kinds and units; text as few words that repeat."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.tables.schema import STRING, Field, Schema
-from livebode.tables.text import Text
+STRING = "string"
+KINDS = (
+    "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "float16", "float32", "float64",
+    STRING,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Field:
+    """A column.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    kind
+        Type of its values by the name that NumPy and Arrow share, such as "float64", "int64" or "bool"; or "string".
+    metadata
+        Further texts, such as its "unit".
+
+    Raises
+    ------
+    TypeError
+        If a column cannot have this kind.
+    """
+
+    name: str
+    kind: str
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise TypeError(f"column {self.name!r} is of type {self.kind}")
+
+    @cached_property
+    def dtype(self) -> np.dtype[Any]:
+        """Of NumPy; TypeError for text."""
+        return np.dtype(self.kind)
+
+
+@dataclass(frozen=True)
+class Schema:
+    """The columns of a table in order, and texts on the whole table. Iterate over it to get its fields."""
+
+    fields: tuple[Field, ...]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, **kinds: str) -> Schema:
+        """Columns without metadata.
+
+        >>> Schema.of(sample="int64", time_s="float64").names
+        ['sample', 'time_s']
+        """
+        return cls(tuple(Field(name, kind) for name, kind in kinds.items()))
+
+    @cached_property
+    def names(self) -> list[str]:
+        return [one.name for one in self.fields]
+
+    def field(self, name: str) -> Field:
+        """The column of this name; KeyError if there is none."""
+        return self.fields[self.place(name)]
+
+    def place(self, name: str) -> int:
+        """The number of a column; KeyError if there is none."""
+        for number, one in enumerate(self.fields):
+            if one.name == name:
+                return number
+        raise KeyError(name)
+
+    def __iter__(self) -> Iterator[Field]:
+        return iter(self.fields)
+
+    def __len__(self) -> int:
+        return len(self.fields)
+
+    def __arrow_c_schema__(self) -> object:
+        from livebode.tables.exchange import schema_to_arrow  # of the extra parquet
+
+        return schema_to_arrow(self).__arrow_c_schema__()
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """The word number `at[i]` in row i.
+
+    Attributes
+    ----------
+    words
+        Different words; some may be in no row.
+    at
+        Numbers of words, int32, shape (rows,).
+    """
+
+    words: tuple[str, ...]
+    at: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, words: Sequence[str], at: NDArray[np.integer[Any]] | None = None) -> Text:
+        """The word number `at[i]` in row i, or all words in order; they may repeat.
+
+        >>> Text.of(["Hz", "kg", "Hz"]).words, Text.of(["Hz", "kg", "Hz"], np.array([2, 1])).to_list()
+        (('Hz', 'kg'), ['Hz', 'kg'])
+        """
+        numbers: dict[str, int] = {}
+        unique = np.array([numbers.setdefault(word, len(numbers)) for word in words], dtype=np.int32)
+        return cls(tuple(numbers), unique if at is None else unique[at])
+
+    @classmethod
+    def join(cls, parts: Sequence[Text]) -> Text:
+        """The rows of all parts, one after the other."""
+        numbers: dict[str, int] = {}
+        rows = []
+        for part in parts:
+            new = np.array([numbers.setdefault(word, len(numbers)) for word in part.words], dtype=np.int32)
+            rows.append(new[part.at])
+        return cls(tuple(numbers), np.concatenate(rows) if rows else np.empty(0, np.int32))
+
+    def to_list(self) -> list[str]:
+        return [self.words[number] for number in self.at.tolist()]
+
+    def where(self, word: str) -> NDArray[np.bool_]:
+        """Whether each row has this word."""
+        found: NDArray[np.bool_] = self.at == (self.words.index(word) if word in self.words else -1)
+        return found
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.to_list())
+
+    @overload
+    def __getitem__(self, rows: int) -> str: ...
+    @overload
+    def __getitem__(self, rows: slice | NDArray[Any]) -> Text: ...
+    def __getitem__(self, rows: int | slice | NDArray[Any]) -> str | Text:
+        if isinstance(rows, int):
+            return self.words[int(self.at[rows])]
+        return Text(self.words, self.at[rows])
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the rows are equal."""
+        return isinstance(other, Text) and self.to_list() == other.to_list()
+
+    __hash__ = None  # type: ignore[assignment]
+
 
 Column = NDArray[Any] | Text
 """Numbers or truth values of shape (rows,), or text."""
@@ -48,9 +195,9 @@ class Table:
     def __post_init__(self) -> None:
         if len(self.columns) != len(self.schema) or len({len(column) for column in self.columns}) > 1:
             raise ValueError("the columns do not fit the schema, or differ in length")
-        for column, field in zip(self.columns, self.schema):
-            if not _is_of(column, field):
-                raise ValueError(f"column {field.name!r} is not of type {field.kind}")
+        for column, stated in zip(self.columns, self.schema):
+            if not _is_of(column, stated):
+                raise ValueError(f"column {stated.name!r} is not of type {stated.kind}")
 
     @classmethod
     def of(cls, columns: Mapping[str, Column]) -> Table:

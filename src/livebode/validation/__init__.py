@@ -1,22 +1,5 @@
 """Validation of fitted models on independent data."""
 
-from livebode.validation.correlation import LIMIT, SMALL, Correlation
-from livebode.validation.lines import FittedModel, LineValidation, fitted_model, validate_at_lines
-from livebode.validation.loop_equation import LoopResidual, LoopSignals
-from livebode.validation.loop_images import held_path
-from livebode.validation.validate import Validation, validate
+from livebode.on_first_use import on_first_use
 
-__all__ = [
-    "LIMIT",
-    "SMALL",
-    "Correlation",
-    "FittedModel",
-    "LineValidation",
-    "LoopResidual",
-    "LoopSignals",
-    "Validation",
-    "fitted_model",
-    "held_path",
-    "validate",
-    "validate_at_lines",
-]
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

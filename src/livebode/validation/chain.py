@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core.installing import needing
-from livebode.fitting.transfer import Transfer
+from livebode.arrays import Complex, Floats
+from livebode.core import needing
+from livebode.fitting import Transfer
 
 with needing("SciPy", "analysis", "a validation"):
     from scipy import linalg, signal
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def respond(

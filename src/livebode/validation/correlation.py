@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.installing import needing
+from livebode.arrays import Floats
+from livebode.core import needing
 
 with needing("SciPy", "analysis", "a validation"):
     from scipy import linalg, signal, stats
 
-Floats = NDArray[np.float64]
 
 LIMIT = 2.17
 """Normal quantile: 97 % are within this many sigma."""

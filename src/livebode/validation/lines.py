@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import Response, SignalError
-from livebode.core.installing import needing
+from livebode.arrays import Complex, Floats
+from livebode.core import Response, SignalError, needing, same_rate
 from livebode.fitting import CommonPoles, EvaluationGrid, Fit
 from livebode.validation.correlation import SMALL
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 LineVerdict = Literal["passes", "small error", "fails", "cannot be judged"]
 
 _ALPHA = 0.03
@@ -144,7 +141,7 @@ def validate_at_lines(model: FittedModel, response: Response, *, reason: str) ->
         If the rates differ, or there are fewer than two such lines with a known sigma.
     """
     lines = response.lines
-    if abs(lines.rate_hz / model.rate_hz - 1) > 1e-6:
+    if not same_rate(lines.rate_hz, model.rate_hz):
         raise SignalError(
             "rate-differs",
             f"the model was fitted at {model.rate_hz:g} Hz, and the response has {lines.rate_hz:g} Hz",

@@ -5,15 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import FitError, SignalError
-from livebode.fitting import Fit
-from livebode.fitting.physical import DELAY
-from livebode.fitting.transfer import Transfer
+from livebode.fitting import DELAY, Fit, Transfer
 from livebode.validation.chain import respond
-
-Floats = NDArray[np.float64]
 
 _STEP = 1e-3  # of a parameter's sigma
 _RINGS_OUT = 1e-12

@@ -18,7 +18,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.sources.live.hal_wiring import SAMPLER_KEY, STREAMER_KEY, fifo
+from livebode_drives.live.hal_wiring import SAMPLER_KEY, STREAMER_KEY, fifo
 from tests.support.peers.peer import program, until
 
 RATE_HZ = 4000
@@ -118,7 +118,9 @@ class Hal:
         self.process = subprocess.Popen(
             command, env=self._environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
         )
-        until(lambda: "t" in self.halcmd("-s", "show", "thread").split(), "the thread")
+        # Two programs that attach to HAL's new memory at once both initialise it, and the second wipes what the first
+        # loaded: only when the memory is there may another program start, and `load` waits until rtapi_app answers.
+        until(self._serves, "HAL's memory")
         for module in (
             f"sampler depth={self._depth} cfg=ffff", f"streamer depth={self._depth},{10 * DEPTH} cfg=f,f",
             "mux2", "sum2 count=3", "pid num_chan=1", "lowpass", "biquad",
@@ -128,6 +130,11 @@ class Hal:
                 env=self._environment, check=True, timeout=30, capture_output=True,
             )  # fmt: skip
         self.halcmd("-f", stdin=_STARTED)
+
+    def _serves(self) -> bool:
+        assert self.process.poll() is None, f"rtapi_app ended with {self.process.returncode}"
+        used = fifo(_HAL_KEYS[0])
+        return used is not None and used.users > 0
 
     def kill(self) -> None:
         """End rtapi_app as a fault does; its shared memory remains."""

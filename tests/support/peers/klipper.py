@@ -44,12 +44,16 @@ def measured(time_s: np.ndarray) -> np.ndarray:
 
 
 class Printer:
-    """Answers one client after the other. `time_s` is its print time, which only sending advances."""
+    """Answers one client after the other. `time_s` is its print time, which only sending advances.
 
-    def __init__(self, folder: Path, rate_hz: float = 3213.7) -> None:
+    With `numbered_hz` the acceleration in y is the print time times this rate.
+    """
+
+    def __init__(self, folder: Path, rate_hz: float = 3213.7, numbered_hz: float = 0.0) -> None:
         self.path = folder / "klippy_uds"
         self.rate_hz, self.time_s, self.overflows = rate_hz, 100.0, 0
-        self._moved_s = self.time_s
+        self._moved_s, self._numbered_hz = self.time_s, numbered_hz
+        self._templates: dict[str, Any] = {}
         self.answers: dict[str, Any] = {}
         """What is answered in place of the header, by the method."""
         self.settings = {"url": f"klipper:{self.path}"}
@@ -122,7 +126,8 @@ class Printer:
         """A batch of the accelerometer; print times are estimated, and a batch is off by up to a microsecond."""
         time_s = self.time_s + np.arange(BATCH) / self.rate_hz
         self.time_s += BATCH / self.rate_hz
-        rows = np.stack([time_s, measured(time_s), np.full(BATCH, -3.0), np.full(BATCH, 9810.0)], axis=1)
+        y = self._numbered_hz * time_s - 3.0
+        rows = np.stack([time_s, measured(time_s), y, np.full(BATCH, 9810.0)], axis=1)
         rows[:, 0] += 1e-6 * np.sin(self.time_s * 1e3)
         self.send("adxl345", {"data": np.round(rows, 6).tolist(), "overflows": self.overflows})
 

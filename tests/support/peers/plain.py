@@ -9,8 +9,7 @@ import sys
 import threading
 from pathlib import Path
 
-from livebode.sources.live import Batch, encode_layout, encode_samples
-from livebode.sources.live.ndjson import encode_line
+from livebode.sources.live import Batch, encode_layout, encode_line, encode_samples
 from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer, free_port, until
 
 

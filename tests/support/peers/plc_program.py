@@ -15,8 +15,8 @@ from pyads.testserver import PLCVariable
 
 from livebode.core import Lines
 from livebode.sources.live import Batch
-from livebode.sources.live.ring import FILETIME_1970
-from livebode.structured_text import Project
+from livebode_drives.live.ring import FILETIME_1970
+from livebode_drives.structured_text.project import Project
 from tests.support.peers.plc import AdsPeer
 from tools.structured_text import Instance, Machine
 from tools.structured_text.types import ULINT

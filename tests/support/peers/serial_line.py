@@ -11,8 +11,7 @@ import termios
 import time
 import tty
 
-from livebode.sources.live import Batch, encode_layout, encode_samples
-from livebode.sources.live.ndjson import encode_line
+from livebode.sources.live import Batch, encode_layout, encode_line, encode_samples
 from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, Peer, until
 
 _TIOCPKT_FLUSHREAD = 1

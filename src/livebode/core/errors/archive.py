@@ -24,7 +24,9 @@ class ArchiveError(LivebodeError):
         "cluster-lost": "The scheduler of the cluster does not answer any more.",
         "cluster-unreachable": "The scheduler of the cluster does not answer, or refuses the certificate.",
         "covariate-unknown": "No run has a covariate of that name.",
+        "foreign-files": "The directory of a table of the lake has files that livebode did not write.",
         "internal": "Tracking a recording ended with an internal error.",
+        "lake-damaged": "A table of the lake is damaged.",
         "lake-unusable": "A table of the lake cannot be read or written.",
         "machine-unknown": "No run of the lake is of that machine.",
         "memory-exceeded": "A recording needs more memory than a worker may use.",
@@ -37,6 +39,8 @@ class ArchiveError(LivebodeError):
         "recipe-unknown": "No run was tracked with these settings.",
         "recording-absent": "A recording that a baseline needs is at none of its places any more, or has changed.",
         "run-unknown": "A run that is excluded is not among those to learn from.",
-        "run-without-summary": "A run was tracked by an earlier livebode, which did not store its configuration.",
         "workers-lost": "The cluster has had no worker for two minutes.",
     }
+    temporary_codes: ClassVar[frozenset[str]] = frozenset(
+        {"changed-meanwhile", "cluster-lost", "cluster-unreachable", "lake-unusable", "process-ended", "workers-lost"}
+    )

@@ -2,8 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
+
+from livebode.language import Message
+
+_PASSING = frozenset(
+    getattr(errno, name, None)
+    for name in (
+        "ENOSPC", "EDQUOT", "EIO", "EROFS", "ESTALE",
+        "EAGAIN", "EBUSY", "EINTR", "ENOMEM", "ENOBUFS", "EMFILE", "ENFILE", "ETXTBSY",
+        "EADDRINUSE", "EADDRNOTAVAIL", "ENETDOWN", "ENETUNREACH", "ENETRESET", "EHOSTDOWN", "EHOSTUNREACH",
+        "ECONNREFUSED", "ECONNRESET", "ECONNABORTED", "ETIMEDOUT", "EPIPE", "ENODEV", "ENXIO",
+    )
+) - {None}  # fmt: skip
+"""Errors of the system that may pass: of a disk, of resources that others use now, of a network or a device."""
 
 
 class LivebodeError(ValueError):
@@ -30,6 +44,9 @@ class LivebodeError(ValueError):
         As given; each fact is also an attribute.
     place
         Where it was found, such as "axis.toml, axis x"; empty where the message contains it.
+    temporary
+        Whether the same request may succeed later, such as after a full disk or without a network. The command line
+        then ends with another exit code, so that a service is started again.
 
     Examples
     --------
@@ -43,6 +60,8 @@ class LivebodeError(ValueError):
 
     area: ClassVar[str] = ""
     codes: ClassVar[Mapping[str, str]] = {}
+    temporary_codes: ClassVar[frozenset[str]] = frozenset()
+    """Codes of what may pass without a change of the request; where it is not known, it is assumed to."""
 
     def __init__(self, code: str, message: str, remedy: str = "", **facts: object) -> None:
         super().__init__(code, message, remedy)
@@ -55,8 +74,15 @@ class LivebodeError(ValueError):
         cls.__module__ = "livebode"  # as users import it, and so as tracebacks name it
 
     def __str__(self) -> str:
-        place = f"{self.place}: " if self.place else ""
-        return f"{place}{self.message}; {self.remedy}" if self.remedy else f"{place}{self.message}"
+        return str(self.words)
+
+    @property
+    def words(self) -> str:
+        """The sentence with its facts, for `livebode.language.worded`."""
+        sentence = self.message
+        if self.remedy:
+            sentence = Message("{message}; {remedy}", message=self.message, remedy=self.remedy)
+        return Message("{place}: {sentence}", place=self.place, sentence=sentence) if self.place else sentence
 
     def __getattr__(self, name: str) -> Any:
         facts = self.__dict__.get("facts", {})
@@ -66,6 +92,10 @@ class LivebodeError(ValueError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuilt, (type(self), self.__dict__)
+
+    @property
+    def temporary(self) -> bool:
+        return self.code.partition(".")[2] in self.temporary_codes or self.facts.get("errno") in _PASSING
 
     def at(self, place: str) -> Self:
         """The same error with the place where it was found in front of its message."""

@@ -2,4 +2,4 @@
 
 
 class DamageWarning(UserWarning):
-    """A file of a run is damaged; its damaged part is left out, and the rest is read."""
+    """A file of a run or a lake is damaged; its damaged part is left out, and the rest is read."""

@@ -25,6 +25,7 @@ class FleetError(LivebodeError):
         "axis-failed": "The messages of an axis cannot be tracked with its configuration.",
         "axis-unknown": "The fleet has no axis of this path.",
         "axis-unnamed": "An axis of the fleet has no [machine] section, so its place in the log is not defined.",
+        "buffer-locked": "Another process uses the disk buffer of an edge.",
         "buffer-unusable": "The disk buffer of an edge cannot be read or written.",
         "cluster-open": "Others could join the servers of the log, because they have no TLS or no authority.",
         "credentials-unusable": "A file with the key of a user of the log cannot be used, or can be by others.",
@@ -45,5 +46,8 @@ class FleetError(LivebodeError):
         "server-open": "The server of the log would be open to a network without TLS or keys.",
         "servers-missing": "The log is to have more copies than there are servers.",
         "view-only": "The key of this user may read the log, and store nothing there.",
-        "workers-ended": "The workers of a fleet ended again and again while they started.",
+        "worker-not-started": "The system starts no process for a worker of a fleet.",
     }
+    temporary_codes: ClassVar[frozenset[str]] = frozenset(
+        {"buffer-locked", "buffer-unusable", "log-unreachable", "worker-not-started"}
+    )

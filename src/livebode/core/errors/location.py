@@ -38,3 +38,6 @@ class LocationError(LivebodeError):
         "not-uploaded": "A run was written, and could not be uploaded completely.",
         "scheme-unknown": "The first part of the URL names no storage that can be used here.",
     }
+    temporary_codes: ClassVar[frozenset[str]] = frozenset(
+        {"changed", "failed", "interrupted", "no-space", "not-reachable", "not-uploaded"}
+    )

@@ -52,3 +52,4 @@ class RecordError(LivebodeError):
         "unexpected-content": "A file of the run is whole, but contains what a run does not write.",
         "unreadable": "The system or a library cannot read a file of the run.",
     }
+    temporary_codes: ClassVar[frozenset[str]] = frozenset({"changed-meanwhile", "locked"})

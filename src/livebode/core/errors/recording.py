@@ -49,6 +49,7 @@ class RecordingError(LivebodeError):
         "rate-missing": "Neither the file nor the call gives the sampling rate.",
         "recording-repeated": "Two recordings of one run have the same content.",
         "recordings-differ": "Recordings of one run differ in their rate, units, window or lines.",
+        "spectrum": "The file is a table over the frequency, not over the time.",
         "table-missing": "The file is text without rows of numbers.",
         "time-irregular": "The time column is not regular apart from whole missing samples, or has too many gaps.",
         "time-jitter": "The time column jitters too much for a spectrum.",

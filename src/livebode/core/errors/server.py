@@ -35,3 +35,4 @@ class ServerError(LivebodeError):
         "run-unknown": "A run of this name is not in the directory that is served.",
         "too-many-tries": "Wrong tokens came too often from this address.",
     }
+    temporary_codes: ClassVar[frozenset[str]] = frozenset({"busy", "not-started", "port-taken"})

@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from livebode.core.errors.base import LivebodeError
+from livebode.language import Message
 
-ANY_EXCITATION = "for noise or a single chirp set tracking.estimator to 'lpm' (--estimator lpm)"
+ANY_EXCITATION = Message(
+    "for noise or a single chirp, with power in a whole band, set tracking.estimator to 'lpm' (--estimator lpm)"
+)
 """Remedy for an excitation that does not repeat."""
 
 

@@ -41,3 +41,4 @@ class SourceError(LivebodeError):
         "spectrum-misplaced": "A spectrum ends at a sample that does not fit the hop.",
         "value-invalid": "A value in a message of the sender is not of its type, or out of range.",
     }
+    temporary_codes: ClassVar[frozenset[str]] = frozenset({"no-samples", "not-found"})

@@ -23,7 +23,7 @@ class StateError(LivebodeError):
         "damaged": "The state is not as it was written, or incomplete.",
         "newer-version": "The state was written by a newer version of livebode.",
         "not-a-state": "The bytes are not a state that livebode wrote.",
-        "older-version": "The state was written by an older version of livebode, and cannot be converted.",
+        "older-version": "The state was written by an older version of livebode.",
         "other-settings": "The state belongs to a stage with other settings.",
         "other-stage": "The state belongs to another stage.",
     }

@@ -1,10 +1,9 @@
 // @ts-check
 // Rows of the lists of alarms and events, and of their history.
 import { hourMinute, moment } from "./clock.js";
-import { dated } from "./dated.js";
 import { tr } from "./language.js";
 import { element } from "./make.js";
-import { recognised } from "./recognition.js";
+import { worded } from "./worded.js";
 
 /** @import { Alarm, Notice, Transition } from "./messages.js" */
 /** @typedef {{label: string, words: string, act: () => void, disabled?: boolean}} Act */
@@ -129,8 +128,8 @@ export function noticeRow(notice, nowS, acts) {
     alarm?.at_s ?? lastS,
     [
       ...chip,
-      element("span", { class: "kind" }, recognised(kind)),
-      dated(notice),
+      element("span", { class: "kind" }, worded(kind)),
+      worded(notice.words),
       ...remarks(notice, nowS).map((text) => element("span", { class: "often" }, text)),
     ],
     acts,
@@ -149,8 +148,8 @@ export function historyRow(transition) {
     [
       element("span", { class: "state" }, count > 1 ? `${WHAT[what]} · ${count} ×` : WHAT[what]),
       " ",
-      element("span", { class: "kind" }, recognised(kind)),
-      dated(transition),
+      element("span", { class: "kind" }, worded(kind)),
+      worded(transition.words),
       ...(person ? [element("span", { class: "often" }, person)] : []),
     ],
     [],

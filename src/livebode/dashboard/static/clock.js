@@ -2,7 +2,7 @@
 // Times of a run: time of day in the viewer's zone or in UTC if the run has a clock, otherwise, or as an option, the
 // run's own time.
 import { chosen, remember } from "./address.js";
-import { language } from "./language.js";
+import { language, numeral } from "./language.js";
 import { fixed } from "./words.js";
 
 /** @typedef {"zone" | "utc" | "run"} Shown The browser's zone, UTC, or the time since the start of the run. */
@@ -149,7 +149,7 @@ export const printTime = () => full(new Date());
 /** @param {Date} date */
 const full = (date) => `${day(date)} ${timeOfDay(date, 0)} ${zone(date)}`;
 
-// As recorded sentences have it, whose translations find a date by its form.
+// Parts of a date, for its form in the language.
 const RECORDED = /** @type {Intl.DateTimeFormatOptions} */ ({
   year: "numeric",
   month: "2-digit",
@@ -164,9 +164,16 @@ const RECORDED = /** @type {Intl.DateTimeFormatOptions} */ ({
  * @param {number} unixS
  */
 export function recordedTime(unixS) {
-  if (choice() === "run") return `${(wallS(ofUnix(unixS))).toFixed(1)} s`;
-  const date = new Date(1000 * unixS);
-  return `${format("recorded", "sv-SE", RECORDED).format(date)} ${zone(date)}`;
+  if (known() && shown === "run") return `${numeral(wallS(ofUnix(unixS)).toFixed(1))} s`;
+  const date = new Date(1000 * unixS),
+    parts = format("recorded", "sv-SE", RECORDED).formatToParts(date),
+    found = Object.fromEntries(parts.map(({ type, value }) => [type, value]));
+  return language.date
+    .replace("%Y", found.year)
+    .replace("%m", found.month)
+    .replace("%d", found.day)
+    .replace("%H:%M:%S", `${found.hour}:${found.minute}:${found.second}`)
+    .replace("%Z", zone(date));
 }
 
 /**

@@ -17,6 +17,7 @@ import { printed } from "./printed.js";
 import { copyLink } from "./shared.js";
 import { table } from "./table.js";
 import { nextTheme } from "./theme.js";
+import { worded } from "./worded.js";
 import { fixed } from "./words.js";
 import { nextClock } from "./zone.js";
 
@@ -245,7 +246,7 @@ export function controls(
   /** @param {number} i */
   const nth = (i) => () => {
     const q = page.facts?.begun && page.facts.quantities[i];
-    if (q) watch(q.name, q.why_not);
+    if (q) watch(q.name, worded(q.why_not));
   };
   keys(
     $("keys-list"),

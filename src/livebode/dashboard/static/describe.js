@@ -3,8 +3,8 @@
 import { moment } from "./clock.js";
 import { tr, trn } from "./language.js";
 import { ofLoop } from "./marks.js";
-import { recognised } from "./recognition.js";
 import { angle, frequency, level } from "./values.js";
+import { worded } from "./worded.js";
 import { hertz, plain } from "./words.js";
 
 /** @import { Bode } from "./bode.js" */
@@ -65,7 +65,7 @@ function describeTrends({ items, span, title }) {
     }
     const values = seen.map((i) => v[i]),
       times = { from: moment(t[seen[0]], true), to: moment(t[seen[seen.length - 1]], true) },
-      [low, high] = [plain(Math.min(...values)), `${plain(Math.max(...values))} ${recognised(unit)}`.trim()];
+      [low, high] = [plain(Math.min(...values)), `${plain(Math.max(...values))} ${worded(unit)}`.trim()];
     const reach = tr("between {low} and {high}", { low, high });
     label(host, text(title(name), words.textContent ?? "", tr("{from} to {to}", times), reach));
   }
@@ -90,7 +90,7 @@ export function describe(page, { bode, tracking, map, trends }) {
       label(map.canvas, map.words);
       return;
     }
-    const of = `${recognised(page.quantity ?? "")} ${bode.symbol}`,
+    const of = `${worded(page.quantity ?? "")} ${bode.symbol}`,
       band = tr("{from} to {to}", { from: frequency(lines[0], view), to: frequency(lines[lines.length - 1], view) }),
       curve = text(of, trn("{n} line", "{n} lines", lines.length), band),
       time = tr("at {time}", { time: moment(bode.curves.measured?.frame?.timeS[0], true) }),

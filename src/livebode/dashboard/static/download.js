@@ -1,6 +1,6 @@
 // @ts-check
 // Downloads: the exact numbers from the server, and their menu.
-import { address } from "./link.js";
+import { address, refusal } from "./link.js";
 import { element } from "./make.js";
 
 /**
@@ -19,7 +19,7 @@ export function save(name, blob) {
  */
 export async function numbers(query, name) {
   const answer = await fetch(address("/api/export", query));
-  if (!answer.ok) throw new Error((await answer.json()).error);
+  if (!answer.ok) throw await refusal(answer);
   save(name, await answer.blob());
 }
 

@@ -3,12 +3,12 @@
 
 import { chosen, remember } from "./address.js";
 import { chatters, historyRow, noticeRow, open } from "./alarmrows.js";
-import { dated } from "./dated.js";
 import { tr, trn } from "./language.js";
 import { post, reason } from "./link.js";
 import { choose, element, segments } from "./make.js";
 import { askPerson, storedName } from "./person.js";
 import { roving } from "./roving.js";
+import { worded } from "./worded.js";
 
 /** @import { Notice, Transition } from "./messages.js" */
 /** @typedef {"all" | "alarms" | "history"} View */
@@ -228,7 +228,7 @@ export class Events {
   acts(notice) {
     const { alarm, cause, count, seen } = notice;
     if (!alarm || alarm.state === "normal") return [];
-    const message = dated(notice);
+    const message = worded(notice.words);
     const acts = [];
     if (seen < count && open(alarm))
       acts.push({
@@ -289,7 +289,7 @@ export class Events {
     if (!notice || notice.seen >= notice.count || this.waiting.has(cause)) return;
     let answer = { by: storedName(), words: "" };
     if (!answer.by || commenting) {
-      const given = await askPerson(tr("Acknowledge"), dated(notice), "comment");
+      const given = await askPerson(tr("Acknowledge"), worded(notice.words), "comment");
       this.list.focus();
       if (!given) return;
       answer = given;
@@ -320,7 +320,7 @@ export class Events {
     const known = shelved && storedName();
     const answer = known
       ? { by: known, words: "", minutes: 0 }
-      : await askPerson(title, dated(notice), shelved ? "comment" : "reason");
+      : await askPerson(title, worded(notice.words), shelved ? "comment" : "reason");
     this.list.focus();
     if (!answer) return;
     const { by, words, minutes } = answer;

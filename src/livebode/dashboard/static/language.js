@@ -1,6 +1,6 @@
 // @ts-check
 // The language of the page: sentences by their English text, and numbers. The server selects the catalogue from the
-// choice in the help, `[serve] language` or the language of the browser. Its own messages stay English; see recognition.js.
+// choice in the help, `[serve] language` or the language of the browser. For its messages see worded.js.
 
 /**
  * @typedef {object} Catalogue
@@ -9,7 +9,6 @@
  * @property {string} date for strftime
  * @property {string} plural digit n is the plural form for n < 200; from there on they repeat every hundred
  * @property {Record<string, string | string[]>} messages
- * @property {[english: string, translation: string][]} recorded
  * @property {Record<string, string>} languages their names by code
  */
 
@@ -20,7 +19,6 @@ const ENGLISH = {
   date: "%Y-%m-%d %H:%M:%S %Z",
   plural: "",
   messages: {},
-  recorded: [],
   languages: { en: "English" },
 };
 const SHOWN = ["title", "aria-label", "placeholder"];
@@ -61,7 +59,7 @@ export function choose(code) {
  * @param {string} text
  * @param {Values} values
  */
-export const filled = (text, values) => text.replace(/\{(\w+)\}/g, (_all, name) => String(values[name]));
+export const filled = (text, values) => text.replace(/\{(\w+)(?::[^{}]*)?\}/g, (_all, name) => String(values[name]));
 
 /**
  * The sentence in the language of the page; `text` is a literal, which `make catalogues` finds here.

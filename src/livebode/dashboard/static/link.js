@@ -1,6 +1,7 @@
 // @ts-check
 // The web socket: reconnects with increasing delay, sends requests of the page, distributes the messages.
 import { framesOf } from "./frames.js";
+import { worded } from "./worded.js";
 
 /** @import { Frame, News, ClientRequest } from "./messages.js" */
 
@@ -88,7 +89,7 @@ export const address = (path, query) =>
 export async function ask(path, query) {
   const answer = await fetch(address(path, query));
   if (answer.status === 401) location.reload();
-  if (!answer.ok) throw new Error((await answer.json()).error);
+  if (!answer.ok) throw await refusal(answer);
   return answer.arrayBuffer();
 }
 
@@ -109,5 +110,15 @@ export async function post(path, body) {
     headers: { "content-type": "application/json" },
     body: JSON.stringify(body),
   });
-  if (!answer.ok) throw new Error((await answer.json()).error);
+  if (!answer.ok) throw await refusal(answer);
+}
+
+/**
+ * The error of an answer, in the language of the page.
+ *
+ * @param {Response} answer
+ */
+export async function refusal(answer) {
+  const { error, words } = await answer.json();
+  return new Error(worded(words ?? error));
 }

@@ -1,8 +1,8 @@
 // @ts-check
 // The token is sent once, in the body of a POST; the answer is a cookie that scripts cannot read.
 import { tr } from "./language.js";
+import { refusal } from "./link.js";
 import { byId } from "./make.js";
-import { recognised } from "./recognition.js";
 import { applyTheme } from "./theme.js";
 
 applyTheme();
@@ -16,5 +16,5 @@ byId("form").addEventListener("submit", async (event) => {
   }).catch(() => null);
   token.value = "";
   if (answer?.ok) location.replace("/");
-  else byId("wrong").textContent = answer ? recognised((await answer.json()).error) : tr("The server does not answer.");
+  else byId("wrong").textContent = answer ? (await refusal(answer)).message : tr("The server does not answer.");
 });

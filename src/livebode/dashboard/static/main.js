@@ -22,7 +22,6 @@ import { isMargin, Margins, marginWords } from "./margins.js";
 import { Matrix } from "./matrix.js";
 import { past } from "./past.js";
 import { readout } from "./readout.js";
-import { recognised } from "./recognition.js";
 import { References } from "./references.js";
 import { Rows } from "./rows.js";
 import { Saved } from "./saved.js";
@@ -38,6 +37,7 @@ import { lamp } from "./verdict.js";
 import { viewMenu } from "./view-menu.js";
 import { Wall } from "./wall.js";
 import { WhatIfCard } from "./whatif-card.js";
+import { worded } from "./worded.js";
 import { named } from "./words.js";
 import { zoneChoice } from "./zone.js";
 
@@ -130,7 +130,7 @@ const timeline = new Timeline(
 
 /** @param {string} text */
 function complain(text) {
-  $("notice").textContent = recognised(text);
+  $("notice").textContent = text;
   $("notice").hidden = !text;
   clearTimeout(page.silence);
   page.silence = setTimeout(() => {
@@ -147,7 +147,7 @@ const link = new Link({
     const beginning = news.facts ? news : null;
     // Until the facts of the axis in the address arrive, what comes belongs to another one.
     if (beginning ? overtaken(beginning) || elsewhere(beginning) : !page.facts) return;
-    if (news.error) complain(news.error);
+    if (news.error) complain(worded(news.words ?? news.error));
     if (news.span && setClock(news.span.clock, news.span.start_s ?? 0)) newClock();
     if (beginning) begin(beginning);
     if (news.span) {
@@ -275,8 +275,8 @@ function begin({ facts, axes, trends }) {
     $("quantities"),
     facts.quantities.map(({ name, symbol, why_not: why }) => ({
       value: name,
-      text: `${recognised(name)} ${symbol}`,
-      why: why && recognised(why),
+      text: `${worded(name)} ${symbol}`,
+      why: why && worded(why),
     })),
     page.quantity,
     watch,
@@ -305,7 +305,7 @@ function begin({ facts, axes, trends }) {
   margins.begin(trends, whyNoMargins(facts));
   marginTrends.begin(trends);
   events.begin(facts.axis, facts.role === "operator" && facts.live);
-  const remarks = [gone ? REFERENCE_GONE : "", refused, facts.remark].filter(Boolean);
+  const remarks = [gone ? REFERENCE_GONE : "", refused, worded(facts.remark)].filter(Boolean);
   if (remarks.length) complain(remarks.join(" "));
   if (timeline.atS !== null) showMoment(timeline.atS);
   if (facts.watched !== page.quantity) watchShown();
@@ -317,9 +317,7 @@ function begin({ facts, axes, trends }) {
  */
 function whyNot({ quantities }, quantity) {
   const why = quantities.find(({ name }) => name === quantity)?.why_not;
-  return why
-    ? `${recognised(quantity)}: ${recognised(why)}`
-    : tr("{quantity} is not a quantity of this page.", { quantity });
+  return why ? `${worded(quantity)}: ${worded(why)}` : tr("{quantity} is not a quantity of this page.", { quantity });
 }
 
 // Another axis was chosen, whose machine may not have sent anything: clear the page.
@@ -366,7 +364,7 @@ const watchShown = () => link.request({ kind: "watch", axis: page.axis, quantity
  */
 function watch(quantity, why) {
   if (why) {
-    complain(`${recognised(quantity)}: ${recognised(why)}`);
+    complain(`${worded(quantity)}: ${why}`);
     return;
   }
   if (quantity === page.quantity) return;

@@ -2,9 +2,9 @@
 // The margins of the loop with their bounds; small ones are marked.
 import { tr } from "./language.js";
 import { element } from "./make.js";
-import { recognised } from "./recognition.js";
 import { Series } from "./series.js";
 import { bounded } from "./trends.js";
+import { worded } from "./worded.js";
 import { hertz, pair, plain } from "./words.js";
 
 /** @import { AtLines, Trend } from "./messages.js" */
@@ -82,7 +82,7 @@ export class Margins {
             none ? tr("no limit") : `${bounded(value, found.s[row], found.unit)}${mark ? ` ⚠ ${tr("small")}` : ""}`,
           ),
           element("td", {}, Number.isFinite(at) ? `${plain(at, 3)} Hz` : ""),
-          element("td", {}, none ? tr("no crossing") : recognised(found.status[row])),
+          element("td", {}, none ? tr("no crossing") : worded(found.status[row])),
         ),
       );
     }

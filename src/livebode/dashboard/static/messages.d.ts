@@ -61,13 +61,13 @@ export interface Run extends Axis {
   window: number;
   quantity: Quantity;
   /** `units` are those of the quantity times (jω)^n, n = −2 … 2. */
-  quantities: { name: Quantity; symbol: string; unit: string; units: string[]; why_not: string }[];
+  quantities: { name: Quantity; symbol: string; unit: string; units: string[]; why_not: Words }[];
   /** Channels by role. */
   signals: Record<string, string | null>;
   schedule: string;
   model: string;
   baseline: boolean;
-  remark: string;
+  remark: Words;
   /** of an entry of a matrix run; null of any other run */
   matrix: MatrixNames | null;
 }
@@ -155,6 +155,16 @@ export interface AlarmFacts {
   entry?: string;
 }
 
+/** A fact of a message; a number as formatted in English. */
+export type Fact =
+  | Words
+  | { number: string }
+  | { list: Fact[] }
+  | { unix_s: Sent; text: string };
+
+/** A message of the server: its template and its facts, or a plain text; see worded.js. */
+export type Words = string | [template: string, facts: Record<string, Fact>];
+
 /** The most important thing on an axis; see verdict.py. */
 export interface Verdict {
   tone: "alarm" | "check" | "ok" | "open";
@@ -164,8 +174,7 @@ export interface Verdict {
   seconds: Sent;
   facts: AlarmFacts;
   message: string;
-  /** times of day in it, and their seconds since 1970; see message_times.py */
-  times?: [text: string, unixS: number][];
+  words: Words;
   count: number;
   cause: string;
   /** set by the page: not of the axis that is shown */
@@ -198,8 +207,7 @@ export interface Transition {
   cause: string;
   kind: string;
   message: string;
-  /** times of day in it, and their seconds since 1970; see message_times.py */
-  times?: [text: string, unixS: number][];
+  words: Words;
   what: string;
   state: string;
   by: string;
@@ -214,8 +222,7 @@ export interface Notice {
   kind: string;
   kinds: string[];
   message: string;
-  /** times of day in it, and their seconds since 1970; see message_times.py */
-  times?: [text: string, unixS: number][];
+  words: Words;
   first_s: number;
   last_s: number;
   count: number;
@@ -245,6 +252,7 @@ export interface Beginning {
 /** A message; `newest` are the newest rows of the parameters. */
 export type News = (Beginning | { facts?: undefined }) & {
   error?: string;
+  words?: Words;
   span?: Span;
   health?: Health;
   notices?: Notice[];
@@ -309,7 +317,8 @@ export interface LoopBand {
   lines_hz: number[];
   dropped: number;
   confidence: number;
-  places: { re: number[]; im: number[]; radius: number[] }[];
+  /** `rise`: above the lines, the factor by which a resonance that they permit exceeds the fall. */
+  places: { re: number[]; im: number[]; radius: number[]; rise: number[] }[];
   parts: LoopParts;
 }
 
@@ -327,7 +336,7 @@ export interface LoopFacts {
   frequency_hz: number[];
   parts: LoopParts;
   band: LoopBand | null;
-  band_why_not: string;
+  band_why_not: Words;
   /** Of `livebode tune`; without gains where the run has only its filters. */
   proposed: {
     gains: Record<string, number> | null;
@@ -336,7 +345,7 @@ export interface LoopFacts {
   } | null;
 }
 
-export type LoopAnswer = (LoopFacts & { why_not: "" }) | { why_not: string; described?: undefined };
+export type LoopAnswer = (LoopFacts & { why_not: "" }) | { why_not: Words; described?: undefined };
 
 /** A step with its band; without one where a plant within the bounds may be unstable. */
 export interface StepBand {

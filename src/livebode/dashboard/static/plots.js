@@ -4,7 +4,7 @@ import { moment } from "./clock.js";
 import { tr, trn } from "./language.js";
 import { byId as $ } from "./make.js";
 import { legendOf } from "./picture.js";
-import { recognised } from "./recognition.js";
+import { worded } from "./worded.js";
 import { fixed } from "./words.js";
 
 /** @import { Page } from "./messages.js" */
@@ -27,7 +27,7 @@ export function plots(page, { bode, tracking, map }) {
     const count = facts?.begun ? facts.frequency_hz.length : 0;
     const lines = trn("{n} line", "{n} lines", count),
       span = tr("{from} to {to}", { from: moment(tracking.fromS, true), to: moment(tracking.toS, true) });
-    const of = `${facts?.name ?? ""}: ${recognised(page.quantity ?? "")}`;
+    const of = `${facts?.name ?? ""}: ${worded(page.quantity ?? "")}`;
     const common = { note: `livebode ${facts?.begun ? facts.version : ""}`, legend: () => [] };
     if (name === "tracking") {
       const tracked = tr("tracking"),

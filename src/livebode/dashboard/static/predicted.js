@@ -1,9 +1,9 @@
 // @ts-check
 // The margins of a loop from its measured plant, as measured and of the worst plant within its bounds: the definitions of
-// livebode.tuning.predicted and livebode.margins.stability, so that the numbers are those of `livebode tune`.
+// livebode_control.tuning.predicted and livebode.margins.stability, so that the numbers are those of `livebode tune`.
 
 /** @import { Numbers } from "./curves.js" */
-/** A curve of L with the radius that contains it, at the frequencies of the band. @typedef {{re: Float64Array, im: Float64Array, radius: Float64Array}} Disc */
+/** A curve of L with the radius that contains it, at the frequencies of the band, and the rise above the lines. @typedef {{re: Float64Array, im: Float64Array, radius: Float64Array, rise: Numbers}} Disc */
 /** Infinite where nothing limits it. @typedef {{bandwidthHz: number, gainMarginDb: number, phaseMarginDeg: number, ms: number, disk: number}} Predicted */
 
 const EDGES = 24;
@@ -26,7 +26,8 @@ const HALF_POWER_DB = 20 * Math.log10(Math.SQRT2);
 export function predicted(hz, places, known, worst) {
   const found = places.map((place) => {
     const radius = worst ? place.radius : new Float64Array(place.radius.length),
-      disc = { re: place.re.subarray(0, known), im: place.im.subarray(0, known), radius: radius.subarray(0, known) };
+      [re, im] = [place.re, place.im].map((all) => all.subarray(0, known)),
+      disc = { re, im, radius: radius.subarray(0, known), rise: [] };
     return {
       bandwidthHz: bandwidth(hz, disc),
       gainMarginDb: gainMargin(disc),
@@ -147,9 +148,15 @@ export function stable(hz, { re, im }) {
 export const keepsClear = (places, known) =>
   places.every(({ re, im, radius }) => re.subarray(0, known).every((v, i) => length(1 + v, im[i]) > radius[i]));
 
-/** The largest |L| above the lines, where no phase is known. @param {Disc[]} places @param {number} known */
+/** The largest |L| of every resonance that the lines permit above them, where no phase is known. @param {Disc[]} places @param {number} known */
 export const largestAbove = (places, known) =>
-  Math.max(0, ...places.flatMap(({ re, im }) => Array.from(re.subarray(known), (v, i) => length(v, im[known + i]))));
+  Math.max(0, ...places.flatMap(({ rise, ...loop }) => fall(loop, known).map((size, i) => size * rise[i])));
+
+/** The largest |L| above the lines if there is no resonance. @param {Disc[]} places @param {number} known */
+export const largestFall = (places, known) => Math.max(0, ...places.flatMap((loop) => fall(loop, known)));
+
+/** @param {{re: Float64Array, im: Float64Array}} loop @param {number} known */
+const fall = ({ re, im }, known) => Array.from(re.subarray(known), (v, i) => length(v, im[known + i]));
 
 /** The same if |L| is up to `largest`, below 1, with any phase at other frequencies. @param {Predicted} found @param {number} largest @returns {Predicted} */
 export const withUnknown = (found, largest) => ({

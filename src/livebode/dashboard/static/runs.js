@@ -4,7 +4,6 @@ import { chosen as fromAddress, remember } from "./address.js";
 import { language, tr, trn } from "./language.js";
 import { reason } from "./link.js";
 import { byId as $, element } from "./make.js";
-import { recognised } from "./recognition.js";
 import { askDeletion, dialogs, editNotes } from "./runs_dialogs.js";
 import { RunsFeed } from "./runs_feed.js";
 import { found, ORDERS, ordered, since, words } from "./runs_search.js";
@@ -27,7 +26,7 @@ const chosen = new Set();
 search.value = fromAddress("find", "");
 const feed = new RunsFeed(draw, (error) => {
   $("notice").hidden = error === null;
-  if (error !== null) $("notice").textContent = recognised(reason(error));
+  if (error !== null) $("notice").textContent = reason(error);
 });
 
 /** @type {import("./runs_table.js").Actions} */

@@ -3,7 +3,6 @@
 import { tr } from "./language.js";
 import { post, reason } from "./link.js";
 import { byId as $ } from "./make.js";
-import { recognised } from "./recognition.js";
 import { size } from "./runs_words.js";
 
 /** @import { RunRow } from "./runs_feed.js" */
@@ -57,7 +56,7 @@ async function tried(path, body, place) {
     await post(path, body);
     return true;
   } catch (error) {
-    $(place).textContent = recognised(reason(error));
+    $(place).textContent = reason(error);
     return false;
   }
 }

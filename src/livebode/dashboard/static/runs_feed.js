@@ -9,6 +9,7 @@ import { ask } from "./link.js";
  * @property {number | null} written seconds since 1970
  * @property {number} size_bytes
  * @property {string} message
+ * @property {import("./messages.js").Words} said the message
  * @property {string} machine
  * @property {string} recording
  * @property {string} signals

@@ -2,9 +2,9 @@
 // The table of the runs.
 import { tr } from "./language.js";
 import { element } from "./make.js";
-import { recognised } from "./recognition.js";
 import { tagWord } from "./runs_search.js";
 import { began, bounded, duration, fit, lines, pageOf, quantity, size, state, verdict } from "./runs_words.js";
+import { worded } from "./worded.js";
 
 /** @import { RunRow } from "./runs_feed.js" */
 
@@ -82,7 +82,7 @@ export function row(run, actions) {
     cell(
       5,
       broken ? "–" : element("span", { class: `verdict ${run.tone}` }, verdict(run)),
-      small(broken || run.tone === "open" ? "" : recognised(run.message)),
+      small(broken || run.tone === "open" ? "" : worded(run.said)),
     ),
     fitCell(run),
     cell(7, size(run.size_bytes)),
@@ -136,7 +136,7 @@ function nameCell(run, actions) {
   const name = broken
     ? element("span", { class: "name" }, run.name)
     : element("a", { href: pageOf(run.name), class: "name", "data-key": `open-${run.name}` }, run.name);
-  const what = run.state === "finished" ? "" : state(run) + (broken ? `: ${recognised(run.message)}` : "");
+  const what = run.state === "finished" ? "" : state(run) + (broken ? `: ${worded(run.said)}` : "");
   const found = element("th", { scope: "row" }, name, ...tags);
   if (what) found.append(element("small", { class: `state ${run.state}` }, what));
   if (run.notes) found.append(element("small", { class: "notes clamped" }, run.notes));

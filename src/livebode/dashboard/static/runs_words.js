@@ -1,7 +1,7 @@
 // @ts-check
 // What the list shows of a run, in words.
 import { language, tr } from "./language.js";
-import { recognised } from "./recognition.js";
+import { worded } from "./worded.js";
 import { afterNumber, fixed, hertz, pair } from "./words.js";
 
 /** @import { RunRow } from "./runs_feed.js" */
@@ -78,7 +78,7 @@ export function lines(run) {
 }
 
 /** @param {string} name */
-export const quantity = (name) => recognised(name.replaceAll("_", " "));
+export const quantity = (name) => worded(name.replaceAll("_", " "));
 
 /**
  * A value with its 95 % bound: as many digits as the bound determines.
@@ -89,7 +89,7 @@ export const quantity = (name) => recognised(name.replaceAll("_", " "));
  */
 export function bounded(value, bound, unit) {
   if (!Number.isFinite(value)) return "–";
-  return pair(value, bound) + afterNumber(unit && recognised(unit));
+  return pair(value, bound) + afterNumber(unit && worded(unit));
 }
 
 /**

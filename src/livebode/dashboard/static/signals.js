@@ -3,7 +3,6 @@
 import { moment } from "./clock.js";
 import { tr } from "./language.js";
 import { ask, reason } from "./link.js";
-import { recognised } from "./recognition.js";
 import { answerOf } from "./signal-answer.js";
 import { SignalChart } from "./signal-chart.js";
 import { plain } from "./words.js";
@@ -57,7 +56,7 @@ export class Signals {
     try {
       if (this.seen()) await this.renew();
     } catch (error) {
-      this.say(recognised(reason(error)));
+      this.say(reason(error));
       this.request = "";
     }
     setTimeout(() => this.repeat(), EVERY_MS);

@@ -4,10 +4,10 @@ import { axis, chart } from "./chart.js";
 import { gestures } from "./gestures.js";
 import { language, tr } from "./language.js";
 import { element } from "./make.js";
-import { recognised } from "./recognition.js";
 import { bounded, dateTime, pageOf, quantity as words } from "./runs_words.js";
 import { colour } from "./theme.js";
 import { ALARMS, nearest, reach } from "./trends_data.js";
+import { worded } from "./worded.js";
 import { plain } from "./words.js";
 import { scaled, shifted } from "./zoom.js";
 
@@ -231,7 +231,7 @@ export class TrendChart {
     const within = tr("90 %: {low} … {high}", { low: plain(low), high: plain(high) });
     const text =
       this.quantity.name === ALARMS
-        ? [value, recognised(message ?? "")].filter((part) => part !== "").join(" · ")
+        ? [value, worded(message ?? "")].filter((part) => part !== "").join(" · ")
         : `${bounded(value, bound, unit)} (${within})`;
     const link = element("a", { href: pageOf(run, timeS), class: "name" }, run);
     this.readout.replaceChildren(link, ` ${dateTime(at)}: ${text}`);

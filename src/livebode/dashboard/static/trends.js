@@ -2,10 +2,10 @@
 // Parameters over time with 95 % bounds, valid if the model is complete: a small chart for each.
 import { axis, chart } from "./chart.js";
 import { element } from "./make.js";
-import { recognised } from "./recognition.js";
 import { Series } from "./series.js";
 import { colour } from "./theme.js";
 import { timeAxis, timeLabel } from "./time-ticks.js";
+import { worded } from "./worded.js";
 import { afterNumber, pair, plain } from "./words.js";
 
 /** @import { Trend } from "./messages.js" */
@@ -18,7 +18,7 @@ const BOUND = 1.959964;
  * @param {string} unit
  */
 export const bounded = (value, sigma, unit) =>
-  Number.isFinite(value) ? pair(value, BOUND * sigma) + afterNumber(unit && recognised(unit)) : "–";
+  Number.isFinite(value) ? pair(value, BOUND * sigma) + afterNumber(unit && worded(unit)) : "–";
 
 // A parameter with its chart, which is built when it is first drawn.
 class Item extends Series {
@@ -35,7 +35,7 @@ export class Trends {
    * @param {string} empty shown instead of none
    * @param {(name: string) => string} title of a chart
    */
-  constructor(host, wanted, empty, title = (name) => recognised(name.replaceAll("_", " "))) {
+  constructor(host, wanted, empty, title = (name) => worded(name.replaceAll("_", " "))) {
     this.host = host;
     this.wanted = wanted;
     this.empty = empty;
@@ -126,7 +126,7 @@ export class Trends {
       high = Math.max(high, item.t.at(-1) ?? high);
       const at = item.known(atS);
       const words = item.name.endsWith("_frequency") ? "" : bounded(item.v[at], item.s[at], item.unit);
-      item.words.textContent = Number.isFinite(item.v[at]) ? words : recognised(item.status[at] ?? "");
+      item.words.textContent = Number.isFinite(item.v[at]) ? words : worded(item.status[at] ?? "");
       if (!item.dirty) continue;
       item.dirty = false;
       /** @param {number} v */

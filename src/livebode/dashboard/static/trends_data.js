@@ -4,10 +4,10 @@
 /** @import { RunRow } from "./runs_feed.js" */
 
 /** @typedef {[model: string, name: string, unit: string, value: number, bound: number, low: number, high: number, timeS: number, unixS: number | null, fits: number]} SentPoint */
-/** @typedef {[timeS: number, unixS: number | null, kind: string, message: string]} SentAlarm */
+/** @typedef {[timeS: number, unixS: number | null, kind: string, message: import("./messages.js").Words]} SentAlarm */
 /** @typedef {[model: string, name: string, at: number[], timeS: number[], value: number[], bound: number[]]} SentDetail */
 /** @typedef {{points: SentPoint[], alarms: SentAlarm[], baseline: string | null}} RunTrend */
-/** @typedef {{run: string, at: number, timeS: number, value: number, bound: number, low: number, high: number, written: boolean, message?: string}} Point */
+/** @typedef {{run: string, at: number, timeS: number, value: number, bound: number, low: number, high: number, written: boolean, message?: import("./messages.js").Words}} Point */
 /** @typedef {{model: string, name: string, unit: string, points: Point[]}} Quantity */
 /** @typedef {{at: number, baseline: string, machine: string}} BaselineMark */
 

@@ -4,7 +4,6 @@ import { chosen, remember } from "./address.js";
 import { tr, trn } from "./language.js";
 import { reason } from "./link.js";
 import { byId as $, choose, element, segments } from "./make.js";
-import { recognised } from "./recognition.js";
 import { json, RunsFeed } from "./runs_feed.js";
 import { found, ordered, words } from "./runs_search.js";
 import { bounded, dateTime, quantity as named, pageOf, state, verdict } from "./runs_words.js";
@@ -47,7 +46,7 @@ const feed = new RunsFeed(
 /** @param {unknown} error */
 function complain(error) {
   $("notice").hidden = error === null;
-  if (error !== null) $("notice").textContent = recognised(reason(error));
+  if (error !== null) $("notice").textContent = reason(error);
 }
 
 /**

@@ -1,9 +1,8 @@
 // @ts-check
 // The first look: whether the display is current, and the one sentence on the machine that matters.
 import { choice, hourMinute, runTime, wallS } from "./clock.js";
-import { dated } from "./dated.js";
 import { tr, trn } from "./language.js";
-import { recognised } from "./recognition.js";
+import { worded } from "./worded.js";
 import { fixed, plain, signed } from "./words.js";
 
 /** @import { AlarmFacts, Facts, Health, Verdict } from "./messages.js" */
@@ -77,8 +76,8 @@ function effect(facts) {
   if (name === undefined || amount === undefined) return tr("different from the baseline");
   const size = `${signed(amount)} ${unit}`;
   return of === "value" || of === undefined
-    ? `${recognised(name)} ${size}`
-    : tr("{quantity} at {name} {size}", { quantity: recognised(of), name, size });
+    ? `${worded(name)} ${size}`
+    : tr("{quantity} at {name} {size}", { quantity: worded(of), name, size });
 }
 
 /** @type {Record<string, (verdict: Verdict) => string>} */
@@ -103,6 +102,7 @@ const SENTENCES = {
       },
     ),
   suppressed: (v) => tr("Not assessed: not ready since {time}", { time: sinceOf(v) }),
+  "not-monitored": (v) => tr("Not monitored since {time}: too little is known of the machine", { time: sinceOf(v) }),
   healthy: () => tr("Healthy: no difference from the baseline"),
   "no-baseline": () => tr("Not assessed: no baseline"),
   "not-judged": () => tr("Not assessed: the baseline does not cover what the machine did"),
@@ -119,6 +119,7 @@ const WORDS = {
   alarms: (v) => trn("{n} alarm", "{n} alarms", v.count),
   active: (v) => trn("{n} alarm", "{n} alarms", v.count),
   suppressed: () => tr("not ready"),
+  "not-monitored": () => tr("not monitored"),
   healthy: () => tr("healthy"),
   "no-baseline": () => tr("no baseline"),
   "not-judged": () => tr("not judged"),
@@ -150,5 +151,5 @@ export function sentence(up, verdict) {
   if (!up) return { text: tr("Not assessed: no connection to the server"), tone: "open", detail: "" };
   const words = verdict && SENTENCES[verdict.word];
   if (!words) return { text: tr("Not assessed: no current data of the machine"), tone: "open", detail: "" };
-  return { text: words(verdict), tone: verdict.tone, detail: dated(verdict) };
+  return { text: words(verdict), tone: verdict.tone, detail: worded(verdict.words) };
 }

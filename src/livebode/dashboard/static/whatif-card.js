@@ -4,12 +4,12 @@ import { chosen, remember } from "./address.js";
 import { tr } from "./language.js";
 import { ask, reason } from "./link.js";
 import { byId as $, element } from "./make.js";
-import { recognised } from "./recognition.js";
 import { slider } from "./slider.js";
 import { factor, isNothing, NOTCHES_MAX, nothing, textOf, trialOf } from "./trial.js";
 import { briefWords, TrialMargins } from "./whatif-margins.js";
 import { TrialSteps } from "./whatif-steps.js";
 import { checkWords, filtersText, tomlText } from "./whatif-text.js";
+import { worded } from "./worded.js";
 import { signed } from "./words.js";
 
 /** @import { Bode } from "./bode.js" */
@@ -123,7 +123,7 @@ export class WhatIfCard {
     if (answer.described === undefined) {
       this.facts = null;
       this.check.className = "check open";
-      this.check.textContent = recognised(answer.why_not);
+      this.check.textContent = worded(answer.why_not);
       $("what-if-margins").replaceChildren();
       this.steps.clear("");
       this.rows.replaceChildren();

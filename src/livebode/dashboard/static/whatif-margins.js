@@ -2,10 +2,10 @@
 // Bandwidth and margins of the described loop and of a trial: of the measured plant, and of the worst within its bounds.
 import { tr } from "./language.js";
 import { element } from "./make.js";
-import { keepsClear, largestAbove, nearestHz, predicted, stable, withUnknown } from "./predicted.js";
-import { recognised } from "./recognition.js";
+import { keepsClear, largestAbove, largestFall, nearestHz, predicted, stable, withUnknown } from "./predicted.js";
 import { feedback, nothing } from "./trial.js";
 import { orNoLimit } from "./whatif-text.js";
+import { worded } from "./worded.js";
 import { fixed, hertz } from "./words.js";
 
 /** @import { LoopBand, LoopFacts } from "./messages.js" */
@@ -34,14 +34,14 @@ export function loops(band, facts, trial) {
       im[i] = place.re[i] * f.im[i] + place.im[i] * f.re[i];
       radius[i] = place.radius[i] * Math.hypot(f.re[i], f.im[i]);
     }
-    return { re, im, radius };
+    return { re, im, radius, rise: place.rise };
   });
 }
 
 /** @param {LoopBand} band @param {Disc[]} places @returns {Both} */
 export function both({ frequency_hz: hz, known }, places) {
   if (!places.every((place) => stable(hz, place))) return null;
-  const above = largestAbove(places, known);
+  const above = largestFall(places, known);
   return {
     measured: predicted(hz, places, known, false),
     worst: keepsClear(places, known) && above < 1 ? withUnknown(predicted(hz, places, known, true), above) : null,
@@ -69,7 +69,7 @@ export class TrialMargins {
     this.cells.clear();
     const { band } = facts;
     if (!band) {
-      this.host.replaceChildren(element("p", { class: "empty" }, recognised(facts.band_why_not)));
+      this.host.replaceChildren(element("p", { class: "empty" }, worded(facts.band_why_not)));
       return;
     }
     this.before = both(band, loops(band, facts, nothing()));
@@ -168,12 +168,26 @@ const about = ({ places, lines_hz: lines, confidence }) =>
 
 /** @param {LoopBand} band @param {Disc[]} places */
 function aboveWords({ known, lines_hz: lines }, places) {
-  const size = largestAbove(places, known);
-  return size > ABOVE_MAX
-    ? tr("⚠ Above {high} Hz nothing was measured, and |L| may reach {size} there: the margins need less than {most}.", {
-        high: hertz(lines[lines.length - 1]),
+  const [size, most] = [largestFall(places, known), largestAbove(places, known)],
+    high = hertz(lines[lines.length - 1]);
+  if (size > ABOVE_MAX)
+    return tr(
+      "⚠ Above {high} Hz nothing was measured, and |L| may reach {size} there: the margins need less than {most}.",
+      {
+        high,
         size: orNoLimit(size, 2),
         most: fixed(ABOVE_MAX, 1),
-      })
-    : "";
+      },
+    );
+  const db = (/** @type {number} */ ratio) => fixed(20 * Math.log10(ratio), 0);
+  const words = tr(
+    "The margins hold up to {high} Hz; above it if no resonance exceeds the fall by more than {db} dB.",
+    {
+      high,
+      db: db(ABOVE_MAX / size),
+    },
+  );
+  return most > ABOVE_MAX
+    ? [words, tr("⚠ The lines permit one of {db} dB.", { db: db(most / size) })].join(" ")
+    : words;
 }

@@ -5,7 +5,6 @@ import { axis, chart } from "./chart.js";
 import { tr } from "./language.js";
 import { ask, reason } from "./link.js";
 import { element } from "./make.js";
-import { recognised } from "./recognition.js";
 import { colour } from "./theme.js";
 import { textOf } from "./trial.js";
 import { plain, signed } from "./words.js";
@@ -145,7 +144,7 @@ export class TrialSteps {
       const found = await ask("/api/steps", { axis, trial: text });
       if (newest()) this.show(JSON.parse(new TextDecoder().decode(found)));
     } catch (error) {
-      if (newest()) this.clear(recognised(reason(error)));
+      if (newest()) this.clear(reason(error));
     }
     this.asking = false;
     if (!newest() && this.rested) this.renew();

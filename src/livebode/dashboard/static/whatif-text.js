@@ -1,8 +1,8 @@
 // @ts-check
 // A trial as text for a person to copy: keys of the configuration, or the filters as coefficients.
 import { numeral, tr } from "./language.js";
-import { recognised } from "./recognition.js";
 import { biquadsOf } from "./trial.js";
+import { worded } from "./worded.js";
 import { plain } from "./words.js";
 
 /** @import { LoopFacts } from "./messages.js" */
@@ -63,10 +63,7 @@ export function checkWords({ described, verdict, sentence }) {
         "check-loop: not checked. These values are not promises: compare the description with the signals by livebode check-loop.",
       ),
     ];
-  return [
-    "bad",
-    tr("check-loop: contradicted. These values are wrong: {sentence}", { sentence: recognised(sentence) }),
-  ];
+  return ["bad", tr("check-loop: contradicted. These values are wrong: {sentence}", { sentence: worded(sentence) })];
 }
 
 /** With as many digits at any time, so that a table does not move while a slider does. @param {number} value */

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core.installing import needing
+from livebode.core import needing
 from livebode.experiment_design.files.c_names import identifier
 from livebode.experiment_design.files.facts import facts
 from livebode.experiment_design.waveform import Waveform

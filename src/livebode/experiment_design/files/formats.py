@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 
-from livebode.core import UsageError
-from livebode.core.files import whole_file
+from livebode.core import UsageError, whole_file
 from livebode.experiment_design.files.arrays import write_mat, write_npz
 from livebode.experiment_design.files.c_header import write_c_header
 from livebode.experiment_design.files.delimited import write_csv

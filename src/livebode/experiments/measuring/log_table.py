@@ -8,8 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from livebode.core import Block
-from livebode.core.writing import writing
+from livebode.core import Block, writing
 
 
 class LogTable:

@@ -8,8 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from livebode.core import ConfigError
-from livebode.core.writing import writing
+from livebode.core import ConfigError, write_whole, writing
 from livebode.experiment_design import Design, choose
 from livebode.experiments.designing import Picture, design_experiment
 from livebode.experiments.experiment import Experiment
@@ -157,5 +156,5 @@ def measure(
     text = axis.read_text(encoding="utf-8")
     part = f'log = "{LOG}"\nfrom = "{first} samples"\nto = "{last} samples"\n'
     with writing(axis):
-        axis.write_text(text.replace(f'log = "{LOG}"\n', part, 1), encoding="utf-8")
+        write_whole(axis, text.replace(f'log = "{LOG}"\n', part, 1).encode())
     return Made(LOG, measured.samples, measured.lost)

@@ -1,18 +1,14 @@
-"""Player: what plays an excitation on a controller. A new kind is one line in PLAYERS."""
+"""Player: what plays an excitation on a controller. That of a kind of source is in the table of the kinds."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from importlib import import_module
 
 from livebode.core import ConfigError, MeasurementError
 from livebode.experiment_design import Waveform
 from livebode.experiments.measure_section import MeasureSection
-from livebode.sources.live import LiveSource, make_source
-from livebode.sources.live.settings import SourceSettings
-
-PLAYERS = {"hal": "hal_player", "ads": "ads_player"}
-"""Module of each kind of source whose controller can play; it ends with PLAYER."""
+from livebode.plugins import loaded, named
+from livebode.sources.live import LiveSource, SourceSettings, make_source
 
 
 class Player(ABC):
@@ -74,13 +70,14 @@ def make_player(settings: SourceSettings, section: MeasureSection, excitation: s
         )
     source = make_source(settings)
     kind = source.address.scheme
-    if kind not in PLAYERS:
+    players = {name: one.player for name, one in named("sources").items() if one.player}
+    if kind not in players:
         raise MeasurementError(
             "not-playable",
             f"livebode cannot play an excitation on a controller with {kind}",
-            f"play the files of `livebode design` there and record; livebode can play on: {', '.join(PLAYERS)}",
+            f"play the files of `livebode design` there and record; livebode can play on: {', '.join(players)}",
             kind=kind,
-            allowed=list(PLAYERS),
+            allowed=list(players),
         )
-    player: type[Player] = import_module(f"livebode.experiments.measuring.{PLAYERS[kind]}").PLAYER
+    player: type[Player] = loaded(players[kind])
     return player(source, section, excitation)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core.installing import needing
-
-Floats = NDArray[np.float64]
+from livebode.arrays import Floats
+from livebode.core import needing
 
 _ROUNDS = 40
 _REACHED = 1e-5  # of a limit, and of the largest cost

@@ -6,17 +6,14 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import DesignError, Lines, UsageError
 from livebode.excitation import low_crest_phases
 from livebode.mimo.design.amplitude import best_amplitudes
 from livebode.mimo.design.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode.mimo.design.spec import Kind, MatrixSpec
 from livebode.mimo.excitation import MatrixExcitation
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 RESERVE = 0.1
 """Share of each limit that remains for errors of the prediction and for noise."""

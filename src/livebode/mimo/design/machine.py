@@ -9,14 +9,13 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
 from livebode.mimo.excitation import MatrixExcitation
 from livebode.mimo.settings import MatrixLoop
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 _Positive = Annotated[float, Gt(0)]
 _Each = _Positive | Sequence[_Positive]
 

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.core import Lines, UsageError
 from livebode.mimo.design.machine import MatrixMachine
 from livebode.mimo.excitation import MatrixExcitation
 from livebode.mimo.settings import MatrixLoop
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from livebode.arrays import Complex, Floats
 from livebode.core import CHANNELS_MAX, UsageError, counted
 from livebode.mimo.design.machine import MatrixMachine, each_of
 from livebode.mimo.excitation import MatrixExcitation
 from livebode.mimo.settings import MatrixLoop
 from livebode.simulation import MotorLoop
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _REPETITIONS = 2  # that are simulated from rest; later ones repeat the second
 

@@ -6,14 +6,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.arrays import Complex, Floats
 from livebode.mimo.design.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode.mimo.design.spec import HOLDING_95, MatrixSpec
 from livebode.mimo.excitation import MatrixExcitation
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import numpy as np
 from annotated_types import Ge, Gt, Le, MinLen
 from numpy.typing import NDArray
 
+from livebode.arrays import Floats
 from livebode.core import UsageError
 
-Floats = NDArray[np.float64]
 Kind = Literal["orthogonal", "interleaved", "successive"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _Sigma = Annotated[float, Gt(0)]

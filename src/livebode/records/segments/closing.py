@@ -6,6 +6,7 @@ import errno
 import logging
 import os
 import threading
+import time
 
 from livebode.core import LivebodeError
 from livebode.records.segments.manifest import Segment
@@ -14,6 +15,7 @@ from livebode.records.segments.shelf import Shelf
 
 # One for all records of the process: sixteen axes that close a segment in the same second would use every core.
 _ONE_AT_A_TIME = threading.Lock()
+_USUAL_S = 2.0  # a conversion takes longer only where the disk is slow, or another record's is before it
 _logger = logging.getLogger(__name__)
 
 
@@ -26,8 +28,15 @@ class Closing:
     def __init__(self, shelf: Shelf) -> None:
         self._shelf = shelf
         self._thread: threading.Thread | None = None
+        self._began_s = 0.0
         self._gone: list[Segment] = []
         self._error: BaseException | None = None
+
+    def ends(self) -> bool:
+        """Whether no thread runs; one that has begun a short time ago is waited for."""
+        if self._thread is not None:
+            self._thread.join(max(0.0, self._began_s + _USUAL_S - time.monotonic()))
+        return self._thread is None or self.done
 
     @property
     def done(self) -> bool:
@@ -37,6 +46,7 @@ class Closing:
     def begin(self, bytes_max: int | None) -> None:
         """Remove the oldest segments above `bytes_max`, then convert all sealed journals; see `result`."""
         assert self._thread is None
+        self._began_s = time.monotonic()
         self._thread = threading.Thread(target=self._work, args=(bytes_max,), name="livebode closing")
         self._thread.start()
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from livebode.core import Event
+from livebode.language import Message
 
 KIND = "record-damaged"
 _SHOWN = 3
@@ -58,27 +59,38 @@ class Damage:
         >>> Damage(120, (400, 0.4), (500, 0.5), {"responses": 20}).sentence
         '20 rows of responses are lost, of samples 400 to 499 (0.1 s)'
         """
-        rows = " and ".join(f"{number} rows of {table}" for table, number in self.rows.items())
         if self.begin is None:
-            return f"its first {self.size_bytes} bytes are lost"
+            return Message("its first {size} bytes are lost", size=self.size_bytes)
         if self.end is None:
-            return f"its last {self.size_bytes} bytes are lost, from sample {self.begin[0]}"
-        if not rows:
-            return "nothing is lost"
-        rows = "at least " * self.at_least + rows
-        seconds = f" ({self.end[1] - self.begin[1]:.4g} s)" if self.end[1] > self.begin[1] else ""
-        return f"{rows} are lost, of samples {self.begin[0]} to {self.end[0] - 1}{seconds}"
+            return Message(
+                "its last {size} bytes are lost, from sample {first}", size=self.size_bytes, first=self.begin[0]
+            )
+        if not self.rows:
+            return Message("nothing is lost")
+        rows = Message.conjunction(
+            Message("{rows} rows of {table}", rows=number, table=table) for table, number in self.rows.items()
+        )
+        lost = Message(
+            "{rows} are lost, of samples {first} to {last}",
+            rows=Message("at least {rows}", rows=rows) if self.at_least else rows,
+            first=self.begin[0],
+            last=self.end[0] - 1,
+        )
+        seconds = self.end[1] - self.begin[1]
+        return Message("{lost} ({seconds:.4g} s)", lost=lost, seconds=seconds) if seconds > 0 else lost
 
 
 def event_of(name: str, damages: Iterable[Damage], kept_as: str | None) -> Event:
     """One event for all damaged places of a journal; `kept_as` is the path of the retained file."""
     places = list(damages)
-    lost = "; ".join(place.sentence for place in places[:_SHOWN]) + f"; and {len(places) - _SHOWN} more" * (
-        len(places) > _SHOWN
-    )
-    kept = f"; the file is retained as {kept_as}" if kept_as else ""
-    details = {"file": name, "retained": kept_as, "places": [place.to_json() for place in places], **total(places)}
-    return Event(KIND, *(places[0].begin or (0, 0.0)), f"{name} is damaged: {lost}{kept}", details)
+    lost: list[str] = [place.sentence for place in places[:_SHOWN]]
+    if len(places) > _SHOWN:
+        lost.append(Message("and {count} more", count=len(places) - _SHOWN))
+    if kept_as:
+        lost.append(Message("the file is retained as {path}", path=kept_as))
+    message = Message("{file} is damaged: {what}", file=name, what=lost)
+    details = {"retained": kept_as, "places": [place.to_json() for place in places], **total(places)}
+    return Event(KIND, *(places[0].begin or (0, 0.0)), message, details)
 
 
 def total(places: Iterable[Damage]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from livebode.core.files import write_all
+from livebode.core import write_all
 from livebode.records.inside import check_own
 
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)

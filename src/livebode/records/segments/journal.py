@@ -12,16 +12,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from livebode.core import RecordError
-from livebode.core.files import sync_directory
+from livebode.core import RecordError, replace_file, sync_directory
 from livebode.records.inside import check_folder, open_read
 from livebode.records.segments.damage import Damage
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE, Frame, frames, to_frame
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import check_version, format_of
-from livebode.tables import Schema, Table
-from livebode.tables.record_batch import from_message
-from livebode.tables.schema_message import schema_from_message, schema_to_message
+from livebode.tables import Schema, Table, from_message, schema_from_message, schema_to_message
 
 FOLDER, ASIDE = "open", "damaged"
 _LENGTH = struct.Struct("<I")
@@ -270,7 +267,7 @@ def set_aside(run: Path, number: int) -> None:
     check_folder(run, set_aside_name(number))
     with contextlib.suppress(FileExistsError):
         os.mkdir(run / ASIDE)
-    os.replace(run / name_of(number), run / set_aside_name(number))
+    replace_file(run / name_of(number), run / set_aside_name(number))
     sync_directory(run / ASIDE)
 
 

@@ -7,7 +7,7 @@ import os
 from importlib import import_module
 from pathlib import Path
 
-from livebode.core import RecordError
+from livebode.core import RecordError, remove_files
 
 try:
     import fcntl
@@ -47,7 +47,7 @@ class Lock:
         os.close(self._file)
         if self._beside is not None:
             with contextlib.suppress(OSError):  # another process has opened it
-                os.unlink(self._beside)
+                remove_files(self._beside.parent.resolve(), [self._beside.name])
 
 
 def _beside(directory: Path) -> Path:

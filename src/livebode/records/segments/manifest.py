@@ -211,12 +211,13 @@ class Manifest:
         known = [self.until, *sorted(self.closed)] if self.broken else []
         return [(a + 1, b - 1) for a, b in pairwise(known) if b > a + 1]
 
-    def check(self, run: Path, journals: Sequence[int]) -> None:
-        """RecordError if lines are missing that were written: their segments would be lost.
+    def is_short(self, journals: Sequence[int]) -> bool:
+        """Whether its last lines are missing, where these are the numbers of the existing journals."""
+        return not self.broken and min(journals, default=0) > self.last_closed + 1
 
-        `journals` are the numbers of the existing ones.
-        """
-        if not self.broken and min(journals, default=0) > self.last_closed + 1:
+    def check(self, run: Path, journals: Sequence[int]) -> None:
+        """RecordError if lines are missing that were written: their segments would be lost; see `is_short`."""
+        if self.is_short(journals):
             raise RecordError(
                 "damaged",
                 f"{str(run / NAME)!r} is damaged after byte {self.length}",

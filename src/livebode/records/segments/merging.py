@@ -42,7 +42,7 @@ def groups_to_merge(segments: list[Segment], bytes_max: int) -> Iterator[list[Se
 
 
 def rows_to_merge(run: Path, parts: list[Segment]) -> list[Table] | None:
-    """The rows of each segment; None if one is missing, damaged, or of an earlier version with other columns."""
+    """The rows of each segment; None if one is missing or damaged, or has other columns."""
     tables = []
     for part in parts:
         try:

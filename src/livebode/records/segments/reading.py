@@ -5,18 +5,16 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 from livebode.core import Event, RecordError
+from livebode.language import Message
 from livebode.records.inside import is_folder
 from livebode.records.segments import journal
 from livebode.records.segments.damage import KIND, event_of
-from livebode.records.segments.journal import Journal, last_commit
+from livebode.records.segments.journal import Commit, Journal, last_commit
 from livebode.records.segments.manifest import NAME, Manifest, Segment
 from livebode.records.segments.segment_file import open_segment
-from livebode.tables import Table
-from livebode.tables.parquet_file import ParquetFile
-from livebode.tables.parquet_writer import ParquetWriter
+from livebode.tables import ParquetFile, ParquetWriter, Table
 
 _ROWS = 1 << 14
 Report = Callable[[Event], None]
@@ -31,8 +29,11 @@ def in_segments(run: Path) -> bool:
 Rows = dict[str, list[Table]]
 
 
-def parts(run: Path, report: Report, *, finished: bool) -> tuple[list[Segment], Rows]:
-    """Closed segments of all tables, by age, and later rows of each that are still in a journal."""
+def parts(run: Path, report: Report, manifest_bytes: int | None) -> tuple[list[Segment], Rows]:
+    """Closed segments of all tables, by age, and later rows of each that are still in a journal.
+
+    `manifest_bytes` is the length of the manifest of a finished run, as far as it is known.
+    """
     # The newest first: everything before an existing journal is complete. And before the manifest: a journal that is
     # closed in between is then in both instead of in neither.
     journals: dict[int, Journal] = {}
@@ -40,8 +41,16 @@ def parts(run: Path, report: Report, *, finished: bool) -> tuple[list[Segment], 
         following = journals.get(number + 1)
         journals[number] = _read(run, number, following, report)
     found = Manifest.read(run)
-    found.check(run, list(journals))
-    _tell_of(found, finished, report)
+    if found.is_short(list(journals)):
+        message = Message(
+            "{file} is damaged: its last lines are missing; the segments of journals {first} to {last} are not read",
+            file=NAME,
+            first=found.last_closed + 1,
+            last=min(journals) - 1,
+        )
+        report(Event(KIND, 0, 0.0, message))
+    else:
+        _tell_of(found, manifest_bytes, report)
     left = [number for number in sorted(journals) if not found.is_closed(number)]
     for number in left:
         if places := journals[number].damages:
@@ -53,13 +62,12 @@ def parts(run: Path, report: Report, *, finished: bool) -> tuple[list[Segment], 
     return found.segments, rows
 
 
-def waiting_events(run: Path) -> list[Any]:
-    """Events of an unfinished run, as plain data, that are in its newest commit because they are in no line yet."""
+def newest_commit(run: Path) -> Commit | None:
+    """The newest commit of an unfinished run; None if it cannot be read."""
     try:
-        commit = last_commit(run)
+        return last_commit(run)
     except (RecordError, OSError):  # `parts` reports it
-        return []
-    return [] if commit is None else list(commit.waiting)
+        return None
 
 
 def tables(
@@ -69,7 +77,7 @@ def tables(
     size_bytes_max: int | None,
     span_s: tuple[float, float] | None = None,
     *,
-    finished: bool,
+    manifest_bytes: int | None,
 ) -> Iterator[Table]:
     """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it, with `span_s` without the
     segments outside of that time. A damaged segment is reported and skipped.
@@ -81,7 +89,7 @@ def tables(
     OSError
         If something cannot be read.
     """
-    segments, rows = parts(run, report, finished=finished)
+    segments, rows = parts(run, report, manifest_bytes)
     segments = [segment for segment in segments if segment.table == table]
     if span_s is not None:
         segments = [segment for segment in segments if segment.first_s <= span_s[1] and segment.last_s >= span_s[0]]
@@ -129,17 +137,24 @@ def whole(run: Path, segment: Segment, report: Report) -> ParquetFile | None:
             return _part(run, segment, *place, report)
         if segment not in now.segments:
             return None  # it was removed in the meantime
-        why = "the file is missing"
+        why: str = Message("the file is missing")
     except RecordError as error:
         why = error.message
     except OSError as error:
         why = str(error)
-    lost = f"{segment.rows} rows of {segment.table} of samples {segment.first_sample} to {segment.last_sample}"
-    details = {
-        "file": segment.name, "rows": {segment.table: segment.rows}, "seconds": segment.last_s - segment.first_s,
-        "samples": segment.last_sample - segment.first_sample + 1,
-    }  # fmt: skip
-    message = f"{segment.name} is damaged: {why}; {lost} ({details['seconds']:.4g} s) are not read"
+    message = Message(
+        "{file} is damaged: {why}; {lost_rows} rows of {table} of samples {first} to {last} ({seconds:.4g} s) are not "
+        "read",
+        file=segment.name,
+        why=why,
+        lost_rows=segment.rows,
+        table=segment.table,
+        first=segment.first_sample,
+        last=segment.last_sample,
+        seconds=segment.last_s - segment.first_s,
+    )
+    samples = segment.last_sample - segment.first_sample + 1
+    details = {"rows": {segment.table: segment.rows}, "samples": samples}
     report(Event(KIND, segment.first_sample, segment.first_s, message, details))
     return None
 
@@ -170,14 +185,27 @@ def _read(run: Path, number: int, following: Journal | None, report: Report) -> 
     except RecordError as error:
         if error.code == "record.newer-version":
             raise
-        report(Event(KIND, 0, 0.0, str(error), {"file": journal.name_of(number)}))
+        report(Event(KIND, 0, 0.0, error.words, {"file": journal.name_of(number)}))
         return Journal()
 
 
-def _tell_of(found: Manifest, finished: bool, report: Report) -> None:
-    if not found.broken and not (finished and found.torn):
+def _tell_of(found: Manifest, whole_bytes: int | None, report: Report) -> None:
+    if whole_bytes is not None and (missing := whole_bytes - found.length - len(found.torn)) > 0:
+        message = Message(
+            "{file} is damaged: its last {missing_bytes} bytes are missing; the segments that they name are not read",
+            file=NAME,
+            missing_bytes=missing,
+        )
+        report(Event(KIND, 0, 0.0, message))
         return
-    lines = ", ".join(map(str, found.broken)) or "the last"
+    # The end of an unfinished one is still being written, but not with zeros, which a power cut leaves.
+    torn = found.torn and (whole_bytes is not None or 0 in found.torn)
+    if not found.broken and not torn:
+        return
     lost = ", ".join(f"{first} to {last}" for first, last in found.missing)
-    what = f"the segments of journals {lost} are not read" if lost else "each line is written twice, so nothing is lost"
-    report(Event(KIND, 0, 0.0, f"{NAME} is damaged in line {lines}; {what}", {"file": NAME, "lines": found.broken}))
+    what = Message("each line is written twice, so nothing is lost")
+    if lost:
+        what = Message("the segments of journals {journals} are not read", journals=lost)
+    numbers = ", ".join(map(str, found.broken)) or Message("the last")
+    message = Message("{file} is damaged in line {numbers}; {what}", file=NAME, numbers=numbers, what=what)
+    report(Event(KIND, 0, 0.0, message, {"lines": found.broken}))

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.core import RecordError
+from livebode.core import RecordError, remove_files
 from livebode.records.removal import foreign, remove
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.journal import Commit, Journal
@@ -68,7 +68,7 @@ def recover(run: Path) -> UnfinishedRun | None:
             if read.damages:
                 damaged.insert(0, number)
             else:  # It was begun, but later data went to the previous journal.
-                os.unlink(run / journal.name_of(number))
+                remove_files(run / journal.FOLDER, [Path(journal.name_of(number)).name])
             continue
         torn = (run / journal.name_of(number)).stat().st_size - read.length
         torn += max(0, (run / EVENTS).stat().st_size - read.commit.events_bytes)
@@ -95,4 +95,4 @@ def _clear(run: Path) -> None:
             path=str(run),
             files=strange,
         )
-    remove(run, itself=False)
+    remove(run.resolve(), itself=False)

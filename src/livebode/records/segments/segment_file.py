@@ -9,8 +9,7 @@ from pathlib import Path
 from livebode.core import RecordError
 from livebode.records.inside import open_read
 from livebode.records.segments.manifest import Segment
-from livebode.tables.parquet_file import ParquetFile
-from livebode.tables.parquet_footer import Footer
+from livebode.tables import Footer, ParquetFile
 
 _VALUES_MAX = 1 << 27  # 1 GiB of numbers; a full journal holds 32 MiB
 _VERIFIED_MAX = 100_000

@@ -11,16 +11,15 @@ import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from livebode.core.files import sync_directory, write_whole
-from livebode.records.inside import check_folder, is_folder
+from livebode.core import remove_files, sync_directory, write_whole
+from livebode.records.inside import is_folder
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.manifest import Manifest, Retained, Segment
 from livebode.records.segments.merging import groups_to_merge, row_groups, rows_to_merge, unlisted
 from livebode.records.table_file import ColumnTable
 from livebode.records.versions import VERSIONS
-from livebode.tables import Table
-from livebode.tables.parquet_writer import ParquetWriter
+from livebode.tables import ParquetWriter, Table
 
 FIRST_TO_GO = "samples"
 _LONG_BYTES, _SHORTER = 128 << 10, 3
@@ -70,6 +69,11 @@ class Shelf:
     def begin(self) -> None:
         """Begin the manifest of a new run."""
         self._file.append_synced(manifest.first_line())
+
+    @property
+    def manifest_bytes(self) -> int:
+        """Length of the manifest."""
+        return self._file.length
 
     @property
     def used_bytes(self) -> int:
@@ -254,8 +258,7 @@ def sweep(run: Path, found: Manifest) -> None:
 
 def _removed(run: Path, name: str) -> bool:
     try:
-        check_folder(run, name)
-        os.unlink(run / name)
+        remove_files((run / name).parent, [Path(name).name])
     except OSError as error:
         return error.errno == errno.ENOENT
     return True

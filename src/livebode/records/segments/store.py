@@ -11,14 +11,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from livebode.core import Emit, Event, LivebodeError, RecordError, counted, ignore
-from livebode.core.files import sync_directory, write_whole
-from livebode.core.writing import why, writing
+from livebode.core import Emit, Event, LivebodeError, RecordError, ignore, sync_directory, why, write_whole, writing
+from livebode.language import Message
 from livebode.records.inside import check_own
-from livebode.records.segments import journal
+from livebode.records.segments import journal, manifest
 from livebode.records.segments.closing import Closing
 from livebode.records.segments.damage import total
 from livebode.records.segments.disk import AppendFile
+from livebode.records.segments.event_lines import end_missing, ends_line
 from livebode.records.segments.event_log import EventLog
 from livebode.records.segments.journal import Commit
 from livebode.records.segments.limits import JOURNALS, SegmentLimits
@@ -154,7 +154,7 @@ class Store:
             commit = Commit(sample, time_s, time.time(), *written)
             self._journal.append(b"".join([*self._waiting.unwritten(), commit.to_frame()]))
             parts = self._waiting.written()
-            full = self._full(sample)
+            full = self._full(sample) and self._may_close()
             if full:
                 self._sync()
             elif committed_s - self._synced_s >= self.limits.interval_s:
@@ -170,7 +170,7 @@ class Store:
             try:
                 self._close_segment(commit)
             except (OSError, LivebodeError) as error:
-                self._not_closed(error, "with the next commit")
+                self._not_closed(error, Message("with the next commit"))
         elif self._closing.done:
             self._closed()
         return True
@@ -220,6 +220,10 @@ class Store:
         limits = self.limits
         return self._journal.length >= limits.journal_bytes_max or sample - self._began >= limits.segment_samples
 
+    def _may_close(self) -> bool:
+        """Whether the previous journal is converted, or this one may not grow: no commit waits for a slow disk."""
+        return self._journal.length >= self.limits.journal_bytes_max or self._closing.ends()
+
     def _go_on(self, found: UnfinishedRun) -> None:
         self.last = found.commit
         self._waiting.rows |= found.commit.rows
@@ -258,12 +262,20 @@ class Store:
         self._named = len(found.retained)
         self._events = AppendFile(self.path, EVENTS, events_bytes)
         self._files.callback(self._events.close)
+        if self._events.length < events_bytes:
+            assert self.last is not None
+            lost_bytes = events_bytes - self._events.length
+            self._log.report_event(end_missing(lost_bytes, self.last.sample, self.last.time_s))
+        if self._events.length and not ends_line(self.path):
+            self._events.append(b"\n")  # so that only the damaged line is lost
 
     def _write_summary(self, summary: dict[str, Any], *, finished: bool) -> None:
         record: dict[str, Any] = {"finished": finished, "tables": list(self._tables)}
         if retained := self._shelf.retained:
             places = [place for one in retained for place in one.damages]
             record["damaged"] = {"files": [journal.set_aside_name(one.number) for one in retained], **total(places)}
+        if finished:
+            summary |= {"size_bytes": {EVENTS: self._events.length, manifest.NAME: self._shelf.manifest_bytes}}
         data = to_document(summary | {"record": record})
         for name in (RUN, COPY):
             write_whole(self.path / name, data, locked=True)
@@ -318,18 +330,24 @@ class Store:
             self._named += 1
         if gone:
             assert self.last is not None
-            names = f"{gone[0].name} and {len(gone) - 1} more" if len(gone) > 1 else gone[0].name
+            names: str = gone[0].name
+            if len(gone) > 1:
+                names = Message("{name} and {more} more", name=names, more=len(gone) - 1)
             self._log.report(
                 "record-removed",
                 self.last.sample,
                 self.last.time_s,
-                f"{names} removed, the oldest of the record, to meet the budget of {self.limits.budget_bytes} bytes",
+                Message(
+                    "{names} removed, the oldest of the record, to meet the budget of {budget_bytes} bytes",
+                    names=names,
+                    budget_bytes=self.limits.budget_bytes,
+                ),
                 removed=[segment.name for segment in gone],
             )
         if error is not None:
-            self._not_closed(
-                error, f"when the next journal is full, at sample {self._began + self.limits.segment_samples}"
-            )
+            full_at = self._began + self.limits.segment_samples
+            retried = Message("when the next journal is full, at sample {at_sample}", at_sample=full_at)
+            self._not_closed(error, retried)
         elif self._attempts and not self._shelf.sealed and self.last is not None and not self._full(self.last.sample):
             self._report_closed()
         return error
@@ -345,16 +363,25 @@ class Store:
             "record-unclosed",
             self.last.sample,
             self.last.time_s,
-            f"no segment could be closed: {why(error)} (attempt {self._attempts}); it is retried {retried}, and the "
-            f"record remains in {counted(len(waiting), 'journal')}",
-            attempts=self._attempts,
+            Message(
+                "no segment could be closed: {why} (attempt {attempts}); it is retried {retried}, and the record "
+                "remains in {in_journals}",
+                why=why(error),
+                attempts=self._attempts,
+                retried=retried,
+                in_journals=Message("1 journal")
+                if len(waiting) == 1
+                else Message("{journals} journals", journals=len(waiting)),
+            ),
             journals=waiting,
             errno=getattr(error, "errno", None),
         )
 
     def _report_closed(self) -> None:
         assert self.last is not None
-        message = f"segments are closed again, after {counted(self._attempts, 'failed attempt')}"
+        message = Message("segments are closed again, after 1 failed attempt")
+        if self._attempts > 1:
+            message = Message("segments are closed again, after {attempts} failed attempts", attempts=self._attempts)
         self._log.report("record-closed", self.last.sample, self.last.time_s, message, attempts=self._attempts)
         self._attempts = 0
 
@@ -368,7 +395,11 @@ class Store:
                 "record-paused",
                 sample,
                 time_s,
-                f"{why(error)}; recording pauses at sample {sample} and resumes when the disk can be written again",
+                Message(
+                    "{why}; recording pauses at sample {at_sample} and resumes when the disk can be written again",
+                    why=why(error),
+                    at_sample=sample,
+                ),
                 errno=error.errno,
             )
 
@@ -376,15 +407,22 @@ class Store:
         if self._pause is None:
             return
         lost = self._waiting.take_lost()
-        what = ", ".join(
-            f"{sums['rows']} rows of {table} of samples {sums['first_sample']} to {sums['last_sample']}"
-            for table, sums in lost.items()
-        )
+        message = Message("recording resumes at sample {at_sample}; nothing is lost", at_sample=sample)
+        if lost:
+            rows = (
+                f"{sums['rows']} rows of {table} of samples {sums['first_sample']} to {sums['last_sample']}"
+                for table, sums in lost.items()
+            )
+            message = Message(
+                "recording resumes at sample {at_sample}; {rows} are lost",
+                at_sample=sample,
+                rows=", ".join(rows),
+            )
         self._log.report(
             "record-resumed",
             sample,
             time_s,
-            f"recording resumes at sample {sample}; {what + ' are lost' if lost else 'nothing is lost'}",
+            message,
             paused_at=self._pause.sample,
             lost=lost,
             lost_events=self._log.take_given_up(),

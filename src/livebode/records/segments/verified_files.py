@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from livebode.core import Event
-from livebode.core.installing import needing
+from livebode.core import Event, needing
 from livebode.records.segments import reading
 from livebode.records.segments.manifest import Segment
 
@@ -44,7 +44,13 @@ def segment_groups(run: Path, segments: list[Segment], damages: list[Event]) -> 
     if first is None:
         return []
     schema = pa.schema(first.schema)
-    files = PyFileSystem(_VerifiedFiles(run, segments, schema, damages))
+    named = {segment.name: segment for segment in segments}
+
+    def opened(name: str) -> pa.NativeFile | None:
+        file = reading.whole(run, named[name], damages.append)
+        return None if file is None else pa.BufferReader(file.content)
+
+    files = PyFileSystem(VerifiedFiles(schema, opened))
     parquet = ds.ParquetFileFormat()
     size = -(-len(segments) // _GROUPS_MAX)
     groups = []
@@ -62,12 +68,19 @@ def _within(segment: Segment) -> ds.Expression:
     return of_samples & (time_s >= segment.first_s) & (time_s <= segment.last_s)
 
 
-class _VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
-    """Reads the files of these segments, and nothing else."""
+class VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
+    """Reads Parquet files with these columns, and nothing else.
 
-    def __init__(self, run: Path, segments: list[Segment], schema: pa.Schema, damages: list[Event]) -> None:
-        self._run, self._schema, self._damages = run, schema, damages
-        self._segments = {segment.name: segment for segment in segments}
+    Parameters
+    ----------
+    schema
+        Columns of all files.
+    opened
+        A file, which was compared with its checksum; None if it is damaged, and has no rows.
+    """
+
+    def __init__(self, schema: pa.Schema, opened: Callable[[str], pa.NativeFile | None]) -> None:
+        self._schema, self._opened = schema, opened
 
     def __eq__(self, other: object) -> bool:
         return self is other
@@ -76,13 +89,12 @@ class _VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
         return self is not other
 
     def open_input_file(self, path: str) -> pa.NativeFile:
-        """The content of a segment; no rows if it is damaged."""
-        file = reading.whole(self._run, self._segments[path], self._damages.append)
-        if file is None:
-            sink = pa.BufferOutputStream()
-            pq.write_table(self._schema.empty_table(), sink)
-            return pa.BufferReader(sink.getvalue())
-        return pa.BufferReader(file.content)
+        """A file; no rows if it is damaged."""
+        if (file := self._opened(path)) is not None:
+            return file
+        sink = pa.BufferOutputStream()
+        pq.write_table(self._schema.empty_table(), sink)
+        return pa.BufferReader(sink.getvalue())
 
     def open_input_stream(self, path: str) -> pa.NativeFile:
         return self.open_input_file(path)
@@ -91,7 +103,7 @@ class _VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
         return path
 
     def get_type_name(self) -> str:
-        return "segments of a run"
+        return "verified files"
 
     def get_file_info(self, paths: list[str]) -> list[FileInfo]:
         return [FileInfo(path, FileType.File) for path in paths]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from livebode.records.segments.frames import ROWS, to_frame
-from livebode.tables import Table
-from livebode.tables.record_batch import to_message
+from livebode.tables import Table, to_message
 
 
 @dataclass(frozen=True)

@@ -6,19 +6,7 @@ from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
 
 from livebode.core import ConfigError
-
-PORTS: dict[str, int | None] = {
-    "udp": None, "tcp": None, "mqtt": 1883, "mqtts": 8883, "opc.tcp": 4840, "ads": 48898,
-}  # fmt: skip
-DEVICES = {
-    "serial": "serial:/dev/ttyACM0",
-    "can": "can:socketcan/can0",
-    "hal": "hal:sampler.0",
-    "klipper": "klipper:/tmp/klippy_uds",
-    "daqref": "daqref://device0",
-    "daq.nd": "daq.nd://192.168.0.5",
-}
-"""Kinds whose URL is kind:path, each with an example; of can the path is interface/channel."""
+from livebode.plugins import named
 
 
 @dataclass(frozen=True)
@@ -31,10 +19,10 @@ class Address:
     path: str = ""
 
     def __str__(self) -> str:
-        if self.scheme in DEVICES:
-            return f"{self.scheme}:{'//' if self.scheme.startswith('daq') else ''}{self.path}"
         if not self.host:
-            return self.path or "stdin:"
+            kind = named("sources").get(self.scheme)
+            start = f"{self.scheme}:{'//' if '://' in kind.device else ''}" if kind else ""  # else a file or a run
+            return f"{start}{self.path}"
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.scheme}://{host}:{self.port}" + (f"/{self.path}" if self.path else "")
 
@@ -72,32 +60,37 @@ def parse_address(url: str) -> Address:
             "give the URL of the machine",
             key="source.url",
         )
-    kind, _, path = url.partition(":")
-    if kind in DEVICES:
-        return _device(kind, path)
+    kinds = named("sources")
+    scheme, _, path = url.partition(":")
+    if scheme in kinds and kinds[scheme].device:
+        return _device(scheme, path)
     try:
         parts = urlsplit(url)
         port, host = parts.port, parts.hostname
     except ValueError:
         raise _url_error("is not an address", "give kind://host:port, with a port from 1 to 65535") from None
-    if parts.scheme not in PORTS:
-        raise _url_error("has a scheme that is not supported", f"give one of {', '.join([*PORTS, *DEVICES])} or stdin:")
-    port = port or PORTS[parts.scheme]
+    if parts.scheme not in kinds:
+        raise _url_error("has a scheme that is not supported", f"give one of {', '.join(kinds)}")
+    port = port or kinds[parts.scheme].port
     if not host or port is None or "?" in url or "#" in url:
         raise _url_error("is not a complete address", f"give {parts.scheme}://host:port")
     path = unquote(parts.path.removeprefix("/"))
-    if path and not parts.scheme.startswith(("mqtt", "opc")):
+    if path and not kinds[parts.scheme].has_path:
         raise _url_error(f"has a path, but {parts.scheme} has none", "remove what is after the port")
     return Address(parts.scheme, host, port, path)
 
 
-def _device(kind: str, path: str) -> Address:
+def _device(scheme: str, path: str) -> Address:
+    """The address of a device, in the form of the example of its kind: an absolute path, or a name with its parts."""
+    device = named("sources")[scheme].device
+    example = device.partition(":")[2]
     if path.startswith("//"):
         path = "/" + path.lstrip("/")
-    path = path if kind in ("serial", "klipper") else path.lstrip("/")
-    if not path.strip("/") or (kind == "can" and "/" not in path.strip("/")):
-        raise _url_error("names no device", f"give one such as {DEVICES[kind]}")
-    return Address(kind, path=path)
+    is_path = example.startswith("/") and not example.startswith("//")
+    path = path if is_path else path.lstrip("/")
+    if not path.strip("/") or (not is_path and path.strip("/").count("/") < example.strip("/").count("/")):
+        raise _url_error("names no device", f"give one such as {device}")
+    return Address(scheme, path=path)
 
 
 def _url_error(wrong: str, remedy: str) -> ConfigError:

@@ -39,6 +39,10 @@ class Batch:
         `time.monotonic()` when the batch was received.
     mark
         Position at which the source can read it again; None if it cannot.
+    delivery
+        Number of the delivery that brought it, ascending, of a source whose sender waits for an acknowledgement.
+    again
+        Whether the sender may have delivered it before.
 
     Raises
     ------
@@ -54,6 +58,8 @@ class Batch:
     stamp_s: float | None = None
     arrived_s: float = nan
     mark: Mark | None = None
+    delivery: int = 0
+    again: bool = False
 
     def __post_init__(self) -> None:
         if self.data.ndim != 2 or len(self.data) != len(self.channels) or not 0 < self.data.size <= VALUES_MAX:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, SpectraLayout
-from livebode.core.state import Stage, decode, encode
+from livebode.core import Channel, SpectraLayout, Stage, decode, encode
 from livebode.sources.live.batch import Batch
 from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
 

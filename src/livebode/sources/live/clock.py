@@ -6,7 +6,8 @@ from collections import deque
 from statistics import median
 from typing import Any
 
-from livebode.core.state import Stage, StatefulBase
+from livebode.core import Stage, StatefulBase
+from livebode.language import Message
 from livebode.sources.live.source_events import SourceEvents
 
 JUMP_S = 0.1
@@ -68,10 +69,9 @@ class ClockMonitor(StatefulBase):
     def _jumped(self, step_s: float, number: int) -> None:
         self._events.report(
             "clock-jump",
-            f"the sender's clock was set by {step_s:+.3f} s; time continues by sample numbers",
+            Message("the sender's clock was set by {step_s:+.3f} s; time continues by sample numbers", step_s=step_s),
             sample=number,
             rate_hz=self._rate_hz,
-            step_s=step_s,
         )
 
     def _judge_rate(self, number: int) -> None:
@@ -85,10 +85,14 @@ class ClockMonitor(StatefulBase):
             measured_hz = self._rate_hz / ratio if ratio > 0 else None
             self._events.report(
                 "wrong-rate",
-                f"the sampling rate is {measured_hz:.6g} Hz by the sender's clock, not {self._rate_hz:.6g} Hz; "
-                "every frequency is wrong by the same factor; correct the rate"
+                Message(
+                    "the sampling rate is {measured_hz:.6g} Hz by the sender's clock, not {rate_hz:.6g} Hz; every "
+                    "frequency is wrong by the same factor; correct the rate",
+                    measured_hz=measured_hz,
+                    rate_hz=self._rate_hz,
+                )
                 if measured_hz
-                else "the sender's clock does not advance or runs backwards; its rate cannot be checked",
+                else Message("the sender's clock does not advance or runs backwards; its rate cannot be checked"),
                 sample=number,
                 rate_hz=self._rate_hz,
                 measured_hz=measured_hz,

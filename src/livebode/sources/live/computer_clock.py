@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 
+from livebode.language import Message
+
 SET_S = 1.0
 """A clock whose advance differs by more than this from that of the time since boot was set during the pause."""
 LONGEST_S = 30 * 86400.0
@@ -54,14 +56,21 @@ def pause(before: ClockReading, now: ClockReading) -> Pause:
     if before.boot and before.boot == now.boot:
         by_uptime_s = max(0.0, now.uptime_s - before.uptime_s)
         step_s = by_clock_s - by_uptime_s
-        remark = f"this computer's clock was set by {step_s:+.0f} s during the pause; check its date and time"
+        remark = Message(
+            "this computer's clock was set by {set_by_s:+.0f} s during the pause; check its date and time",
+            set_by_s=step_s,
+        )
         return Pause(by_uptime_s, remark if abs(step_s) > SET_S else "")
     if 0 <= by_clock_s <= LONGEST_S:
         return Pause(by_clock_s)
     return Pause(
         None,
-        f"this computer's clock shows {_shown(now)}, and showed {_shown(before)} at the end of the record, so the "
-        "pause is unknown; set its date and time",
+        Message(
+            "this computer's clock shows {now}, and showed {before} at the end of the record, so the pause is unknown; "
+            "set its date and time",
+            now=_shown(now),
+            before=_shown(before),
+        ),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from livebode.language import Message
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch
 
@@ -13,15 +14,18 @@ class Dropped:
         self._events = source_events
         self._samples = self._first = self._last = 0
 
-    def take(self, batch: AnyBatch) -> None:
-        """This batch is dropped."""
+    def take(self, batch: AnyBatch, advice: str) -> None:
+        """This batch is dropped; `advice` against it."""
         if not self._samples:
             self._first = batch.first_sample
             self._events.report(
                 "overflow",
-                f"the queue is full; samples from the sender's number {batch.first_sample} are dropped until a quarter "
-                "of it is free; use a longer tracking.hop, fewer lines or fewer axes on this computer",
-                sender_first=batch.first_sample,
+                Message(
+                    "the queue is full; samples from the sender's number {sender_first} are dropped until a quarter of "
+                    "it is free; {advice}",
+                    sender_first=batch.first_sample,
+                    advice=advice,
+                ),
             )
         self._samples += batch.samples
         self._last = batch.stop - 1
@@ -31,9 +35,11 @@ class Dropped:
         if self._samples:
             self._events.report(
                 "overflow",
-                f"the queue was full: the sender's samples {self._first} … {self._last} ({self._samples}) were dropped",
-                samples=self._samples,
-                sender_first=self._first,
-                sender_last=self._last,
+                Message(
+                    "the queue was full: the sender's samples {sender_first} … {sender_last} ({samples}) were dropped",
+                    sender_first=self._first,
+                    sender_last=self._last,
+                    samples=self._samples,
+                ),
             )
         self._samples = 0

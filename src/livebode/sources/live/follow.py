@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Channel, LivebodeError, SourceError
+from livebode.language import Message
 from livebode.sources.delimited import DelimitedRecording
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, Batch
@@ -24,13 +25,6 @@ from livebode.sources.opening import open_log
 from livebode.sources.recording import Column, Recording
 from livebode.sources.timing import find_time
 from livebode.sources.units import SECONDS
-
-REPLACED = {
-    "most": "changed before byte {end}, up to which it was read: the changes are not recorded",
-    "none": "was truncated or replaced after it was read up to byte {end}. The new file is read "
-    "from its beginning; what was added to the old one is not recorded",
-}
-"""Message for a file that was read before, by how much of it is unchanged."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +52,7 @@ class FollowSource(LiveSource):
 
     format: ClassVar[str] = "follow"
     waits: ClassVar[bool] = True
+    on_demand: ClassVar[bool] = True
     paced: ClassVar[bool] = False
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
@@ -113,7 +108,7 @@ class FollowSource(LiveSource):
                     self._stop.wait(TICK_S)
                     continue
                 if lines.cut:
-                    self._malformed(f"a line is longer than {LINE_BYTES_MAX} bytes")
+                    self._malformed(Message("a line is longer than {bytes_max} bytes", bytes_max=LINE_BYTES_MAX))
                 for batch in self._batches(table, piece.raw, piece.mark.rows, piece.mark.as_plain()):
                     if piece.mark.offset >= again or batch.stop > self._due:
                         self._deliver(batch)
@@ -128,7 +123,7 @@ class FollowSource(LiveSource):
         kept = mark.kept_in(file)
         if kept == "all":
             return mark, mark.end
-        self._events.report("replaced", f"{path} {REPLACED[kept]}".format(end=mark.end), end_bytes=mark.end)
+        self._events.report("replaced", _replaced(path, kept, mark.end))
         if kept == "most":
             return mark, path.stat().st_size
         self._epoch, self._due = self._epoch + 1, -1
@@ -154,7 +149,7 @@ class FollowSource(LiveSource):
             time_s = np.asarray(values.pop(), dtype=np.float64) * table.scale_s
             usable = np.isfinite(time_s) & (time_s >= 0) & (time_s * table.rate_hz < 2**62)
             if not usable.all():
-                self._malformed(f"{np.count_nonzero(~usable)} rows have no time")
+                self._malformed(Message("{rows} rows have no time", rows=np.count_nonzero(~usable)))
             numbers = np.rint(time_s[usable] * table.rate_hz).astype(np.int64)
             values = [column[usable] for column in values]
         yield from numbered(numbers, values, table.channels, table.rate_hz, self._epoch, mark)
@@ -186,9 +181,15 @@ class FollowSource(LiveSource):
         whole = mark.last is not None and due >= mark.last
         if whole and not path.exists():
             return mark.name, mark.stop
-        gone = "was removed" if not path.exists() else "was changed"
-        self._events.report("replaced", f"{path} {gone} since it was read up to sample {due - 1}; its other samples "
-                       "are not recorded")  # fmt: skip
+        gone = Message("{path} was changed", path=path) if path.exists() else Message("{path} was removed", path=path)
+        self._events.report(
+            "replaced",
+            Message(
+                "{gone} since it was read up to sample {last_sample}; its other samples are not recorded",
+                gone=gone,
+                last_sample=due - 1,
+            ),
+        )
         self._epoch += not mark.timed
         return mark.name, max(mark.counted, mark.stop)
 
@@ -221,6 +222,22 @@ class FollowSource(LiveSource):
         if batch is not None and batch.stop > self._due:
             self._deliver(batch)
             self._due = batch.stop
+
+
+def _replaced(path: Path, kept: str, end_bytes: int) -> Message:
+    """Of a file that was read up to a byte, by how much of that is unchanged."""
+    if kept == "most":
+        return Message(
+            "{path} changed before byte {end_bytes}, up to which it was read: the changes are not recorded",
+            path=path,
+            end_bytes=end_bytes,
+        )
+    return Message(
+        "{path} was truncated or replaced after it was read up to byte {end_bytes}. The new file is read from its "
+        "beginning; what was added to the old one is not recorded",
+        path=path,
+        end_bytes=end_bytes,
+    )
 
 
 def table_of(log: Log, time: str | None, inode: int) -> TextTable:

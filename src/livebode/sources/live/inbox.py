@@ -15,20 +15,35 @@ INBOX_BYTES_MIN, INBOX_BYTES_MAX = 1 << 20, 64 << 20
 RESUMES_AT = 0.75
 """A queue that was full accepts batches again when at most this share of it is used: dropped samples then form few long
 spans, with complete windows between them."""
-WAITING_S_MAX = 0.1
-"""The same if the sender can wait: samples that are still at the sender are not lost when this process is killed."""
+ON_DEMAND_S_MAX = 0.1
+"""Longest machine time of a sender that waits anyway: samples that are still at the sender are not lost when this
+process is killed."""
 _ENTRY_BYTES = 1000
 
 
 class Inbox:
-    """A queue of batches between the thread that receives and the one that tracks: at most 60 s of them, and 64 MiB.
+    """A queue of batches between the thread that receives and the one that tracks.
 
-    If the sender can wait: at most 0.1 s, or one batch.
+    A full one lets a sender wait that can, and rejects the batches of others.
+
+    Parameters
+    ----------
+    bytes_max
+        Most bytes in it.
+    seconds_max
+        Longest machine time in it, above `bytes_min`.
+    bytes_min
+        Bytes that may always wait; one batch may, too.
     """
 
-    def __init__(self, bytes_max: int = INBOX_BYTES_MAX, *, waits: bool = False) -> None:
-        self._bytes_max = bytes_max
-        self._bytes_min, self._seconds_max = (0, WAITING_S_MAX) if waits else (INBOX_BYTES_MIN, INBOX_S_MAX)
+    def __init__(
+        self,
+        bytes_max: int = INBOX_BYTES_MAX,
+        *,
+        seconds_max: float = INBOX_S_MAX,
+        bytes_min: int = INBOX_BYTES_MIN,
+    ) -> None:
+        self._bytes_max, self._bytes_min, self._seconds_max = bytes_max, bytes_min, seconds_max
         self._batches: deque[AnyBatch] = deque()
         self._bytes = 0
         self._seconds = 0.0

@@ -11,7 +11,7 @@ from livebode.sources.live.batch import Batch, LiveBlock
 from livebode.sources.live.spectra_batch import AnyBatch, LiveSpectra, SpectraBatch
 
 
-def joined(blocks: Sequence[LiveBlock]) -> list[LiveBlock]:
+def join_blocks(blocks: Sequence[LiveBlock]) -> list[LiveBlock]:
     """The same samples or spectra in as few Blocks as possible; a gap begins another one.
 
     A joined Block has arrived when its last part has.
@@ -26,7 +26,7 @@ def joined(blocks: Sequence[LiveBlock]) -> list[LiveBlock]:
 
 
 def block_of(batches: Sequence[AnyBatch], number: int) -> LiveBlock:
-    """Batches of which one follows the other as one Block that begins at `number`, as `joined` would make it."""
+    """Batches of which one follows the other as one Block that begins at `number`, as `join_blocks` would make it."""
     first, last = batches[0], batches[-1]
     if first is last:
         return first.block(number, first.first_sample, False)
@@ -41,6 +41,7 @@ def block_of(batches: Sequence[AnyBatch], number: int) -> LiveBlock:
         values=np.concatenate([part.values for part in parts], axis=1),
         state=np.concatenate([part.state for part in parts]),
         arrived_s=last.arrived_s,
+        mark=last.mark,
     )
     return spectra.block(number, first.first_sample, False)
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import NOT_WHOLE, Block, SpectraLayout
-from livebode.estimation.centre import Centre
-from livebode.estimation.spectra import check_instruction_set
+from livebode.estimation import Centre, check_instruction_set
 from livebode.kernel import SlidingDFT
 from livebode.sources.live.spectra_batch import SpectraBatch
 

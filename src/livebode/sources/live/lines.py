@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from livebode.core import LivebodeError
 from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder
+from livebode.sources.live.reach import Reach
 from livebode.sources.live.source import TICK_S, LiveSource
 
 _PIECE_BYTES = 1 << 13  # bytes that were read but not recorded are lost when the process is killed
@@ -19,6 +20,10 @@ class StdinSource(LiveSource):
 
     format: ClassVar[str] = "ndjson"
     waits: ClassVar[bool] = True
+    on_demand: ClassVar[bool] = True
+
+    def reach(self) -> Reach:
+        return Reach("not applicable", "samples come from standard input")
 
     def _receive(self) -> bool:
         decoder, splitter = LineDecoder(self.settings.rate_hz), LineSplitter()
@@ -82,6 +87,3 @@ class LineSplitter:
         line = b"".join(self._parts).strip() if self._size <= LINE_BYTES_MAX else b""
         self._parts, self._size = [], 0
         return [line] if line else []
-
-
-SOURCE = StdinSource

@@ -1,32 +1,14 @@
-"""Create the source from its settings: a new kind is one line in MODULES."""
+"""Create the source from its settings: its kind is that of the URL."""
 
 from __future__ import annotations
 
-from importlib import import_module
-
 from livebode.core import ConfigError, LocationError
 from livebode.locations import Url
+from livebode.plugins import loaded, named
 from livebode.sources.live.address import Address, parse_address
 from livebode.sources.live.follow import FollowSource
 from livebode.sources.live.settings import SourceSettings, check_keys
 from livebode.sources.live.source import LiveSource
-
-MODULES = {
-    "udp": "udp",
-    "tcp": "tcp",
-    "stdin": "lines",
-    "mqtt": "mqtt",
-    "mqtts": "mqtt",
-    "opc.tcp": "opcua",
-    "ads": "ads",
-    "hal": "hal",
-    "serial": "serial_line",
-    "can": "can_bus",
-    "klipper": "klipper",
-    "daqref": "daq",
-    "daq.nd": "daq",
-}
-"""The module of each kind of URL; it ends with SOURCE, and imports its library when the source is created."""
 
 
 def open_source(settings: SourceSettings) -> LiveSource:
@@ -66,7 +48,7 @@ def make_source(settings: SourceSettings) -> LiveSource:
             )
         return FollowSource(settings, Address("follow", path=str(settings.logs[0])))
     address = checked_address(settings.url, settings)
-    kind: type[LiveSource] = import_module(f"livebode.sources.live.{MODULES[address.scheme]}").SOURCE
+    kind: type[LiveSource] = loaded(named("sources")[address.scheme].source)
     return kind(settings, address)
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, NamedTuple, Protocol
 
-from livebode.core import Channel
-from livebode.core.clock import RunClock
+from livebode.core import Channel, RunClock
 from livebode.sources.live.address import Address
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import LiveSource
@@ -64,6 +63,7 @@ class ReplaySource(LiveSource):
 
     format: ClassVar[str] = "replay"
     waits: ClassVar[bool] = True
+    on_demand: ClassVar[bool] = True
     paced: ClassVar[bool] = False
     sender_numbers: ClassVar[bool] = True
 

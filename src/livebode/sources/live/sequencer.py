@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from typing import Any
 
-from livebode.core.state import Stage, StatefulBase
+from livebode.core import Stage, StatefulBase
+from livebode.language import Message
 from livebode.sources.live.batch import VALUES_MAX, LiveBlock
 from livebode.sources.live.batch_state import batches_from_state, batches_to_state
 from livebode.sources.live.clock import ClockMonitor
 from livebode.sources.live.computer_clock import ClockReading, pause
-from livebode.sources.live.joined import block_of, joined
+from livebode.sources.live.joined import block_of, join_blocks
 from livebode.sources.live.position import Position
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
@@ -99,6 +101,22 @@ class Sequencer(StatefulBase):
         """The sender's number of the sample at its last start; None before the first."""
         return None if self._next is None else self._begun_at
 
+    @property
+    def number(self) -> int:
+        """Number of the sample after the last Block."""
+        return self._number
+
+    @property
+    def oldest_delivery(self) -> float:
+        """Delivery of the oldest batch that waits here or is in doubt; infinite if there is none."""
+        waiting = min((batch.delivery for batch in self._waiting.values()), default=inf)
+        return min(waiting, self.oldest_doubt)
+
+    @property
+    def oldest_doubt(self) -> float:
+        """The same of those that are in doubt."""
+        return self._unconfirmed.oldest_delivery
+
     def resume(self, position: Position, *, paced: bool = True) -> None:
         """Continue a record at this position; to be called before the first batch.
 
@@ -140,7 +158,7 @@ class Sequencer(StatefulBase):
             run.append(batch)
         if run:
             blocks.append(block_of(run, begin))
-        return joined(blocks)
+        return join_blocks(blocks)
 
     def _passed(self, batch: AnyBatch) -> int | None:
         """The number of its Block, if it is the next batch of a stream in which nothing waits; see `passed`."""
@@ -208,7 +226,11 @@ class Sequencer(StatefulBase):
             return []
         if batch.first_sample < self._highest:
             self._events.report(
-                "reordered", f"sample {batch.first_sample} of the sender arrived late and was sorted in"
+                "reordered",
+                Message(
+                    "sample {sender_sample} of the sender arrived late and was sorted in",
+                    sender_sample=batch.first_sample,
+                ),
             )
         self._highest = max(self._highest, batch.first_sample)
         self._waiting[batch.first_sample] = batch
@@ -259,18 +281,19 @@ class Sequencer(StatefulBase):
         rate_hz = self.schema.rate_hz or 1.0
         self.lost += missing
         self._number += missing
-        unsure = "; the sender sends no epoch, so a restart during the pause would not be detected"
-        self._events.report(
-            "loss",
-            f"{missing} samples were lost{unsure if self._resumed is not None and not self._epoch else ''}",
-            sample=self._number,
-            rate_hz=rate_hz,
-            missing_samples=missing,
-        )
+        message = Message("{missing_samples} samples were lost", missing_samples=missing)
+        if self._resumed is not None and not self._epoch:
+            message = Message(
+                "{lost}; the sender sends no epoch, so a restart during the pause would not be detected", lost=message
+            )
+        self._events.report("loss", message, sample=self._number, rate_hz=rate_hz, missing_samples=missing)
         self._next, self._gap = first, True
 
     def _repeat(self, batch: AnyBatch) -> None:
-        self._events.report("repeat", f"sample {batch.first_sample} of the sender was repeated and dropped")
+        self._events.report(
+            "repeat",
+            Message("sample {sender_sample} of the sender was repeated and dropped", sender_sample=batch.first_sample),
+        )
 
     def _doubt(self, batch: AnyBatch) -> list[LiveBlock]:
         """Handle a batch that does not continue the stream: a repeat, a jump, another sender, or a restart."""
@@ -322,14 +345,19 @@ class Sequencer(StatefulBase):
 
     def _restart_numbering(self, batch: AnyBatch, first: int) -> None:
         seconds = None if self._resumed is None else self._pause_s(batch, self._resumed)
-        missing, how = 0, "the length of its pause is not known"
+        missing, how = 0, Message("the length of its pause is not known")
         if seconds is not None:
             step = batch.layout.hop if isinstance(batch, SpectraBatch) else 1
             missing = step * round(seconds * batch.rate_hz / step)
-            how = f"its pause was {seconds:.1f} s by this computer's clock, which is an estimate"
+            how = Message(
+                "its pause was {pause_s:.1f} s by this computer's clock, which is an estimate", pause_s=seconds
+            )
         self._number += missing
         self._report_restart(
-            f"the sender restarted at its sample {first}; {how}", batch.epoch, first, estimated_samples=missing
+            Message("the sender restarted at its sample {sender_sample}; {pause}", sender_sample=first, pause=how),
+            batch.epoch,
+            first,
+            estimated_samples=missing,
         )
         self._next, self._resumed = None, None
 
@@ -338,13 +366,16 @@ class Sequencer(StatefulBase):
         lost = max(0, self._number + offset - first)
         self.lost += lost
         self._next = self._number + offset
-        other = "" if self._epoch is None else f" {self._epoch:#x}"
-        self._report_restart(
-            f"the sender of epoch {epoch:#x} still sends, and the one that replaced it (epoch{other}) is silent; "
-            f"the first continues at its sample {max(first, self._next)}; {lost} of its samples were not recorded. "
-            "If only one machine may send, set its address in source.sender",
-            epoch, first, lost_samples=lost,
-        )  # fmt: skip
+        message = Message(
+            "the sender of epoch {epoch} still sends, and the one that replaced it (epoch{other_epoch}) is silent; the "
+            "first continues at its sample {next_sample}; {lost_samples} of its samples were not recorded. If only one "
+            "machine may send, set its address in source.sender",
+            epoch=f"{epoch:#x}",
+            other_epoch="" if self._epoch is None else f" {self._epoch:#x}",
+            next_sample=max(first, self._next),
+            lost_samples=lost,
+        )
+        self._report_restart(message, epoch, first)
 
     def _report_restart(self, message: str, epoch: int, first: int, **details: int) -> None:
         self._events.report(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import (
     AfterValidator,
@@ -13,14 +13,14 @@ from pydantic import (
     PlainValidator,
     SerializationInfo,
     WithJsonSchema,
+    create_model,
 )
 from pydantic_core import PydanticCustomError
 
-from livebode.core import Channel, ConfigError, QuantityKind
-from livebode.core.clock import ClockKind
-from livebode.core.deferred_model import DeferredModel
+from livebode.core import Channel, ClockKind, ConfigError, DeferredModel, QuantityKind
 from livebode.locations import Location, Url, location
-from livebode.sources.part_limit import PATTERN, part_limit
+from livebode.plugins import loaded, named
+from livebode.sources._part_limit import PATTERN, part_limit
 from livebode.sources.units import split_unit
 
 
@@ -45,25 +45,6 @@ LocatedFile = Annotated[
     WithJsonSchema({"type": "string", "format": "path"}),
 ]
 """A path or URL; as JSON without a secret in it."""
-FRAMES = {"rate_hz", "reorder_batches"}
-TLS = {"ca_file", "certificate_file", "key_file"}
-LOGIN = {"username", "password_env", "password_file"}
-TAKEN: dict[str, set[str]] = {
-    "udp": FRAMES | {"sender"},
-    "tcp": FRAMES,
-    "stdin": {"rate_hz"},
-    "mqtt": FRAMES | LOGIN | {"client_id"},
-    "mqtts": FRAMES | LOGIN | TLS | {"client_id"},
-    "opc.tcp": {"rate_hz", "nodes", "sample_node", "security", "server_certificate_file"} | LOGIN | TLS - {"ca_file"},
-    "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
-    "hal": {"channels", "sample_signal"},
-    "serial": {"rate_hz", "channels", "counter", "counter_modulus", "baud_rate"},
-    "can": {"rate_hz", "dbc", "channels", "counter", "bitrate", "can_fd"},
-    "klipper": {"rate_hz", "accelerometer"},
-    "daqref": {"channels"},
-    "daq.nd": {"channels"},
-}
-"""Keys of each kind of URL, in addition to `url` and those of `EVERY` kind."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
 EVERY = {"timeout_s", "kinds"}
 RECORDINGS_MAX = 1000
@@ -80,7 +61,7 @@ def _checked_limit(given: float | str) -> float | str:
 Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PATTERN})], AfterValidator(_checked_limit)]
 
 
-class SourceSettings(DeferredModel):
+class SourceKeys(DeferredModel):
     """[source]: a recording (`log`), one that grows (`follow`), a live source (`url`), or a recorded one (`replay`).
 
     Parameters
@@ -118,63 +99,9 @@ class SourceSettings(DeferredModel):
         Number of batches by which a batch may be late (UDP, MQTT).
     sender
         The only permitted IP address of the sender (UDP). Default: any.
-    username
-        User name at the broker or server (MQTT, OPC UA).
-    password_env
-        Environment variable with the password (MQTT, OPC UA).
-    password_file
-        File with the password, relative to this file (MQTT, OPC UA).
-    ca_file
-        Certificate of the authority that signed the broker's certificate, relative to this file (mqtts).
-    certificate_file
-        Certificate of livebode, relative to this file (mqtts, OPC UA).
-    key_file
-        Private key of livebode, relative to this file (mqtts, OPC UA).
-    server_certificate_file
-        Certificate of the server, relative to this file (OPC UA).
-    security
-        Security policy; messages are signed and encrypted (OPC UA). Default: no security.
-    client_id
-        Name of the client, for which the broker stores messages while livebode is disconnected (MQTT).
-    nodes
-        Node id of each channel: "w [N m]" = "ns=2;s=axis.w" (OPC UA).
-    sample_node
-        Node id of the number of the batch's first sample (OPC UA). Default: from the time stamps.
-    symbol
-        Symbol of the ring, or of the array that is notified (ADS).
-    channels
-        Channels in the order of the symbol (ADS) or of a line (serial), each with its unit: "w [N m]". Signals of the
-        DBC: "Get_Iq.Iq_Measured", or "Iq_Measured" if one message has it (CAN). Signals of the
-        device; default: all that share the clock of the first (openDAQ). Names of signals at the sampler, each with its
-        unit; default: all of them (hal).
-    counter
-        The channel that counts the samples, so that losses are exact. Default: lines are counted (serial); frames are
-        numbered by their time (CAN).
-    counter_modulus
-        Number of values of the counter, if it wraps: 65536 for 16 bits (serial).
-    baud_rate
-        Bits per second of the serial port, as the device has it.
-    bitrate
-        Bits per second of the bus, for adapters that do not have it from the system (CAN).
-    can_fd
-        Receive CAN FD frames as well (CAN).
-    accelerometer
-        Section of the accelerometer in printer.cfg, such as "adxl345 bed" (Klipper).
-    sample_signal
-        Signal at the sampler that counts the periods of its thread (hal).
-    mode
-        "ring": reads a ring in the PLC program, without losses. "notify": the PLC sends each sample (ADS).
-    net_id
-        AMS net id of the PLC (ADS).
-    local_net_id
-        AMS net id of this computer, for which the PLC has a route (ADS).
-    ams_port
-        AMS port of the PLC runtime (ADS).
     kinds
         Kind of quantity of channels whose unit does not show it, or shows another: { speed = "velocity" }. Default: by
         the unit.
-    poll_s
-        Time between reads of the ring, in seconds (ADS).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -193,32 +120,7 @@ class SourceSettings(DeferredModel):
     timeout_s: Annotated[float, Field(gt=0, le=1e6)] = 30.0
     reorder_batches: Annotated[int, Field(ge=0, le=256)] = 8
     sender: str | None = None
-    username: str | None = None
-    password_env: str | None = None
-    password_file: File | None = None
-    ca_file: File | None = None
-    certificate_file: File | None = None
-    key_file: File | None = None
-    server_certificate_file: File | None = None
-    security: Literal["Basic256Sha256", "Aes128Sha256RsaOaep", "Aes256Sha256RsaPss"] | None = None
-    client_id: str | None = None
-    nodes: dict[str, str] = {}
-    sample_node: str | None = None
-    symbol: str | None = None
-    channels: list[str] = []
-    sample_signal: str | None = None
-    counter: str | None = None
-    counter_modulus: Annotated[int, Field(ge=2, le=1 << 53)] | None = None
-    baud_rate: Annotated[int, Field(ge=50, le=100_000_000)] = 115200
-    bitrate: Annotated[int, Field(ge=1000, le=20_000_000)] | None = None
-    can_fd: bool = False
-    accelerometer: str = "adxl345"
-    mode: Literal["ring", "notify"] = "ring"
-    net_id: str | None = None
-    local_net_id: str | None = None
-    ams_port: Annotated[int, Field(ge=1, le=65535)] = 851
     kinds: dict[str, QuantityKind] = {}
-    poll_s: Annotated[float, Field(gt=0, le=10)] = 0.05
 
     @property
     def live(self) -> bool:
@@ -242,7 +144,7 @@ class SourceSettings(DeferredModel):
             return ()
         return tuple(self.log) if isinstance(self.log, list) else (self.log,)
 
-    def beside(self, folder: Path) -> SourceSettings:
+    def beside(self, folder: Path) -> Self:
         """The same with relative paths from `folder`."""
         files: dict[str, Any] = {
             name: folder / value for name in self.model_fields_set if isinstance(value := getattr(self, name), Path)
@@ -252,7 +154,23 @@ class SourceSettings(DeferredModel):
         return self.model_copy(update=files)
 
 
-def check_keys(settings: SourceSettings, kind: str) -> None:
+if TYPE_CHECKING:
+    SourceSettings = SourceKeys
+
+
+def __getattr__(name: str) -> type[SourceKeys]:
+    """SourceSettings: the keys of all kinds of sources; created when it is first used, since it needs their table."""
+    if name != "SourceSettings":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    own = (loaded(kind.settings) for kind in named("sources").values() if kind.settings)
+    model: type[SourceKeys] = create_model(
+        name, __base__=(*dict.fromkeys(own), SourceKeys), __module__=__name__, __doc__=SourceKeys.__doc__
+    )
+    globals()[name] = model
+    return model
+
+
+def check_keys(settings: SourceKeys, kind: str) -> None:
     """ConfigError for a key that does not apply to this kind of source: the scheme of a URL, "log" or "replay"."""
     if part := [name for key, name in PART.items() if key in settings.model_fields_set]:
         why = "this one grows" if kind == "log" else f"{kind} is a live source"
@@ -263,7 +181,7 @@ def check_keys(settings: SourceSettings, kind: str) -> None:
             key=f"source.{part[0]}",
             source=kind,
         )
-    taken = LOG if kind == "log" else {"replay"} if kind == "replay" else TAKEN[kind] | {"url"}
+    taken = LOG if kind == "log" else {"replay"} if kind == "replay" else named("sources")[kind].keys | {"url"}
     if stray := sorted(settings.model_fields_set - taken - EVERY):
         raise ConfigError(
             "key-unused",

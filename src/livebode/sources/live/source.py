@@ -3,34 +3,41 @@
 from __future__ import annotations
 
 import logging
-import math
+import socket
 import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from math import inf
 from typing import ClassVar, Self
 
 import numpy as np
 
 from livebode.core import Channel, Event, LivebodeError, SourceError, SpectraLayout, nearest_name
+from livebode.language import Message
 from livebode.sources.live.address import Address
+from livebode.sources.live.backlog_cause import BacklogCause
 from livebode.sources.live.batch import LiveBlock, with_kinds
 from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
-from livebode.sources.live.inbox import Inbox
+from livebode.sources.live.inbox import INBOX_S_MAX, ON_DEMAND_S_MAX, Inbox
 from livebode.sources.live.pauses import Pauses
 from livebode.sources.live.position import Position
+from livebode.sources.live.reach import TIMEOUT_S, Reach
 from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
+from livebode.sources.live.settled import SettledDeliveries
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch
 from livebode.sources.live.unconfirmed import CONFIRMED
 
 TICK_S = 0.1
 """Longest time until a request to end is detected."""
+UNDECIDED_S_MAX = 2.0
+"""Batches that are in doubt for so long while nothing arrives are acknowledged: the sender may not send more before."""
 TOGETHER_S = 0.25
 """Longest machine time that is taken from the queue at once: what waits is cheaper together than batch by batch."""
 
@@ -41,7 +48,19 @@ class LiveSource(ABC):
     A thread receives and reconnects with increasing delay; `blocks` sorts the batches. A source that is not read fast
     enough makes its sender wait; if the sender cannot wait, samples are dropped, which is a gap.
 
+    A sender that stores what it sent receives what it may forget: samples that are recorded. Without a record these are
+    the samples before those that `blocks` gave last.
+
     Use it as a context manager, or call `close`.
+
+    Attributes
+    ----------
+    has_record
+        Whether its reader calls `record` when samples are recorded.
+    asks_commit
+        Whether the sender sends no more until more of what it sent is recorded.
+    backlog_cause
+        Why samples wait; its reader reports when it waits for its record.
     """
 
     format: ClassVar[str]
@@ -49,6 +68,10 @@ class LiveSource(ABC):
     """Whether batches can arrive in another order than they were sent."""
     waits: ClassVar[bool] = False
     """Whether the sender can wait until the queue has room."""
+    on_demand: ClassVar[bool] = False
+    """Whether samples can be read faster than they were taken, so that only those that are tracked next are read."""
+    queue_s_max: ClassVar[float] = INBOX_S_MAX
+    """Longest machine time that waits to be tracked."""
     paced: ClassVar[bool] = True
     """Whether samples arrive when they are taken, so that this computer's clock gives the length of a pause."""
 
@@ -57,9 +80,12 @@ class LiveSource(ABC):
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
-        self._logger = logging.getLogger(type(self).__module__)
+        # Also of a source of another package: what is below "livebode" is in its log.
+        self._logger = logging.getLogger(f"{__package__}.{type(self).__module__.rpartition('.')[2]}")
         self._events = SourceEvents(log=self._log)
-        self._inbox = Inbox(waits=self.waits)
+        self._inbox = (
+            Inbox(seconds_max=ON_DEMAND_S_MAX, bytes_min=0) if self.on_demand else Inbox(seconds_max=self.queue_s_max)
+        )
         self._dropped = Dropped(self._events)
         self._sequencer = Sequencer(
             self._events,
@@ -76,11 +102,14 @@ class LiveSource(ABC):
         self._outage = False
         self._failure: BaseException | None = None
         self._refused: SourceError | None = None
-        self._trouble: object = "nothing was received"
+        self._trouble: object = Message("nothing was received")
         self._first: tuple[float, int] | None = None
         self._newest: tuple[float, float | None] | None = None
         self._received = 0
         self._resumed: Position | None = None
+        self._settled, self._taken_delivery = SettledDeliveries(), 0
+        self.has_record = self.asks_commit = False
+        self.backlog_cause = BacklogCause()
 
     @abstractmethod
     def _receive(self) -> bool:
@@ -93,6 +122,17 @@ class LiveSource(ABC):
         SourceError
             With the code "refused" if a retry would not help (certificate, password, policy).
         """
+
+    def reach(self) -> Reach:
+        """Whether the machine can be reached; at most a connection is opened, and closed again.
+
+        Raises
+        ------
+        SourceError
+            If the settings do not fit this computer.
+        """
+        host = self.address.host, self.address.port
+        return Reach.by(lambda: socket.create_connection(host, TIMEOUT_S).close(), self.address)
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -148,15 +188,20 @@ class LiveSource(ABC):
         Blocks are numbered from there, and the sender's numbers and epoch give exactly what is missing.
         """
         self._resumed = position
+        self.record(position.sample)
         self._sequencer.resume(position, paced=self.paced)
         exact = (
-            "its numbers give what is missing"
+            Message("its numbers give what is missing")
             if position.epoch
-            else "it sends no epoch: if it was restarted during the pause, what is missing is an estimate"
+            else Message("it sends no epoch: if it was restarted during the pause, what is missing is an estimate")
         )
         self._events.report(
             "resumed",
-            f"continues after sample {position.number - 1} of the sender; {exact}",
+            Message(
+                "continues after sample {last_sample} of the sender; {exact}",
+                last_sample=position.number - 1,
+                exact=exact,
+            ),
             sender_sample=position.number,
             epoch=f"{position.epoch:#x}",
         )
@@ -174,8 +219,15 @@ class LiveSource(ABC):
         until = time.monotonic() + self.settings.timeout_s
         while not self.channels:
             if late is not None and time.monotonic() > until:
-                late(f"{self.address}: no samples arrived within {self.settings.timeout_s:g} s ({self._trouble})")
-                until = math.inf
+                late(
+                    Message(
+                        "{address}: no samples arrived within {timeout_s:g} s ({why})",
+                        address=self.address,
+                        timeout_s=self.settings.timeout_s,
+                        why=self._trouble,
+                    )
+                )
+                until = inf
             if self._inbox.ended or time.monotonic() > until:
                 asked = self._stop.is_set()
                 self.close()
@@ -217,14 +269,18 @@ class LiveSource(ABC):
         self._inbox.listener = listener
 
     def expect(self, samples: int) -> None:
-        """Call the listener only when so many samples wait, unless the sender waits, too."""
-        if self.paced and not self.waits:
+        """Call the listener only when so many samples wait, unless they are read on demand."""
+        if self.paced and not self.on_demand:
             self._inbox.enough_s = (samples - 0.5) / self.rate_hz
 
     @property
     def has_more(self) -> bool:
         """Whether samples were received for which the listener is called, and which `stream` has not given."""
         return bool(self._ready) or self._inbox.has_enough
+
+    def record(self, sample: int) -> None:
+        """All samples before this one are recorded: their sender may forget them. Any thread may call it."""
+        self._settled.record(sample)
 
     def take_events(self) -> list[Event]:
         """Events since the last call, of the kinds in `livebode.sources.live.KINDS`."""
@@ -250,18 +306,27 @@ class LiveSource(ABC):
     def _stream(self, wait_s: float) -> Iterator[LiveBlock | None]:
         while self._ready or not self._inbox.ended:
             if self._ready:
-                yield self._ready.popleft()
+                yield from self._hand_out(self._ready.popleft())
                 continue
             if wait_s:
                 self._inbox.wait(wait_s)
-            if self.paced and not self.waits:
+            if self.paced and not self.on_demand:
                 self._take_waiting()
             else:
                 self._take(0.0)
             if not self._ready:
                 yield None
-        yield from self._sequencer.finish()
+        doubted = self._sequencer.oldest_doubt  # the end is no reason to settle them
+        blocks = self._sequencer.finish()
+        self._settle(doubted)
+        for block in blocks:
+            yield from self._hand_out(block)
         self._raise_failure()
+
+    def _hand_out(self, block: LiveBlock) -> Iterator[LiveBlock]:
+        yield block
+        if not self.has_record:
+            self.record(block.stop)
 
     def _take(self, timeout_s: float) -> None:
         batch = self._inbox.get(timeout_s)
@@ -269,11 +334,23 @@ class LiveSource(ABC):
             self._ready += self._sequencer.poll(time.monotonic())
         else:
             self._ready += self._sequencer.push(batch)
+            self._taken_delivery = batch.delivery
+        self._settle(self._sequencer.oldest_delivery)
 
     def _take_waiting(self) -> None:
         """Take what waits; what follows each other is one Block."""
         batches = self._inbox.get_waiting(round(TOGETHER_S * self.rate_hz))
         self._ready += self._sequencer.push_together(batches) if batches else self._sequencer.poll(time.monotonic())
+        self._taken_delivery = batches[-1].delivery if batches else self._taken_delivery
+        self._settle(self._sequencer.oldest_delivery)
+
+    def _settle(self, open_: float) -> None:
+        """What was read is settled when the Blocks so far are recorded, except deliveries from `open_` on."""
+        if not self._taken_delivery:
+            return
+        if self._newest is not None and time.monotonic() - self._newest[0] > UNDECIDED_S_MAX:
+            open_ = inf
+        self._settled.read(int(min(self._taken_delivery, open_ - 1)), self._sequencer.number)
 
     def _check_kinds(self) -> None:
         """SourceError if a kind is declared for a channel that the stream does not have."""
@@ -285,12 +362,14 @@ class LiveSource(ABC):
 
     def _silence(self, asked: bool) -> SourceError:
         """The error that no samples arrived before the source was stopped or the timeout."""
-        when = "before the source was stopped" if asked else f"within {self.settings.timeout_s:g} s"
+        when = Message("before the source was stopped")
+        if not asked:
+            when = Message("within {timeout_s:g} s", timeout_s=self.settings.timeout_s)
         address, cause = str(self.address), self._trouble.code if isinstance(self._trouble, LivebodeError) else ""
         return SourceError(
             "no-samples",
-            f"no samples arrived {when} ({self._trouble})",
-            "check that the machine is on and sends",
+            Message("no samples arrived {when} ({why})", when=when, why=self._trouble),
+            Message("check that the machine is on and sends"),
             address=address,
             timeout_s=self.settings.timeout_s,
             cause=cause,
@@ -314,7 +393,7 @@ class LiveSource(ABC):
         except BaseException as error:  # any error: it must not be lost with the thread
             if isinstance(error, SourceError) and error.code == "source.refused":
                 self._refused = error.at(str(self.address))
-                self._events.report("refused", f"{self._refused}; no further attempt is made")
+                self._events.report("refused", Message("{why}; no further attempt is made", why=self._refused))
             else:
                 self._failure = error
         finally:
@@ -331,7 +410,7 @@ class LiveSource(ABC):
     def _established(self) -> None:
         """The connection is established."""
         self._connected, self._outage = True, False
-        self._events.report("connected", f"connected to {self.address}")
+        self._events.report("connected", Message("connected to {address}", address=self.address))
 
     def _announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
         """Set the channels of a record that continues; they are known before new samples arrive."""
@@ -340,15 +419,20 @@ class LiveSource(ABC):
 
     def _lost_connection(self, why: str) -> None:
         if not self._outage:
-            self._events.report("disconnected", f"{self.address}: {why}; retrying with increasing delay")
+            self._events.report(
+                "disconnected",
+                Message("{address}: {why}; retrying with increasing delay", address=self.address, why=why),
+            )
         self._connected, self._outage, self._trouble = False, True, why
 
     def _malformed(self, why: object) -> None:
-        self._events.report("malformed", f"{self.address}: {why}")
+        self._events.report("malformed", Message("{address}: {why}", address=self.address, why=why))
         self._trouble = why
 
-    def _deliver(self, batch: AnyBatch) -> None:
+    def _deliver(self, batch: AnyBatch, *, waits: bool | None = None) -> None:
+        """Add a batch to the queue; `waits`: whether its sender can wait, where it is not the same for all batches."""
         now = time.monotonic()
+        self.backlog_cause.take(self.waiting_s, now)
         batch = batch.with_kinds(self.settings.kinds) if self.settings.kinds else batch
         self._pauses.reset()
         latency = None
@@ -359,10 +443,10 @@ class LiveSource(ABC):
         self._first = self._first or (now, self._received)
         if np.isnan(batch.arrived_s):
             batch = replace(batch, arrived_s=now)
-        if self._inbox.put(batch, self.waits):
+        if self._inbox.put(batch, self.waits if waits is None else waits):
             self._dropped.finish()
         elif not self._stop.is_set():
-            self._dropped.take(batch)
+            self._dropped.take(batch, self.backlog_cause.advice)
 
 
 def channel_unknown(name: str, names: list[str]) -> SourceError:

@@ -95,7 +95,7 @@ class SourceEvents:
             at, time_s = self.position if sample is None else (sample, sample / rate_hz)
             if held := self._held.pop(kind, 0):
                 details["more"] = held
-            message = message[:MESSAGE_MAX]
+            message = message if len(message) <= MESSAGE_MAX else message[:MESSAGE_MAX]
             self._events.append(Event(kind, at, time_s, message, details))
         self._log(LEVELS.get(kind, logging.WARNING), f"{message} ({held} more of this kind)" if held else message)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Channel, QuantityKind, SourceError, Spectra, SpectraLayout, rms
 from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers, with_kinds
-from livebode.sources.live.position import Origin
+from livebode.sources.live.position import Mark, Origin
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class SpectraBatch:
         float64, shape (values, spectra).
     layout
         Signals, values and lines of the spectra.
-    rate_hz, epoch, stamp_s, arrived_s
+    rate_hz, epoch, stamp_s, arrived_s, mark, delivery, again
         As in `Batch`.
 
     Raises
@@ -51,6 +51,9 @@ class SpectraBatch:
     epoch: int = 0
     stamp_s: float | None = None
     arrived_s: float = nan
+    mark: Mark | None = None
+    delivery: int = 0
+    again: bool = False
 
     def __post_init__(self) -> None:
         signals, values, bins = len(self.layout.signals), len(self.layout.values), len(self.layout.bins)
@@ -125,7 +128,7 @@ class SpectraBatch:
             state=self.state[skipped:],
             place=(start + layout.hop) % layout.window,
             arrived_s=self.arrived_s,
-            origin=Origin(self.epoch, start - number),
+            origin=Origin(self.epoch, start - number, self.mark),
         )
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import Channel, SpectraLayout
-from livebode.core.state import Stage, StatefulBase
+from livebode.core import Channel, SpectraLayout, Stage, StatefulBase
+from livebode.language import Message
 from livebode.sources.live.batch_state import channels_of, layout_of
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
@@ -74,15 +74,21 @@ class StreamSchema(StatefulBase):
         if abs(batch.rate_hz / self.rate_hz - 1) > SAME_RATE:
             self._events.report(
                 "wrong-rate",
-                f"the sender states {batch.rate_hz:.9g} Hz instead of {self.rate_hz:.9g} Hz; its samples are skipped",
-                stated_hz=batch.rate_hz,
-                rate_hz_expected=self.rate_hz,
+                Message(
+                    "the sender states {stated_hz:.9g} Hz instead of {rate_hz_expected:.9g} Hz; its samples are "
+                    "skipped",
+                    stated_hz=batch.rate_hz,
+                    rate_hz_expected=self.rate_hz,
+                ),
             )
             return None
         if (layout := _layout(batch)) != self.spectra:
-            now = "samples" if layout is None else "spectra" if self.spectra is None else "spectra of another layout"
+            now = Message("spectra of another layout")
+            if layout is None or self.spectra is None:
+                now = Message("samples") if layout is None else Message("spectra")
             self._events.report(
-                "layout-changed", f"the sender now sends {now}; they are skipped until the first layout is back"
+                "layout-changed",
+                Message("the sender now sends {layout}; they are skipped until the first layout is back", layout=now),
             )
             return None
         units = {channel.name: channel.unit for channel in batch.channels}
@@ -90,7 +96,10 @@ class StreamSchema(StatefulBase):
         if missing := [channel.name for channel in self.channels if channel.name not in units]:
             self._events.report(
                 "layout-changed",
-                f"the sender no longer has channel {missing[0]!r}; its samples are skipped until it is back",
+                Message(
+                    "the sender no longer has channel {channel}; its samples are skipped until it is back",
+                    channel=repr(missing[0]),
+                ),
                 channels=names,
             )
             return None
@@ -98,15 +107,21 @@ class StreamSchema(StatefulBase):
             if channel.unit != units[channel.name]:
                 self._events.report(
                     "unit-changed",
-                    f"the unit of channel {channel.name!r} changed from {channel.unit!r} to {units[channel.name]!r}; "
-                    "its samples are skipped",
+                    Message(
+                        "the unit of channel {of_channel} changed from {before} to {after}; its samples are skipped",
+                        of_channel=repr(channel.name),
+                        before=repr(channel.unit),
+                        after=repr(units[channel.name]),
+                    ),
                     channel=channel.name,
                     unit=units[channel.name],
                 )
                 return None
         if names != [channel.name for channel in self.channels]:
             self._events.report(
-                "layout-changed", "the sender's channels changed; the first ones are used, by name", channels=names
+                "layout-changed",
+                Message("the sender's channels changed; the first ones are used, by name"),
+                channels=names,
             )
         return [names.index(channel.name) for channel in self.channels]
 

@@ -19,6 +19,7 @@ class TcpSource(LiveSource):
     """Connects to the sender at host and port."""
 
     format: ClassVar[str] = "tcp"
+    waits: ClassVar[bool] = True
 
     def _receive(self) -> bool:
         decoder, splitter, skipped = FrameDecoder(), FrameSplitter(), 0
@@ -43,6 +44,3 @@ class TcpSource(LiveSource):
             return
         if batch is not None:
             self._deliver(batch)
-
-
-SOURCE = TcpSource

@@ -8,9 +8,11 @@ from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import ClassVar
 
 from livebode.core import ConfigError, LivebodeError
+from livebode.language import Message
 from livebode.sources.live.address import Address
 from livebode.sources.live.datagrams import receiver
 from livebode.sources.live.frame import FrameDecoder
+from livebode.sources.live.reach import Reach
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import LiveSource
 
@@ -40,6 +42,18 @@ class UdpSource(LiveSource):
                 value=settings.sender,
             ) from None
 
+    def reach(self) -> Reach:
+        """Nobody answers here, but the port must be ours to receive on."""
+        facts = {"address": str(self.address)}
+        family = socket.AF_INET6 if ":" in self.address.host else socket.AF_INET
+        try:
+            with socket.socket(family, socket.SOCK_DGRAM) as port:
+                port.bind((self.address.host, self.address.port))
+        except OSError as error:
+            remedy = "end the program that receives there, perhaps a run of livebode, or check source.url"
+            return Reach("failed", f"{self.address}: {error.strerror or error}", remedy, facts)
+        return Reach("ok", f"{self.address} is free to receive on", facts=facts)
+
     def _receive(self) -> bool:
         family = socket.AF_INET6 if ":" in self.address.host else socket.AF_INET
         with socket.socket(family, socket.SOCK_DGRAM) as port:
@@ -55,7 +69,10 @@ class UdpSource(LiveSource):
     def _take_datagram(self, datagram: bytes, host: str) -> None:
         sender = self._sender
         if sender is not None and (other := plain_address(host)) != sender:
-            self._events.report("foreign", f"a datagram from {other} was dropped; source.sender is {sender}")
+            self._events.report(
+                "foreign",
+                Message("a datagram from {other} was dropped; source.sender is {sender}", other=other, sender=sender),
+            )
             self._trouble = f"datagrams come from {other}, and source.sender is {sender}"
             return
         try:
@@ -75,6 +92,3 @@ def plain_address(host: str) -> IPv4Address | IPv6Address:
     """
     address = ip_address(host.partition("%")[0])
     return getattr(address, "ipv4_mapped", None) or address
-
-
-SOURCE = UdpSource

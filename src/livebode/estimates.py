@@ -1,0 +1,60 @@
+"""The kinds of estimates, and the rules of each: what processes, records, draws, shows, reports and exports it.
+
+A rule is named as "module:name" and loaded when it is used. A kind that lacks a rule does not offer that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from livebode.core import ConfigError
+from livebode.plugins import loaded, named
+
+RESPONSE = "response"
+"""The kind of a run whose run.json names none of the others."""
+
+ESTIMATES: Mapping[str, Mapping[str, str]] = {
+    RESPONSE: {
+        "estimate": "livebode.runtime.single_response:SingleResponse",
+        "recording": "livebode.runtime.recordings:examined_recordings",
+        "draw": "livebode.cli.pictures:drawing_of",
+        "show": "livebode.cli.pictures:show",
+        "page": "livebode.dashboard.matrix_view:views_of_response",
+        "report": "livebode.reporting.run_report:accepted_report",
+        "compare": "livebode.reporting.compare_report:Comparison",
+        "export": "livebode.cli.export_command:responses",
+    },
+    "matrix": {
+        "estimate": "livebode.runtime.response_matrix:ResponseMatrix",
+        "recording": "livebode.runtime.response_matrix:examined_matrix",
+        "draw": "livebode.cli.matrix:drawing_matrix",
+        "show": "livebode.cli.matrix:show_matrix",
+        "page": "livebode.dashboard.matrix_view:views_of_matrix",
+        "report": "livebode.reporting.matrix_report:matrix_report",
+        "compare": "livebode.reporting.matrix_comparison:MatrixComparison",
+        "export": "livebode.cli.export_command:matrices",
+    },
+}
+"""Rules by kind; run.json of each but a response has the name of its kind as a key that is true."""
+
+
+def kind_of(summary: Mapping[str, Any]) -> str:
+    """The kind of a run with this run.json."""
+    return next((kind for kind in named("estimates") if summary.get(kind) is True), RESPONSE)
+
+
+def rule(kind: str, name: str) -> Any:
+    """The rule of a kind; None if it has none. ConfigError if the kind is not installed."""
+    rules = named("estimates").get(kind)
+    if rules is None:
+        raise ConfigError(
+            "value-invalid",
+            f"the section [{kind}] belongs to a kind of estimate that is not installed",
+            "install the wing modes of livebode, or remove the section",
+            key=kind,
+            value=kind,
+            allowed=list(named("estimates")),
+        )
+    reference = rules.get(name)
+    return None if reference is None else loaded(reference)

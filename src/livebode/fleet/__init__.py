@@ -1,1 +1,0 @@
-"""A live fleet: axes in partitions on a log (NATS JetStream), results exactly once. docs/explanation/fleet.md."""

@@ -1,0 +1,15 @@
+from livebode.margins._against_lines import against_lines as against_lines
+from livebode.margins._margins import CONTRADICTED as CONTRADICTED
+from livebode.margins._margins import WORDS as WORDS
+from livebode.margins._margins import Margins as Margins
+from livebode.margins._tuning import Proposal as Proposal
+from livebode.margins._tuning import Tuning as Tuning
+from livebode.margins._tuning import tuning as tuning
+from livebode.margins._tuning import worst as worst
+from livebode.margins.at_lines import peak_sensitivity_at_lines as peak_sensitivity_at_lines
+from livebode.margins.filters import Biquad as Biquad
+from livebode.margins.filters import low_pass as low_pass
+from livebode.margins.filters import notch as notch
+from livebode.margins.open_loop import OpenLoop as OpenLoop
+from livebode.margins.reading import margins as margins
+from livebode.margins.stability import stable as stable

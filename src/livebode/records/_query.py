@@ -1,0 +1,140 @@
+"""SQL on a run, by DuckDB (extra `query`)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from math import nan
+from typing import Any
+
+from livebode.core import Event, RunClock, moment, moments_by, needing
+from livebode.records.confined_sql import QueryResult, QueryTables, answer_query
+from livebode.records.grouped_events import each_event, event_rows
+from livebode.records.plain_json import to_json
+from livebode.records.run import Files, RunRecord
+from livebode.records.segments.manifest import TIERS
+from livebode.records.segments.verified_files import segment_groups
+
+with needing("PyArrow", "query", "a query"):
+    import pyarrow as pa
+    import pyarrow.dataset as ds
+    from pyarrow.fs import LocalFileSystem
+
+_TABLES = ("responses", "covariance", "parameters", "samples", *TIERS)
+_SINGLE_EVENTS = pa.schema(
+    [
+        ("kind", pa.string()),
+        ("sample", pa.int64()),
+        ("time_s", pa.float64()),
+        ("moment", pa.string()),
+        ("message", pa.string()),
+        ("details", pa.string()),
+    ]
+)
+_NEVER_MISSING = ("time_s", "frequency_hz")  # as plain columns, so that conditions on them reach the files
+_COUNTS = [("count", pa.int64()), ("first_s", pa.float64()), ("last_s", pa.float64())]
+_EVENTS = pa.schema([*_SINGLE_EVENTS, *_COUNTS])
+
+
+def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
+    """The first rows of a query on the tables of rows, the events, single_events, and the tiers.
+
+    Parameters
+    ----------
+    run
+        Finished, killed, or being written; the query uses what is committed at its start.
+    sql
+        DuckDB's SQL. It can read these tables and no files.
+    rows_max
+        Most rows to return.
+
+    Raises
+    ------
+    ExtraError
+        If DuckDB is not installed.
+    UsageError
+        If the query cannot be run.
+    RecordError
+        If the run cannot be read.
+    """
+    damages: list[Event] = []  # found in Arrow's threads
+
+    def show(database: Any, asked: set[str]) -> None:
+        _show(run, database, asked, damages)
+
+    try:
+        return answer_query(sql, rows_max, QueryTables("run", _TABLES, show, lambda: _known(run)))
+    finally:
+        for damage in damages:
+            run.report(damage)
+
+
+def _known(run: RunRecord) -> list[str]:
+    in_segments = run.parts()
+    if in_segments is None:
+        return ["events", "single_events", *run.files(_TABLES)]
+    found = {segment.table for segment in in_segments[0]} | in_segments[1].keys()
+    return ["events", "single_events", *(table for table in _TABLES if table in found)]
+
+
+def _show(run: RunRecord, database: Any, asked: set[str], damages: list[Event]) -> None:
+    """Register the requested tables of the run, and its events, in the database."""
+    tables = [table for table in _TABLES if table in asked]
+    if asked & {"events", "single_events"}:
+        run.files(tables)  # so that these have the damage of the requested tables
+    for table, parts in _parts_of(run, tables, damages).items():
+        selected = []
+        for number, part in enumerate(parts):
+            database.register(f"_{table}_{number}", part.rows)
+            columns = "*" if table == "samples" else _nan_as_null(part.rows.schema)
+            # A condition on the time that contradicts this one excludes the part before its files are opened.
+            span = f" WHERE time_s BETWEEN {part.first_s!r} AND {part.last_s!r}" if part.first_s <= part.last_s else ""
+            selected.append(f"SELECT {columns} FROM _{table}_{number}{span}")
+        database.execute(f"CREATE VIEW {table} AS {' UNION ALL '.join(selected)}")
+    lines = list(run.each_event_and_damage())
+    clock = run.clock
+    rows = [_plain(row.newest, clock) | vars(row) for row in event_rows(lines)]
+    database.register("events", pa.Table.from_pylist(rows, schema=_EVENTS))
+    each = [_plain(one, clock) for event in lines for one in each_event(event)]
+    database.register("single_events", pa.Table.from_pylist(each, schema=_SINGLE_EVENTS))
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A part of a table, and its span of time; NaN: not known."""
+
+    rows: ds.Dataset | pa.Table
+    first_s: float = nan
+    last_s: float = nan
+
+
+def _parts_of(run: RunRecord, tables: list[str], damages: list[Event]) -> dict[str, list[_Part]]:
+    """The recorded ones of these tables in parts."""
+    in_segments = run.parts()
+    if in_segments is None:
+        return {table: [_Part(_dataset(files))] for table, files in run.files(tables).items()}
+    segments, rows = in_segments
+    found: dict[str, list[_Part]] = {}
+    for table in tables:
+        groups = segment_groups(run.path, [one for one in segments if one.table == table], damages)
+        found[table] = [_Part(group.rows, group.first_s, group.last_s) for group in groups]
+        found[table] += [_Part(pa.table(batch)) for batch in rows.get(table, ())]
+    return {table: parts for table, parts in found.items() if parts}
+
+
+def _plain(event: Event, clock: RunClock) -> dict[str, Any]:
+    with moments_by(clock):
+        return asdict(event) | {"details": to_json(event.details), "moment": moment(event.time_s)}
+
+
+def _nan_as_null(schema: pa.Schema) -> str:
+    """All columns, with null for missing values, which SQL's averages ignore."""
+    numbers = [field.name for field in schema if pa.types.is_float64(field.type) and field.name not in _NEVER_MISSING]
+    return "* REPLACE (" + ", ".join(f"CASE WHEN isnan({n}) THEN NULL ELSE {n} END AS {n}" for n in numbers) + ")"
+
+
+def _dataset(files: Files) -> ds.Dataset:
+    if files.groups is None:
+        return ds.dataset(files.paths, format="parquet")
+    parquet = ds.ParquetFileFormat()
+    fragment = parquet.make_fragment(str(files.paths[0]), LocalFileSystem(), row_groups=files.groups)
+    return ds.FileSystemDataset([fragment], fragment.physical_schema, parquet, LocalFileSystem())

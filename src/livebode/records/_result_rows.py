@@ -1,0 +1,41 @@
+"""Rows of results in the tables of a record; `result_rows.register` adds another type of results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import singledispatch
+from typing import Any
+
+from livebode.core import MatrixResponses, Parameters, Responses
+from livebode.records.matrix_table import COVARIANCE, MATRIX_RESPONSES, covariance_rows, matrix_rows
+from livebode.records.parameter_table import PARAMETERS, parameter_rows
+from livebode.records.response_table import RESPONSES, as_batch
+from livebode.records.table_file import ColumnTable
+from livebode.tables import Table
+
+RESPONSE_TABLES: Mapping[str, ColumnTable] = {"responses": RESPONSES, "parameters": PARAMETERS}
+"""Tables of a run with single responses."""
+
+MATRIX_TABLES: Mapping[str, ColumnTable] = {"responses": MATRIX_RESPONSES, "covariance": COVARIANCE}
+"""Tables of a matrix run."""
+
+
+@singledispatch
+def result_rows(results: Any) -> Mapping[str, Table]:
+    """The rows of results by the name of their table."""
+    raise TypeError(f"a record has no table for {type(results).__name__}")
+
+
+@result_rows.register
+def _(results: Responses) -> Mapping[str, Table]:
+    return {"responses": as_batch(results)}
+
+
+@result_rows.register
+def _(results: MatrixResponses) -> Mapping[str, Table]:
+    return {"responses": matrix_rows(results), "covariance": covariance_rows(results)}
+
+
+@result_rows.register
+def _(results: Parameters) -> Mapping[str, Table]:
+    return {"parameters": parameter_rows(results)}

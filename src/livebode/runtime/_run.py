@@ -1,0 +1,48 @@
+"""`run`: the entrance to the run loop for an axis."""
+
+from __future__ import annotations
+
+import time
+
+from livebode.configuration import NOT_RECORDED, Axis
+from livebode.core import RunClock, moments_by
+from livebode.estimates import rule
+from livebode.runtime.destination import Destination
+from livebode.runtime.estimate import ExaminedRecording, Outcome
+from livebode.runtime.provenance import provenance
+from livebode.runtime.run_control import RunControl
+from livebode.runtime.run_loop import RunLoop
+
+
+def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outcome:
+    """Track a recording or several, or a machine while it works, and write a run directory.
+
+    A recording is written in one piece, or in segments if the axis has a [record]. A live source is always recorded in
+    segments, and ends with its sender or when `control` requests it; all received samples are then recorded. The same
+    axis in the same directory continues an unfinished run: a live source with the sender's next sample, where missing
+    samples are a gap whose length follows from the sender's numbers. A change of the configuration by `control`
+    finishes the run, and a new run next to it (NAME-2 and so on) continues with the next sample of the same source; the
+    result is that of the last run. A machine that is not switched on yet is waited for, and reported after `timeout_s`.
+
+    Raises
+    ------
+    LivebodeError
+        For any error in the recording or the configuration, if the machine rejects the connection, or if the run is
+        stopped before samples arrive. In one piece nothing is written; in segments what was recorded so far remains.
+    StoppedError
+        If `control` ends a recording before its end; the directory is as for an error.
+    """
+    control, started = control or RunControl(), time.perf_counter()
+    if axis.source.live:
+        from livebode.runtime.live import run_live
+
+        return run_live(axis, to, control)
+    of: ExaminedRecording = rule(axis.kind, "recording")(axis, to)
+    about = {"configuration": of.axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": of.found}
+    about |= provenance(of.axis, of.digests)
+    loop = RunLoop(
+        of.source, of.estimate, to, about=about, segments=of.axis.record, started=started, control=control,
+        noticed=of.noticed, recorded=of.recorded,
+    )  # fmt: skip
+    with moments_by(RunClock.of_kind(of.clock)):
+        return loop.run()

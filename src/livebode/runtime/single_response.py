@@ -1,0 +1,290 @@
+"""SingleResponse: the response from one input to one output, with fits, margins and alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.analysis import LIVE_VALUES_MAX, Overview
+from livebode.configuration import Axis
+from livebode.core import Block, Channel, Event, LivebodeError, Parameters, Responses, Stateful
+from livebode.estimation import Follower, Settings, plant_kinds, response_unit
+from livebode.fitting import DriftTest, Fit, RecordingsMean
+from livebode.preparation import check_excitation, check_some_valid, live_follower
+from livebode.records import RESPONSE_TABLES
+from livebode.runtime import summary
+from livebode.runtime.between_event import between_events
+from livebode.runtime.change_detection import ChangeDetection, change_detection
+from livebode.runtime.documents import Document, FitResults
+from livebode.runtime.drift_event import drift_events
+from livebode.runtime.estimate import (
+    SEEN_AGAIN_BYTES,
+    Estimate,
+    Outcome,
+    RunContext,
+    check_channels,
+)
+from livebode.runtime.fits import Fits
+from livebode.runtime.live_checks import LiveChecks
+from livebode.runtime.readiness import Readiness
+from livebode.sources.live import LiveSource
+
+
+@dataclass(eq=False)
+class SingleResponse(Estimate):
+    """The response from one input to one output, and what is computed from it.
+
+    Attributes
+    ----------
+    follower
+        Turns samples into responses.
+    fits
+        A model fitted to each response, if one is configured.
+    drift
+        Tests whether the machine drifts within a recording.
+    recordings
+        The mean of several recordings.
+    schedule_label
+        The scheduling signal's name with its unit, as soon as it has a run.
+    fit
+        The newest valid fit, at the end of the run.
+    """
+
+    tables: ClassVar = RESPONSE_TABLES
+
+    follower: Follower
+    fits: Fits | None = None
+    detection: ChangeDetection | None = None
+    axis: Axis | None = None
+    drift: DriftTest | None = None
+    recordings: RecordingsMean | None = None
+    readiness: Readiness | None = None
+    schedule_label: str = field(default="", init=False)
+    fit: Fit | None = field(default=None, init=False)
+    _checks: LiveChecks | None = field(default=None, init=False)
+    _ready: list[Block] = field(default_factory=list, init=False)
+
+    @classmethod
+    def of(cls, axis: Axis, follower: Follower, channels: Sequence[Channel], *, samples: bool = True) -> Self:
+        """The configured stages after the follower, with or without `samples`; LivebodeError if one is not possible."""
+        settings = follower.settings
+        fits = Fits.of(axis.fit, settings.loop, plant_kinds(channels, settings)) if axis.fit else None
+        detection = change_detection(axis, settings, samples=samples)
+        return cls(follower, fits, detection, axis, readiness=_readiness(axis, settings))
+
+    @classmethod
+    def live(cls, axis: Axis, source: LiveSource) -> Self:
+        """For a live source, whose channels and rate are known; LivebodeError if they do not fit."""
+        follower = live_follower(axis, source.rate_hz, source.spectra)
+        estimate = cls.of(axis, follower, source.channels, samples=source.spectra is None)
+        check_channels(estimate.channels, source)
+        return estimate
+
+    @property
+    def settings(self) -> Settings:
+        """Settings of the follower."""
+        return self.follower.settings
+
+    @property
+    def rate_hz(self) -> float:
+        return self.settings.lines.rate_hz
+
+    @property
+    def window(self) -> int:
+        return self.settings.lines.window
+
+    @property
+    def step(self) -> int:
+        return self.settings.step
+
+    @property
+    def reference(self) -> str:
+        return self.settings.channel(self.settings.method.reference) or ""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        return self.follower.counts
+
+    @property
+    def signals(self) -> list[str]:
+        return [name for role in self.settings.roles if (name := self.settings.channel(role))]
+
+    @property
+    def channels(self) -> list[str]:
+        schedule = self.settings.schedule
+        covariates = self.detection.covariates if self.detection is not None else ()
+        ready = [] if self.readiness is None else [self.readiness.condition.channel]
+        return list(dict.fromkeys([*self.signals, *([schedule] if schedule else []), *covariates, *ready]))
+
+    @property
+    def parts(self) -> Mapping[str, Stateful]:
+        optional = {
+            "fits": self.fits,
+            "detection": self.detection,
+            "drift": self.drift,
+            "readiness": self.readiness,
+        }
+        return {"tracker": self.follower} | {name: part for name, part in optional.items() if part}
+
+    def take_over(self, before: Estimate) -> bool:
+        try:
+            self.follower.restore(before.parts["tracker"].snapshot())
+        except LivebodeError:
+            return False
+        if not isinstance(before, SingleResponse):
+            return True
+        if self.readiness and before.readiness and self.readiness.condition == before.readiness.condition:
+            self.readiness.take_over(before.readiness)
+        if self._same(before, "signals", "tracking", "loop", "motion"):
+            if self.fits and before.fits and self._same(before, "fit"):
+                self.fits.restore(before.fits.snapshot())
+            if self.detection and before.detection and self._same(before, "monitoring", "fit"):
+                self.detection.restore(before.detection.snapshot())
+        return True
+
+    def _same(self, other: SingleResponse, *sections: str) -> bool:
+        return all(getattr(self.axis, name) == getattr(other.axis, name) for name in sections)
+
+    def describe(self, about: Mapping[str, Any], channels: Sequence[Channel]) -> dict[str, Any]:
+        name = self.settings.schedule
+        unit = next((channel.unit for channel in channels if channel.name == name), "")
+        self.schedule_label = f"{name} in {unit}" if name and unit else name or ""
+        begun = self._described(about, channels)
+        if self.detection is not None and self.detection.baseline is not None:
+            begun |= self.compared_with
+        return begun
+
+    def _described(self, about: Mapping[str, Any], channels: Sequence[Channel]) -> dict[str, Any]:
+        found = dict(about.get("found", {})) | {"schedule": self.schedule_label}
+        plant = response_unit(channels, self.settings), plant_kinds(channels, self.settings)
+        return summary.begun(dict(about) | {"found": found}, self.follower, *plant)
+
+    def begin(self, run: RunContext) -> None:
+        super().begin(run)
+        if isinstance(run.source, LiveSource):
+            self.overview = Overview(LIVE_VALUES_MAX)
+
+    def resume(self) -> Iterator[Document]:
+        if (record := self.run.recorder.previous()) is not None:
+            newest = record.batches(SEEN_AGAIN_BYTES)
+            first = next(newest, None) or record.responses()  # an empty batch contains the lines, unlike no run
+            for responses in chain([first], newest):
+                self.overview.add(responses)
+                yield responses
+                if self.fits is not None:
+                    yield FitResults(self.fits.process(responses[0:0])[0])  # sets the lines
+        self._checks = self._live_checks()
+
+    def _live_checks(self) -> LiveChecks | None:
+        axis, source, counts = self.axis, self.run.source, self.run.counts
+        if not isinstance(source, LiveSource) or source.spectra is not None or axis is None:
+            return None
+        # After a valid response, the excitation has already begun.
+        begins = self.run.begins and not (counts.judged or counts.valid_lines)
+        transient = begins and not (axis.tracking.all_periods or axis.motion)
+        return LiveChecks(
+            self.settings,
+            self.channels,
+            roles=not counts.judged,
+            transient=transient,
+            judged=counts.judge,
+            phase=self.run.recorder.phase,
+        )
+
+    def monitor(self, block: Block) -> Iterator[Event]:
+        """Where the machine begins and ends to be ready, before its alarms."""
+        self._ready = [block]
+        if self.readiness is not None:
+            yield from self.readiness.take(block)
+            self.follower.set_aside(self.readiness.spans)
+            self._ready = self.readiness.condition.parts(block)
+        if self.detection is not None and (self.run.shedding is None or self.run.shedding.monitors()):
+            for part in self._ready:
+                yield from self.detection.take_samples(part)
+
+    def process(self, block: Block) -> Responses:
+        return self._marked(self.follower.process(block, self.run.events.append))
+
+    def finish(self) -> Responses | None:
+        responses = self.follower.finish(self.run.events.append)
+        return None if responses is None else self._marked(responses)
+
+    def _marked(self, responses: Responses) -> Responses:
+        return responses if self.readiness is None else self.readiness.mark(responses)
+
+    def valid(self, results: Responses) -> NDArray[np.bool_]:
+        return results.valid
+
+    def documents(self, results: Responses) -> Iterator[Document]:
+        """Responses, then of those that are assessed the fits and the alarms."""
+        responses = results
+        self.overview.add(responses)
+        if len(responses):
+            yield responses
+        if self.readiness is not None:
+            responses = responses[responses.ready]
+        if self.drift is not None:
+            self.drift.add(responses)
+        if self.recordings is not None:
+            self.recordings.add(responses)
+        parameters = None
+        if self.fits is not None:
+            parts, events = self._fitted(self.fits, responses)
+            yield FitResults(parts)
+            yield from events
+            parameters = parts[0]
+        shedding = self.run.shedding
+        if self.detection is not None and (shedding is None or shedding.to_monitor(responses)):
+            yield from self.detection.take_responses(responses, parameters)
+
+    def _fitted(self, fits: Fits, responses: Responses) -> tuple[tuple[Parameters, ...], list[Event]]:
+        if self.run.shedding is None:
+            return fits.process(responses)
+        with self.run.shedding.fitting(responses) as chosen:
+            return fits.process(chosen)
+
+    def check(self, block: Block) -> Iterable[Event]:
+        return () if self._checks is None else self._checks.take_ready(block, self._ready)
+
+    def last_findings(self) -> Iterable[Event]:
+        return () if self._checks is None else self._checks.finish()
+
+    def judge(self) -> Iterable[Document]:
+        counts = self.run.counts
+        check_excitation(self.follower, counts.check.variance)
+        check_some_valid(counts.responses, counts.valid_lines, self.follower)
+        return ()
+
+    def summary(self, sample: int, time_s: float) -> tuple[dict[str, Any], list[Event]]:
+        source, lines = self.run.source, self.settings.lines
+        events = [] if self.detection is None else self.detection.finish()
+        done = self._described(self.run.about, source.channels)
+        done |= summary.done(self.counts, lines.rate_hz, self.run.counts)
+        self.fit = None if self.fits is None else self.fits.newest()
+        seen = self.overview.responses()
+        done |= summary.of_source(source) | summary.fitted(self.fits, self.fit, seen[seen.ready]) | self.monitored()
+        if self.drift is not None:
+            done["drift"] = summary.of_drift(self.drift.result(), lines)
+            events += drift_events(done["drift"], sample, time_s)
+        if self.recordings is not None:
+            done["between"] = summary.of_recordings(self.recordings)
+            events += between_events(done["between"], sample, time_s)
+        return done, events
+
+    def outcome(self, directory: Path, summary: dict[str, Any]) -> Outcome:
+        return Outcome(directory, summary, self.overview.responses(), self.fit)
+
+
+def _readiness(axis: Axis, settings: Settings) -> Readiness | None:
+    """The state of the machine, if a channel shows it."""
+    condition = axis.ready
+    if condition is None:
+        return None
+    chunk_s = 0.0 if axis.motion is None else axis.motion.chunk_s
+    return Readiness(condition, settings.span, round(chunk_s * settings.lines.rate_hz))

@@ -1,0 +1,14 @@
+from livebode.structured_text.excitation import PERIOD_MAX as PERIOD_MAX
+from livebode.structured_text.excitation import SMALLEST as SMALLEST
+from livebode.structured_text.excitation import multisine as multisine
+from livebode.structured_text.names import as_name as as_name
+from livebode.structured_text.names import check_name as check_name
+from livebode.structured_text.names import check_names as check_names
+from livebode.structured_text.text import BYTES_MAX as BYTES_MAX
+from livebode.structured_text.text import Declared as Declared
+from livebode.structured_text.text import array as array
+from livebode.structured_text.text import check_bytes as check_bytes
+from livebode.structured_text.text import check_rate as check_rate
+from livebode.structured_text.text import comment as comment
+from livebode.structured_text.text import real as real
+from livebode.structured_text.text import section as section

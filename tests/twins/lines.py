@@ -1,0 +1,311 @@
+"""The NumPy twin of the line stage: the readable definition of what `process_lines` computes in C.
+
+The same operations in the same order for each line, so C must agree with it to the bit (except for the sign and
+payload of NaN). Products of complex numbers are written out, because NumPy's round otherwise in the last elements of an
+array, and a sum over lines does not occur. `distortion`, `noise` and `invalid` come from other stages.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from livebode.kernel import (
+    MEANS,
+    NOISE_LARGER,
+    NOISE_SCATTER,
+    LineMoments,
+    LineRows,
+    LineSettings,
+    LineWindows,
+    NewestWindows,
+    WeightSums,
+)
+
+Floats = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Flags = npt.NDArray[np.bool_]
+Integers = npt.NDArray[np.int64]
+
+_EXCITED = 1e-12  # of the largest power so far: above the rounding of the DFT, below any intended excitation
+_NOISE = 8  # of the means: the power of the noise at detection lines
+_Part = tuple[slice, slice, bool]
+
+
+class MomentRows(NamedTuple):
+    """Windows so far (rows,), means (10, rows, lines) and scatter (4, rows, lines) after each window."""
+
+    windows: Integers
+    means: Floats
+    scatter: Floats
+
+
+def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWindows) -> tuple[LineRows, float]:
+    """Results of the windows, which are added to the moments, and the largest power of the reference so far."""
+    with np.errstate(all="ignore"):
+        return _process(settings, moments, windows)
+
+
+def process_each(settings: LineSettings, moments: list[LineMoments], windows: NewestWindows) -> tuple[LineRows, Floats]:
+    """One window of each of several machines with the same settings."""
+    yes, found = np.ones(1, dtype=np.bool_), []
+    for i, own in enumerate(moments):
+        spectrum, moment = windows.spectrum[:, i : i + 1], windows.moment[i : i + 1].T
+        begin = float(windows.largest[i]), int(windows.place[i]), np.ascontiguousarray(spectrum)
+        one = LineWindows(*begin, None, yes, yes, None, None, None, None, None, np.inf, np.ascontiguousarray(moment))
+        found.append(process_lines(settings, own, one))
+    rows = [one._replace(moment=one.moment.T) for one, _ in found]
+    joined = LineRows(*map(np.concatenate, zip(*rows)))
+    return joined._replace(moment=joined.moment.T), np.array([largest for _, largest in found])
+
+
+def add_windows(
+    moments: LineMoments, forgetting: float, weights: Floats, place: int, spectra: Complex, powers: Floats, used: Flags
+) -> MomentRows:
+    """Add windows at consecutive places, from `place` on, and return the moments after each.
+
+    Parameters
+    ----------
+    moments, forgetting, weights
+        As those of `process_lines`.
+    spectra, powers
+        Numerator, denominator and reference, shape (3, rows, lines), and the four powers, shape (4, rows, lines).
+    used
+        Windows that are added; others change nothing, shape (rows,).
+    """
+    with np.errstate(all="ignore"):
+        new = _parts_of(spectra, powers)
+        _, after, means, scatter = _add(moments, forgetting, weights, place, new, used, own=True)
+    return MomentRows(after, means, scatter)
+
+
+def _process(s: LineSettings, moments: LineMoments, w: LineWindows) -> tuple[LineRows, float]:
+    lines = moments.means.shape[2]
+    output, denominator, reference = (w.spectrum[at, :, :lines] for at in (0, s.denominator, s.reference))
+    power = _power(reference)
+    largest = np.maximum.accumulate(np.r_[w.largest, np.where(w.whole, power.max(axis=1), 0.0)])
+    excited = (power > _EXCITED * largest[1:, np.newaxis]) & (power > 0)
+    usable = w.clean & excited.any(axis=1)
+    if w.aside is not None:
+        usable &= ~w.aside
+    moving = np.zeros(len(power), dtype=np.bool_) if w.moving is None else w.moving
+    noise = np.zeros(power.shape) if w.noise is None else w.noise
+    pair = _times_conjugate(np.stack([output, denominator]), reference)
+    powers = np.stack([power, _power(output), noise, _power(denominator)])
+    # `new` receives the noise of the mean where a window has none, after its own is used.
+    new = _parts_of(np.concatenate([pair, reference[np.newaxis]]), powers)
+    before, after, means, scatter = _add(moments, s.forgetting, s.weights, w.place, new, usable, own=s.averages)
+    count = after if s.averages else before
+    sums = WeightSums.after(count, s.forgetting, s.weights)
+    moment = _take_moment(moments, s, w, after, usable) if s.averages else w.moment.copy()
+
+    value, variance = _estimate(s, sums, means, scatter, pair, noise, moving)
+    dof = _dof(s, sums, moving)
+    seen = w.whole if s.averages else w.clean  # an average continues through windows that it excludes
+    valid = seen[:, np.newaxis] & excited & np.isfinite(value)
+    distortion = np.full(value.shape, np.nan)
+    if w.distortion is not None:
+        distortion = np.where(moving[:, np.newaxis], np.nan, w.distortion[w.verdict])
+        variance, dof = _contained(variance, dof, distortion, w.dof_repeating)
+    distortion = np.where(valid, distortion, np.nan)
+    if w.invalid is not None:
+        against = w.invalid[w.verdict] & ~moving[:, np.newaxis]
+        distortion, valid = np.where(valid & against, np.inf, distortion), valid & ~against
+    weight = _weight(s, means, pair, power)
+    several = valid & np.isfinite(sums.dof)[:, np.newaxis]
+    of_input = np.full(value.shape, np.nan)
+    if s.denominator != s.reference:
+        of_input = np.where(several, _coherence(means, sums, 2, 9), np.nan)
+    nothing = complex(np.nan, np.nan)
+    return LineRows(
+        np.where(valid, value, nothing),
+        np.sqrt(np.where(valid, variance, np.nan)),
+        np.where(several, _coherence(means, sums, 0, 7), np.nan),
+        of_input,
+        np.where(valid, weight, nothing),
+        distortion,
+        valid,
+        dof,
+        moment,
+        usable,
+    ), float(largest[-1])
+
+
+def _power(spectrum: Complex) -> Floats:
+    return np.asarray(spectrum.real * spectrum.real + spectrum.imag * spectrum.imag)
+
+
+def _times_conjugate(one: Complex, other: Complex) -> Complex:
+    product = np.empty(np.broadcast_shapes(one.shape, other.shape), dtype=np.complex128)
+    product.real = one.real * other.real + one.imag * other.imag
+    product.imag = one.imag * other.real - one.real * other.imag
+    return product
+
+
+def _quotient(numerator: Complex, denominator: Complex) -> tuple[Complex, Floats]:
+    """Numerator over denominator, and 1/|denominator|²."""
+    inverse = 1 / _power(denominator)
+    product = _times_conjugate(numerator, denominator)
+    quotient = np.empty_like(product)
+    quotient.real, quotient.imag = product.real * inverse, product.imag * inverse
+    return quotient, inverse
+
+
+def _estimate(
+    s: LineSettings, sums: WeightSums, means: Floats, scatter: Floats, pair: Complex, noise: Floats, moving: Flags
+) -> tuple[Complex, Floats]:
+    """Value and its variance, shape (rows, lines)."""
+    of_means = np.empty((2, *means.shape[1:]), dtype=np.complex128)
+    of_means.real, of_means.imag = means[0:4:2], means[1:4:2]
+    ratio, inverse = _quotient(*of_means)
+    # Feedback carries noise into both; the difference contains only what the plant does not explain.
+    shared = ratio.real * scatter[2] + ratio.imag * scatter[3]
+    total = scatter[0] - 2 * shared + _power(ratio) * scatter[1]
+    variance = np.maximum(total, 0.0) * (1 / sums.unbiased)[:, np.newaxis]  # rounding can make it negative
+    if s.noise != NOISE_SCATTER:
+        beside = means[_NOISE] if s.averages else noise
+        if s.noise == NOISE_LARGER:
+            variance = np.fmax(variance, np.where(np.isfinite(variance), means[_NOISE], beside))
+        # Where the machine moves, the scatter between periods contains the motion.
+        variance = np.where(moving[:, np.newaxis], beside, variance)
+    if s.averages:
+        return ratio, variance * sums.of_mean[:, np.newaxis] * inverse
+    value, inverse = _quotient(*pair)
+    return value, variance * inverse
+
+
+def _dof(s: LineSettings, sums: WeightSums, moving: Flags) -> Floats:
+    dof = sums.dof
+    if s.noise == NOISE_LARGER:
+        dof = np.where(np.isfinite(dof), dof, s.noise_dof)
+    if s.noise != NOISE_SCATTER:
+        dof = np.where(moving, s.noise_dof / (sums.of_mean if s.averages else 1.0), dof)
+    return dof
+
+
+def _contained(variance: Floats, dof: Floats, distortion: Floats, dof_repeating: float) -> tuple[Floats, Floats]:
+    """Variance (rows, lines) and degrees of freedom (rows,) of noise and distortion together.
+
+    The degrees of freedom are matched in two moments (Satterthwaite 1946); the least of all lines is used. A distortion
+    that is not known (NaN) adds nothing.
+    """
+    added = np.where(np.isfinite(distortion), distortion * distortion, 0.0)
+    together = variance + added
+    noise_share, added_share = (1 / dof)[:, np.newaxis], np.divide(1.0, dof_repeating)
+    of_line = together * together / (variance * variance * noise_share + added * added * added_share)
+    least = np.where(np.isfinite(of_line), of_line, np.inf).min(axis=1)
+    return together, np.where((added > 0).any(axis=1), np.fmin(dof, least), dof)
+
+
+def _coherence(means: Floats, sums: WeightSums, signal: int, of_signal: int) -> Floats:
+    """γ² of the reference and a signal, Nevaranta 2016, eq. (18), without its bias of (1 − γ²)/m over m periods."""
+    coherence = (means[signal] * means[signal] + means[signal + 1] * means[signal + 1]) / (means[6] * means[of_signal])
+    bias = (1 / (1 - sums.of_mean))[:, np.newaxis]
+    return np.asarray(np.maximum(1 - (1 - coherence) * bias, 0.0))
+
+
+def _weight(s: LineSettings, means: Floats, pair: Complex, power: Floats) -> Complex:
+    """Weight of a response in a mean, so that the mean is a ratio of averages: U/W, for the direct estimator |U|²."""
+    if s.denominator == s.reference:
+        return np.asarray(power + 0j, dtype=np.complex128)
+    weight = np.empty(power.shape, dtype=np.complex128)
+    if s.averages:
+        weight.real, weight.imag = means[2] / means[6], means[3] / means[6]
+    else:
+        weight.real, weight.imag = pair[1].real / power, pair[1].imag / power
+    return weight
+
+
+def _parts_of(spectra: Complex, powers: Floats) -> Floats:
+    """Real and imaginary parts of three spectra, and four powers: shape (10, rows, lines)."""
+    new = np.empty((MEANS, *spectra.shape[1:]))
+    new[0:6:2], new[1:6:2], new[6:] = spectra.real, spectra.imag, powers
+    return new
+
+
+def _add(
+    moments: LineMoments, forgetting: float, weights: Floats, place: int, new: Floats, usable: Flags, *, own: bool
+) -> tuple[Integers, Integers, Floats, Floats]:
+    """Counts without and with each window; means and scatter with it (`own`), or without it."""
+    parts = _parts(place, moments.windows.size, usable)
+    before, after = np.empty(usable.size, dtype=np.int64), np.empty(usable.size, dtype=np.int64)
+    for places, at, used in parts:
+        before[at] = moments.windows[places]
+        moments.windows[places] += used
+        after[at] = moments.windows[places]
+    share = 1 / WeightSums.after(after, forgetting, weights).one
+    means, deviation = _take_means(moments.means, parts, new, share, own=own)
+    products = _products(deviation) * (1 - share)[:, np.newaxis]
+    return before, after, means, _take_scatter(moments.scatter, parts, products, forgetting, own=own)
+
+
+def _parts(place: int, places: int, usable: Flags) -> list[_Part]:
+    """Stretches of rows that are in one period and are all usable or all not: their places, their rows, and which."""
+    rows = np.arange(1, usable.size)
+    cut = (np.diff(usable.view(np.int8)) != 0) | ((place + rows) % places == 0)
+    edges = [0, *(rows[cut]).tolist(), usable.size]
+    parts = []
+    for start, stop in pairwise(edges):
+        at = (place + start) % places
+        if stop > start:
+            parts.append((slice(at, at + stop - start), slice(start, stop), bool(usable[start])))
+    return parts
+
+
+def _take_means(state: Floats, parts: list[_Part], new: Floats, share: Floats, *, own: bool) -> tuple[Floats, Floats]:
+    kept, deviation = np.empty_like(new), np.zeros_like(new)
+    column = share[:, np.newaxis]
+    for places, at, usable in parts:
+        means = state[:, places]
+        if not own:
+            kept[:, at] = means
+        if usable:
+            known, now = means[_NOISE], new[_NOISE, at]
+            # A window with the start or end of the excitation has no noise estimate: the mean is of the others.
+            means[_NOISE] = np.where(np.isnan(known), now, known)
+            new[_NOISE, at] = np.where(np.isnan(now) & (column[at] < 1), means[_NOISE], now)
+            np.subtract(new[:, at], means, out=deviation[:, at])
+            means += deviation[:, at] * column[at]
+        if own:
+            kept[:, at] = means
+    return kept, deviation
+
+
+def _products(deviation: Floats) -> Floats:
+    """|δnum|², |δden|², and δnum·conj(δden) in real and imaginary part, shape (4, rows, lines)."""
+    numerator, denominator = deviation[0:2], deviation[2:4]
+    squares = deviation[:4] * deviation[:4]
+    straight, crosswise = numerator * denominator, numerator[::-1] * denominator
+    return np.stack(
+        [squares[0] + squares[1], squares[2] + squares[3], straight[0] + straight[1], crosswise[0] - crosswise[1]]
+    )
+
+
+def _take_scatter(state: Floats, parts: list[_Part], products: Floats, forgetting: float, *, own: bool) -> Floats:
+    kept = np.empty_like(products)
+    for places, at, usable in parts:
+        scatter = state[:, places]
+        if not own:
+            kept[:, at] = scatter
+        if usable:
+            scatter *= forgetting
+            scatter += products[:, at]
+        if own:
+            kept[:, at] = scatter
+    return kept
+
+
+def _take_moment(moments: LineMoments, s: LineSettings, w: LineWindows, after: Integers, usable: Flags) -> Floats:
+    """Means of time and schedule, and the oldest sample; those of the window until there is a mean."""
+    kept = w.moment.copy()
+    share = 1 / WeightSums.after(after, s.forgetting, s.weights).one
+    for places, at, used in _parts(w.place, moments.windows.size, usable):
+        mean = moments.moment[:, places]
+        if used:
+            mean[2] = np.where(share[at] < 1, mean[2], w.moment[2, at])
+            mean[:2] += (w.moment[:2, at] - mean[:2]) * share[at]
+        kept[:, at] = np.where(after[at] > 0, mean, kept[:, at])
+    return kept

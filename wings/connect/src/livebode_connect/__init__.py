@@ -1,0 +1,1 @@
+"""Results and events of livebode to other systems: the receivers of [[publish]]."""

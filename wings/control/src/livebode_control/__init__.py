@@ -1,0 +1,1 @@
+"""Loop check, tuning, friction and orders of a run."""

@@ -1,0 +1,18 @@
+"""The analyses of a run that this wing adds, and how the report and the page show their results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from livebode.analysis import Analysis
+
+ANALYSES: Mapping[str, Analysis] = {
+    "loop-check": Analysis("livebode_control.run_analyses:loop_check"),
+    "proposal": Analysis(
+        "livebode_control.run_analyses:proposal",
+        section="livebode_control.proposal.section:proposed_controller",
+        trial="livebode_control.trial.loop_trials:LoopTrials",
+    ),
+    "friction": Analysis("livebode_control.run_analyses:friction"),
+    "orders": Analysis("livebode_control.run_analyses:orders"),
+}

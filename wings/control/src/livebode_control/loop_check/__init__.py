@@ -1,0 +1,1 @@
+"""The described controllers compared with the recorded signals."""

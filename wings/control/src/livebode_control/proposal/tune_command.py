@@ -1,0 +1,236 @@
+"""`livebode tune`: a controller for the loop of a finished run."""
+
+from __future__ import annotations
+
+from math import exp
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from livebode.cli import Entry, Json, results_directory
+from livebode.core import RecordError, TuneError, UsageError, write_whole, writing
+from livebode.locations import location
+
+if TYPE_CHECKING:
+    from livebode_control.tuning import ControllerProposal
+    from livebode_control.tuning.feedforward import Feedforward
+    from livebode_control.tuning.gain_schedule import GainSchedule
+
+
+def tune_command(
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
+    axis: Annotated[
+        Path | None, typer.Option(metavar="AXIS.toml", help="Read \\[loop] from this file instead of the run.")
+    ] = None,
+    bandwidth_hz: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Required bandwidth. \\[default: as high as possible]")
+    ] = None,
+    gain_margin_db: Annotated[float, typer.Option(metavar="DB", help="Smallest gain margin.")] = 6.0,
+    phase_margin_deg: Annotated[float, typer.Option(metavar="DEG", help="Smallest phase margin.")] = 30.0,
+    max_sensitivity: Annotated[float, typer.Option(help="Largest peak sensitivity Ms.")] = 2.0,
+    disk_margin: Annotated[float, typer.Option(help="Smallest disk margin; 0: no limit.")] = 0.0,
+    noise_gain: Annotated[
+        float | None, typer.Option(help="Largest rms of the input for white noise of 1 at the output.")
+    ] = None,
+    encoder_step: Annotated[
+        float | None, typer.Option(metavar="STEP", help="Step of the encoder: rad for rad/s, or the position's unit.")
+    ] = None,
+    input_noise: Annotated[
+        float | None, typer.Option(help="Largest rms of the input, in its unit, due to the rounding of the encoder.")
+    ] = None,
+    notches: Annotated[int, typer.Option(help="Most notches, 0 … 4.")] = 2,
+    low_pass: Annotated[bool, typer.Option(help="Permit a low-pass of second order.")] = True,
+    coherence: Annotated[float, typer.Option(help="Do not use lines with a lower coherence.")] = 0.5,
+    loop_checked: Annotated[
+        bool, typer.Option("--loop-checked", help="The description of the loop was compared with the machine.")
+    ] = False,
+    schedule: Annotated[
+        bool,
+        typer.Option("--schedule", help="Also propose gains over the schedule, with the same filters, as gains.csv."),
+    ] = False,
+    odrive: Annotated[
+        bool,
+        typer.Option("--odrive", help="Also write odrive.txt, the gains for odrivetool (firmware from 0.5)."),
+    ] = False,
+    strokes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RUN|LOG|AXIS.toml",
+            help="Usual strokes in both directions, for the feedforward of friction. \\[default: the run's recording]",
+        ),
+    ] = None,
+    entry: Entry = None,
+    as_json: Json = False,
+) -> None:
+    """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
+
+    Writes tune.png, the gains as gains.toml, the filters as filters.h and filters.st, and for `livebode report` the
+    whole as tune.json, to the run directory; nothing to a machine. The exit code is 2 if no controller meets the
+    specification. With --entry of a matrix run it is the controller between that output and input, and the plant that
+    it sees while the other [[loop.controllers]] are active as described.
+    """
+    if entry is not None and (schedule or strokes is not None):
+        raise _not_of_an_entry()
+    from livebode.cli import can_draw, tell_how_to_draw
+    from livebode.configuration import read_loop
+    from livebode.records import to_json
+    from livebode_control.proposal.stored_proposal import store_proposal
+    from livebode_control.proposal.tune_report import feedforward_of, schedule_run, tune_run
+    from livebode_control.tuning import LoopSpecification
+    from livebode_control.tuning.code_text import c_header, odrive_text, structured_text
+    from livebode_control.tuning.gains_text import gains_toml
+
+    specification = LoopSpecification(
+        bandwidth_hz=bandwidth_hz,
+        gain_margin_db=gain_margin_db,
+        phase_margin_deg=phase_margin_deg,
+        max_sensitivity=max_sensitivity,
+        disk_margin=disk_margin,
+        noise_gain=noise_gain,
+        encoder_step=encoder_step,
+        input_noise=input_noise,
+        notches=notches,
+        low_pass=low_pass,
+        coherence=coherence,
+    )
+    other = None if axis is None else read_loop(axis)
+    found = tune_run(directory, specification, other, loop_checked=loop_checked, entry=entry)
+    moves = None if strokes is None else location(strokes)
+    # Several motors share the inertia that an entry of a matrix would show.
+    forward = feedforward_of(directory, found.feedback.controller, moves) if entry is None else None
+    gains = schedule_run(directory, specification, other, loop_checked=loop_checked) if schedule else None
+    into = results_directory(directory)
+    with writing(into, RecordError):
+        if can_draw():
+            from livebode_control.proposal.tuning_picture import save_tuning_picture
+
+            title = directory.name if entry is None else f"{directory.name}: {entry}"
+            save_tuning_picture(found, into, gains=gains, feedforward=forward, title=title)
+        store_proposal(found, into, other, entry)
+        write_whole(into / "filters.h", c_header(found.feedback.biquads).encode())
+        write_whole(into / "gains.toml", gains_toml(found.feedback.controller).encode())
+        if odrive:
+            write_whole(into / "odrive.txt", odrive_text(found.feedback).encode())
+        if gains is not None:
+            write_whole(into / "gains.csv", gains.csv().encode())
+        write_whole(into / "filters.st", structured_text(found.feedback.biquads).encode())
+    if as_json:
+        more = {"feedforward": forward, "schedule": gains}
+        print(to_json(found.plain() | {name: None if one is None else one.plain() for name, one in more.items()}))
+    else:
+        show_proposal(found)
+        if entry is None:
+            show_feedforward(forward)
+        else:
+            print(f"of the controller {entry} alone: the other controllers are active as described, and do not change")
+        if gains is not None:
+            show_schedule(gains)
+        also = {"odrive.txt": odrive, "gains.csv": schedule, "tune.png": can_draw()}
+        written = ["tune.json", "gains.toml", "filters.h", "filters.st", *(name for name, use in also.items() if use)]
+        print(f"\n{into}: {', '.join(written)}")
+        tell_how_to_draw()
+    if not found.met:
+        raise TuneError(
+            "specification-unmet",
+            found.sentence,
+            "require less, or remove what limits it",
+            bandwidth_hz=found.promised.bandwidth_hz,
+            limited_by=list(found.limited_by),
+        )
+
+
+def _not_of_an_entry() -> UsageError:
+    return UsageError(
+        "conflict",
+        "--entry has no --schedule and no --strokes: a matrix has one place, and several motors share the inertia",
+        "leave them out",
+        options=["--entry", "--schedule", "--strokes"],
+    )
+
+
+def show_proposal(found: ControllerProposal) -> None:
+    """Print controller, filters and margins before and after."""
+    print("proposal (nothing is written to a machine)")
+    _show_parameters(found)
+    for frequency_hz, depth_db, damping in found.feedback.notches:
+        print(f"  notch at {frequency_hz:.4g} Hz, {depth_db:.3g} dB deep, damping {damping:.3g}")
+    for corner_hz in found.feedback.low_passes:
+        print(f"  low-pass of second order at {corner_hz:.4g} Hz")
+    for biquad in found.feedback.biquads:
+        b, a = (", ".join(f"{x:.12g}" for x in part) for part in (biquad.b, biquad.a))
+        print(f"    at {biquad.rate_hz:g} Hz: b = {b}   a = 1, {a}")
+    _show_margins(found)
+    print(found.sentence)
+    print(found.reach.sentence)
+
+
+def show_schedule(found: GainSchedule) -> None:
+    """Print the gains of each place, and the promised bandwidth with these and with one controller."""
+    print("gains over the schedule, with the filters above; bandwidth also with one controller for all places")
+    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz", "one controller")))
+    for place, row, promised, common in zip(found.position, found.logarithms, found.promised, found.common_promised):
+        numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz, common.bandwidth_hz)
+        print("  " + "".join(f"{x:>16.5g}" for x in numbers))
+    print(f"  {found.reach.sentence}")
+    if not found.share:
+        print("  no other gains keep the limits between the places")
+
+
+def show_feedforward(found: Feedforward | None) -> None:
+    """Print inertia and friction with their bounds, in the units of the recording."""
+    if found is None:
+        print("feedforward: the lines do not show the inertia")
+        return
+    print("feedforward (95 %, units of the recording)")
+    for name in ("inertia", "viscous", "coulomb", "offset"):
+        if (value := getattr(found, name)) is not None:
+            print(f"  {name:32}{value:>12.5g} ± {getattr(found, f'{name}_bound'):.2g}")
+    if found.coulomb is None:
+        print("  friction: the recording has no strokes in both directions; name some: --strokes")
+
+
+def _show_parameters(found: ControllerProposal) -> None:
+    from dataclasses import asdict
+
+    old, new = asdict(found.loop.feedback), asdict(found.feedback.controller)  # type: ignore[call-overload]
+    for name, value in _numbers(new).items():
+        before = _numbers(old)[name]
+        if before != value:
+            print(f"  {name:32}{before:>12.5g}  →  {value:.5g}")
+
+
+def _numbers(values: dict[str, object], prefix: str = "") -> dict[str, float]:
+    found: dict[str, float] = {}
+    for name, value in values.items():
+        if isinstance(value, dict):
+            found |= _numbers(value, f"{prefix}{name}.")
+        elif isinstance(value, float):
+            found[f"{prefix}{name}"] = value
+    return found
+
+
+def _show_margins(found: ControllerProposal) -> None:
+    """Before and after, each as measured and, in brackets, for the worst plant within the bounds."""
+    words = {
+        "gain_margin_db": "gain margin, dB",
+        "phase_margin_deg": "phase margin, °",
+        "max_sensitivity": "Ms",
+        "disk_margin": "disk margin",
+        "bandwidth_hz": "bandwidth, Hz",
+    }
+    rows = len(found.plant.value)
+    print(f"  {'':18}{'before (worst plant)':>24}{'after (promised)':>24}")
+    for name, word in words.items():
+        cells = [
+            "unstable" if one is None or two is None else f"{getattr(one, name):.4g} ({getattr(two, name):.4g})"
+            for one, two in ((found.before, found.before_worst), (found.after, found.promised))
+        ]
+        print(f"  {word:18}{cells[0]:>24}{cells[1]:>24}")
+    word = "noise gain" if found.specification.encoder_step is None else "input noise, rms"
+    print(f"  {word:18}{found.noise[0]:>24.4g}{found.noise[1]:>24.4g}")
+    places = f"{rows} places, " if rows > 1 else ""
+    print(
+        f"  {places}{found.plant.lines_hz.size} lines, {found.plant.lines_hz[0]:g} … {found.plant.lines_hz[-1]:g} Hz; "
+        f"the true plant is within the bounds with {100 * found.specification.confidence:g} %, all lines together"
+    )

@@ -1,0 +1,1 @@
+"""Friction and orders from strokes without excitation."""

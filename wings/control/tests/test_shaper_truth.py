@@ -1,0 +1,51 @@
+"""`livebode shaper`: the mode that `livebode fit` finds is shaped, and the advice of a refusal gives a shaper."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.command import livebode, write_csv
+
+
+@pytest.fixture(scope="module", params=["position", "velocity"])
+def crane(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run of a swinging load: force to angle, or its speed, 0.7355 Hz and 2 % damping; no drive's model fits it."""
+    folder = tmp_path_factory.mktemp("crane")
+    rate_hz, window, rng = 50.0, 1000, np.random.default_rng(5)
+    bins = np.arange(2, 80)
+    spectrum = np.zeros(window // 2 + 1, complex)
+    spectrum[bins] = np.exp(2j * np.pi * rng.random(bins.size))
+    s = 2j * np.pi * np.fft.rfftfreq(window, 1 / rate_hz)
+    pole = 2 * np.pi * 0.7355
+    plant = 0.5 / (s**2 + 2 * 0.02 * pole * s + pole**2) * (s if request.param == "velocity" else 1)
+    force, angle = (np.tile(np.fft.irfft(x * window / 2, window), 6) for x in (spectrum, spectrum * plant))
+    angle = angle + 1e-3 * np.std(angle) * rng.standard_normal(angle.size)
+    log = write_csv(folder / "load.csv", {"t": np.arange(force.size) / rate_hz, "force": force, "angle": angle})
+    options = ("--input", "force", "--output", "angle", "--estimator", "direct", "--average", "--window", window)
+    result = livebode("run", log, *options, "--out", folder / "run")
+    assert result.code == 0, result.err
+    return folder / "run"
+
+
+def test_the_mode_of_a_fit_is_shaped(crane: Path) -> None:
+    fitted = json.loads(livebode("fit", crane, "--model", "modal", "--json").out)
+    shaped = livebode("shaper", crane, "--model", "modal", "--json")
+    assert shaped.code == 0, shaped.err
+    mode = json.loads(shaped.out)["mode"]
+    assert mode["low_hz"] < 0.7355 < mode["high_hz"]
+    assert mode["low_damping"] < 0.02 < mode["high_damping"]
+    assert "0.735" in json.dumps(fitted)
+
+
+def test_the_advice_of_a_refusal_is_an_option_that_works(crane: Path) -> None:
+    for model in ((), ("--model", "two-mass-gain"), ("--model", "rational")):
+        refused = livebode("shaper", crane, *model)
+        assert refused.code == 2
+        found = re.search(r"choose the model '(\w+)'.*\(option (--\w+)\)", refused.err)
+        assert found is not None, refused.err
+        assert livebode("shaper", crane, found[2], found[1]).code == 0

@@ -1,0 +1,1 @@
+"""Live sources: buses, PLCs, servers and devices that send samples."""

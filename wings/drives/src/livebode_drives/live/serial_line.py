@@ -1,0 +1,125 @@
+"""Serial lines: a microcontroller at a serial port or at USB, with lines of numbers, lines of JSON or frames."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import ClassVar
+
+from livebode.core import ConfigError, not_installed
+from livebode.sources.live import TICK_S, Address, AnyBatch, LiveSource, Position, Reach, named_channels
+from livebode_drives.live.arrival_rate import ArrivalRate
+from livebode_drives.live.number_lines import NumberLines
+from livebode_drives.live.serial_decoder import FramesOrJson, NumbersDecoder, SerialDecoder
+from livebode_drives.settings import DriveKeys
+
+TOGETHER_S = 0.01
+"""Time between reads: what arrives together costs less. The system's buffer holds 4 KiB, 40 ms of 921,600 baud."""
+PIECE_BYTES = 1 << 16
+
+
+class SerialSource(LiveSource):
+    """The device at the port in the URL. The port is opened again after the device was unplugged."""
+
+    settings: DriveKeys
+    format: ClassVar[str] = "serial"
+
+    def __init__(self, settings: DriveKeys, address: Address) -> None:
+        super().__init__(settings, address)
+        self._serial = import_serial()
+        self._lines = number_lines(settings, 0) if settings.channels else None
+        self._arrival: ArrivalRate | None = None
+        self._epoch = 0
+
+    def resume(self, position: Position) -> None:
+        super().resume(position)
+        if self._lines is not None:
+            # Only a counter that does not wrap tells what is missing after a pause of any length.
+            certain = self.settings.counter is not None and self.settings.counter_modulus is None
+            self._lines = number_lines(self.settings, position.epoch + (not certain))
+
+    def reach(self) -> Reach:
+        """Whether the port is there; it is not opened, since that starts many devices again."""
+        facts = {"address": str(self.address)}
+        path = Path(self.address.path)
+        if os.name != "nt" and not path.exists():
+            from serial.tools.list_ports import comports
+
+            found = [port.device for port in comports()]
+            remedy = f"plug the device in, or set source.url to {' or '.join(found)}" if found else "plug the device in"
+            return Reach("failed", f"{self.address}: there is no such device", remedy, facts)
+        if os.name != "nt" and not os.access(path, os.R_OK | os.W_OK):
+            remedy = f"add the user to the group of {path}, often dialout, and log in again"
+            return Reach("failed", f"{self.address}: permission denied", remedy, facts)
+        return Reach("ok", f"{self.address} is there", facts=facts)
+
+    def _receive(self) -> bool:
+        # Another program that reads the port would take bytes from this one.
+        with self._serial.Serial(self.address.path, self.settings.baud_rate, timeout=TICK_S, exclusive=True) as port:
+            self._established()
+            decoder, self._arrival = self._decoder(), None
+            try:
+                while not self._stop.is_set():
+                    if piece := port.read(1):
+                        self._take_piece(decoder, piece + port.read(min(port.in_waiting, PIECE_BYTES)))
+                        self._stop.wait(TOGETHER_S)
+            finally:
+                if self._lines is not None:
+                    self._lines.restart()
+        return False
+
+    def _decoder(self) -> SerialDecoder:
+        return FramesOrJson(self.settings.rate_hz) if self._lines is None else NumbersDecoder(self._lines)
+
+    def _take_piece(self, decoder: SerialDecoder, piece: bytes) -> None:
+        now = time.monotonic()
+        for batch in decoder.feed(piece, now):
+            self._check_rate(batch, now)
+            self._deliver(batch)
+        for problem in decoder.problems:
+            self._malformed(problem)
+        decoder.problems.clear()
+
+    def _check_rate(self, batch: AnyBatch, now: float) -> None:
+        if self._arrival is None:
+            self._arrival = ArrivalRate(self._events, batch.rate_hz)
+        if batch.epoch != self._epoch:
+            self._epoch = batch.epoch
+            self._arrival.restart()
+        self._arrival.take(batch.stop, now)
+
+
+def number_lines(settings: DriveKeys, epoch: int) -> NumberLines:
+    """The reader of lines of numbers for these settings; ConfigError if they are not complete."""
+    if settings.rate_hz is None:
+        raise ConfigError(
+            "key-missing",
+            "lines of numbers need source.rate_hz",
+            "set it to the rate at which the device samples",
+            key="source",
+            keys=["rate_hz"],
+        )
+    channels = named_channels(settings.channels)
+    names = [channel.name for channel in channels]
+    if settings.counter is not None and settings.counter not in names:
+        raise ConfigError(
+            "value-invalid",
+            f"source.counter = {settings.counter!r} is not one of source.channels",
+            f"name one of {', '.join(names)}, or remove it",
+            key="source.counter",
+            value=settings.counter,
+        )
+    column = None if settings.counter is None else names.index(settings.counter)
+    return NumberLines(channels, settings.rate_hz, column, settings.counter_modulus, epoch)
+
+
+def import_serial() -> ModuleType:
+    try:
+        import serial
+    except ImportError:
+        raise not_installed(
+            "serial needs the package pyserial, which is not installed", package="pyserial", extra="serial"
+        ) from None
+    return serial  # type: ignore[no-any-return]

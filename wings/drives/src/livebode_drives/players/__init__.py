@@ -1,0 +1,1 @@
+"""Controllers that `livebode measure` plays an excitation on."""

@@ -1,0 +1,1 @@
+"""Recordings of drives, PLCs, buses and robots."""

@@ -1,0 +1,188 @@
+"""Projects of TwinCAT Scope with their data (.svdx): binary samples, and XML that names and scales them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import Any, ClassVar
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.sources import COLUMNS_MAX, Chunk, Column, Recording, Skipped, oversized
+from livebode_drives.recordings.safexml import parse
+from livebode_drives.recordings.svdxdata import Samples, read_table, samples_of
+from livebode_drives.recordings.timed import TimedColumns, as_columns
+from livebode_drives.recordings.twincat import QUANTITY, TIME
+from livebode_drives.recordings.twincatwords import unique_names
+
+TYPES = {
+    "BIT": "u1", "BOOL": "u1", "INT8": "i1", "INT16": "<i2", "INT32": "<i4", "INT64": "<i8", "UINT8": "u1",
+    "UINT16": "<u2", "UINT32": "<u4", "UINT64": "<u8", "REAL32": "<f4", "REAL64": "<f8",
+}  # fmt: skip
+ALL_BITS = (1 << 64) - 1
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """Where the raw values of a channel are, and its physical values: factor·raw + offset."""
+
+    handle: int
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def values(self, raw: NDArray[Any]) -> NDArray[Any]:
+        return raw if (self.factor, self.offset) == (1.0, 0.0) else raw * self.factor + self.offset
+
+
+class ScopeProjectRecording(Recording):
+    """A project of TwinCAT Scope. Channels have the names, scaling and units of the charts; what no chart shows goes
+    by the name of its acquisition. Acquisitions of equal times have one clock, in ns since 1970."""
+
+    format: ClassVar[str] = "svdx"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        (first, length), self._parts = read_table(path)
+        root = parse(path, first, length)
+        self._kinds: dict[int, np.dtype[Any]] = {}
+        found: list[Column] = []
+        skipped: list[Skipped] = []
+        shown = list(shown_acquisitions(root))
+        for item in (*shown, *hidden_acquisitions(root, shown)):
+            if len(found) > COLUMNS_MAX:
+                raise oversized(f"{path} has more than {COLUMNS_MAX} channels", COLUMNS_MAX)
+            if why := self._unreadable(item):
+                skipped.append(Skipped(item.name, why))
+            else:
+                found.append(item.column())
+        self.columns, self.skipped = tuple(as_columns(self._by_clock(distinct(found)))), tuple(skipped)
+
+    def _unreadable(self, item: Shown) -> str:
+        """Why the data of an acquisition is not read; empty if it is."""
+        data = item.acquisition
+        type_, handle = text(data, "DataType"), int(text(data, "FileHandle") or 0)
+        if handle not in self._parts:
+            return "its data is not in the file"
+        if text(data, "CompressionMode") not in ("", "Uncompressed"):
+            return f"its data is compressed ({text(data, 'CompressionMode')}): export it as CSV"
+        if type_ not in TYPES:
+            return f"its values are of type {type_}, not numbers"
+        if item.bits != ALL_BITS:
+            return "it shows single bits of its variable: export it as CSV"
+        self._kinds[handle] = np.dtype(TYPES[type_])
+        return ""
+
+    def _by_clock(self, columns: Sequence[Column]) -> list[TimedColumns]:
+        """The channels by their times, those with most channels first; each acquisition is read once for that."""
+        groups: dict[tuple[int, bytes], list[Column]] = {}
+        seen: dict[int, tuple[int, bytes]] = {}
+        for column in columns:
+            handle = column.key.handle
+            if handle not in seen:
+                seen[handle] = self._times_of(handle)
+            groups.setdefault(seen[handle], []).append(column)
+        timed = [
+            TimedColumns(Column(TIME, "ns", temporal=True, key=channels[0].key.handle), tuple(channels), samples)
+            for (samples, _), channels in groups.items()
+            if samples
+        ]
+        return sorted(timed, key=lambda group: -len(group.channels))
+
+    def _times_of(self, handle: int) -> tuple[int, bytes]:
+        """Number and fingerprint of the times of an acquisition."""
+        samples, digest = 0, hashlib.blake2b()
+        for times_ns, _ in self._samples(handle):
+            samples += len(times_ns)
+            digest.update(times_ns.tobytes())
+        return samples, digest.digest()
+
+    def _samples(self, handle: int) -> Iterator[Samples]:
+        return samples_of(self.path, self._parts[handle], self._kinds[handle])
+
+    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        keys = [column.key if isinstance(column.key, Scaled) else Scaled(column.key) for column in columns]
+        handles = list(dict.fromkeys(key.handle for key in keys))
+        for parts in zip(*(even(self._samples(handle), rows) for handle in handles), strict=True):
+            read = dict(zip(handles, parts))
+            yield [
+                read[key.handle][0] if column.temporal else key.values(read[key.handle][1])
+                for column, key in zip(columns, keys)
+            ]
+
+
+def even(pieces: Iterator[Samples], rows: int) -> Iterator[Samples]:
+    """The samples `rows` at a time."""
+    held: list[Samples] = []
+    count = 0
+    for piece in chain(pieces, [None]):
+        if piece is not None:
+            held.append(piece)
+            count += len(piece[0])
+        if count >= rows or (piece is None and count):
+            times, values = (np.concatenate(parts) for parts in zip(*held))
+            full = count if piece is None else count - count % rows
+            for first in range(0, full, rows):
+                yield times[first : min(first + rows, full)], values[first : min(first + rows, full)]
+            held, count = [(times[full:], values[full:])], count - full
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A channel: its name, the acquisition with its data, and how a chart scales it."""
+
+    name: str
+    acquisition: Element
+    interpreter: Element | None = None
+
+    @property
+    def bits(self) -> int:
+        return int(text(self.interpreter, "BitMask") or ALL_BITS)
+
+    def column(self) -> Column:
+        """The channel; first its own scaling applies, then that of its unit."""
+        own, symbol = self.interpreter, text(self.acquisition, "SymbolName")
+        scale, offset = number(own, "ScaleFactor", 1.0), number(own, "Offset", 0.0)
+        again = number(own, "ResultingUnit/UnitScaleResult", 1.0)
+        shift = number(own, "ResultingUnit/UnitOffsetResult", 0.0)
+        key = Scaled(int(text(self.acquisition, "FileHandle")), scale * again, offset * again + shift)
+        unit = QUANTITY.sub("", f" {text(own, 'ResultingUnit/Unit/ReturnText')}").strip()
+        return Column(self.name, unit, aliases=(symbol,) if symbol not in ("", self.name) else (), key=key)
+
+
+def text(element: Element | None, path: str) -> str:
+    return (element.findtext(path) or "").strip() if element is not None else ""
+
+
+def number(element: Element | None, path: str, default: float) -> float:
+    found = text(element, path)
+    return float(found) if found else default
+
+
+def shown_acquisitions(root: Element) -> Iterator[Shown]:
+    """What the charts show; the x of an XY chart as NAME.X."""
+    by_guid = {text(one, "Guid"): one for one in root.iter() if one.find("FileHandle") is not None}
+    for channel in root.iter("Channel"):
+        for own in channel.iter("AcquisitionInterpreter"):
+            data = by_guid.get(text(own, "AcquisitionGUID"))
+            if data is not None:
+                usage = text(own, "Usage")
+                yield Shown(text(channel, "Name") + (f".{usage}" if usage not in ("", "Y") else ""), data, own)
+
+
+def hidden_acquisitions(root: Element, shown: Sequence[Shown]) -> Iterator[Shown]:
+    known = {id(one.acquisition) for one in shown}
+    for one in root.iter():
+        if one.find("FileHandle") is not None and id(one) not in known:
+            yield Shown(text(one, "Name"), one)
+
+
+def distinct(columns: Sequence[Column]) -> list[Column]:
+    """Each channel once, with a name of its own."""
+    different = list({(column.name, column.key): column for column in columns}.values())
+    names = unique_names([column.name for column in different], [(*column.aliases, "")[0] for column in different])
+    return [replace(column, name=name) for column, name in zip(different, names)]

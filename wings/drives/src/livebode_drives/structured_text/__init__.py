@@ -1,0 +1,1 @@
+"""Function blocks beside the excitation: sliding DFT, ring buffer and program, also as files of TwinCAT 3."""

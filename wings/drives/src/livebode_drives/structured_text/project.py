@@ -1,0 +1,145 @@
+"""All files of a PLC project: excitation, sliding DFT, ring, and the program that connects them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from livebode.core import Lines, UsageError
+from livebode.structured_text import Declared, check_names, comment, multisine, section
+from livebode_drives.structured_text.ring import LENGTH, ring_block, ring_type
+from livebode_drives.structured_text.sliding_dft import sliding_dft
+
+COUNTER = "sample"
+_DECLARED: list[Declared] = [
+    ("livebode", "ST_LivebodeRing", "read by livebode"),
+    ("fbMultisine", "FB_Multisine", ""),
+    ("fbSlidingDft", "FB_SlidingDft", ""),
+    ("fbRing", "FB_LivebodeRing", ""),
+    ("enable", "BOOL", "excite"),
+    ("stop", "BOOL", "w = 0 at once: connect the drive's fault to it"),
+    ("scale", "LREAL := 1.0", "of the excitation"),
+    ("watch", "UDINT", "cycles until enable is reset, renewed by livebode; 0: never"),
+]
+_WATCH = """\
+IF watch > 0 THEN
+    watch := watch - 1;
+    IF watch = 0 THEN
+        enable := FALSE;
+    END_IF
+END_IF
+"""
+# A variable with one of these names would change the meaning of MAIN.
+_OWN = ("MAIN", "F_GetSystemTime", *(word for name, of, _ in _DECLARED for word in (name, of.split()[0])))
+
+
+@dataclass(frozen=True)
+class Project:
+    """Parts of a PLC program that excites an axis, tracks it and sends its samples to livebode.
+
+    Parameters
+    ----------
+    period
+        One period of the excitation, shape (samples,).
+    limit
+        Limit of the magnitude of the excitation.
+    lines
+        Bins and window of the sliding DFT, and the rate of the task.
+    channels
+        Names of the recorded channels, in the ring's order.
+    excitation
+        The channel that the block generates; the program reads the others from the drive.
+    tracked
+        Channels of the sliding DFT.
+    ring_length
+        Number of samples in the ring.
+    ramp_periods
+        Periods of the ramps of the excitation.
+    counter
+        Name of an additional channel: the excitation's sample counter; multiples of the window are borders of
+        periods.
+    note
+        Lines for the top of the excitation's file.
+    """
+
+    period: ArrayLike
+    limit: float
+    lines: Lines
+    channels: Sequence[str]
+    excitation: str
+    tracked: Sequence[str]
+    ring_length: int = LENGTH
+    ramp_periods: int = 1
+    counter: str = COUNTER
+    note: str = ""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The ring's columns: the channels, and after them the counter if it is not one of them."""
+        return (*self.channels, *([] if self.counter in self.channels else [self.counter]))
+
+    def files(self) -> dict[str, str]:
+        """Text of each file by its name.
+
+        Raises
+        ------
+        UsageError
+            As `multisine`, `sliding_dft`, `ring_type` and `ring_block`; also if the excitation or a tracked signal is
+            not a channel, or has a name that the program uses.
+        """
+        check_signals((self.excitation, *self.tracked), self.counter)
+        for name in (self.excitation, *self.tracked):
+            if name not in self.channels:
+                raise UsageError(
+                    "unknown-name",
+                    f"there is no channel {name!r}",
+                    f"choose from {', '.join(self.channels)}",
+                    argument="excitation" if name == self.excitation else "tracked",
+                    value=name,
+                    allowed=list(self.channels),
+                )
+        check_names(self.columns, "channel", _OWN)
+        rate_hz = self.lines.rate_hz
+        return {
+            "FB_Multisine.st": multisine(
+                self.period, rate_hz=rate_hz, limit=self.limit, ramp_periods=self.ramp_periods, note=self.note
+            ),
+            "FB_SlidingDft.st": sliding_dft(self.lines, self.tracked),
+            "ST_LivebodeRing.st": ring_type(len(self.columns), rate_hz, length=self.ring_length),
+            "FB_LivebodeRing.st": ring_block(self.columns, length=self.ring_length),
+            "MAIN.st": self._program(),
+        }
+
+    def _program(self) -> str:
+        made = {self.excitation: "the excitation", self.counter: "its sample counter"}
+        wired = "\n".join(f"// {name} := ...;" for name in self.columns if name not in made)
+        return (
+            comment(f"The task that controls the drive calls this once a cycle, at {self.lines.rate_hz:g} Hz.")
+            + "PROGRAM MAIN\n"
+            + section(
+                "VAR",
+                [*_DECLARED, *((name, "LREAL", made.get(name, "")) for name in self.columns)],
+            )
+            + f"\n// 1. From the drive, of this cycle:\n{wired}\n\n"
+            + "// 2. The excitation\n"
+            + _WATCH
+            + "fbMultisine(enable := enable, stop := stop, scale := scale);\n"
+            + f"{self.excitation} := fbMultisine.w;\n"
+            + f"{self.counter} := ULINT_TO_LREAL(fbMultisine.sample);\n\n"
+            + f"// 3. To the drive: add {self.excitation} to the torque reference\n\n"
+            + "// 4. Spectra in fbSlidingDft.re and .im, [channel, bin]; samples to livebode\n"
+            + f"fbSlidingDft({_arguments(self.tracked)});\n"
+            + f"fbRing(ring := livebode, stamp := F_GetSystemTime(), {_arguments(self.columns)});\n"
+            + "END_PROGRAM\n"
+        )
+
+
+def check_signals(names: Iterable[str], counter: str = COUNTER) -> None:
+    """UsageError for a signal with a name that MAIN uses: the counter would be sent as torque."""
+    check_names(list(dict.fromkeys(names)), "signal", (*_OWN, counter))
+
+
+def _arguments(names: Sequence[str]) -> str:
+    return ", ".join(f"{name} := {name}" for name in names)

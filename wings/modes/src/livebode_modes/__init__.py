@@ -1,0 +1,5 @@
+"""Modes from the outputs alone: frequencies and dampings of what rings, without an input."""
+
+from livebode.on_first_use import on_first_use
+
+__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

@@ -1,0 +1,110 @@
+"""Pictures and printed results of an output-only run."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from pathlib import Path
+from shutil import get_terminal_size
+from typing import Any
+
+from livebode.cli import can_draw, is_terminal, one_drawing_at_a_time, print_drawn, tell_how_to_draw
+from livebode.configuration import Axis
+from livebode.core import counted
+from livebode.locations import original
+from livebode.runtime import Draw, Outcome
+
+
+def drawing_modes(axis: Axis) -> Draw:
+    """A function that draws modes.png into the directory of a run, if Matplotlib is installed."""
+
+    def draw(_: object, into: Path) -> None:
+        if not can_draw():
+            return
+        from livebode.records import RunRecord
+        from livebode_modes.mode_curves import mode_curves
+        from livebode_modes.picture import save_modes  # with Matplotlib half a second to import
+
+        run = RunRecord.open(into, output_only=True)
+        title = f"{axis.source.title}: {axis.signals.output}"
+        with one_drawing_at_a_time():
+            save_modes(mode_curves(run), into, title=title, facts=_facts(run.summary))
+
+    return draw
+
+
+def _facts(summary: dict[str, Any]) -> str:
+    found = summary["found"]
+    return (
+        f"from the output alone: {', '.join(found['outputs'])} · {counted(len(summary['modes']), 'mode')}, "
+        f"{counted(len(summary['harmonics']), 'harmonic')} · window {found['window'] / found['rate_hz']:.4g} s · "
+        "95 % bounds"
+    )
+
+
+def show_modes(outcome: Outcome) -> None:
+    """Print the frequencies over time and one line for each mode."""
+    from livebode.records import RunRecord
+    from livebode_modes.mode_curves import mode_curves
+    from livebode_modes.terminal_picture import terminal_modes
+
+    size = get_terminal_size((100, 30))
+    text = terminal_modes(
+        mode_curves(RunRecord.open(outcome.directory, output_only=True)),
+        width=min(size.columns, 140),
+        height=max(10, min(size.lines - 4, 24)),
+        colour=is_terminal() and "NO_COLOR" not in os.environ,
+        unicode="utf" in (sys.stdout.encoding or "").lower(),
+    )
+    if text:
+        print_drawn(text)
+    for line in mode_lines(outcome.summary):
+        print(line)
+    print(f"{original(str(outcome.directory))}/")
+    tell_how_to_draw()
+
+
+def mode_lines(summary: dict[str, Any]) -> list[str]:
+    """The result of an output-only run in sentences."""
+    counts, found, speed = summary["counts"], summary["found"], summary["speed"]
+    low_hz, high_hz = found["band_hz"]
+    lines = [_mode(track) for track in summary["modes"]] or [_no_mode(found["window"] / found["rate_hz"])]
+    lines += [_harmonic(track) for track in summary["harmonics"]]
+    gaps = f", {counted(counts['gaps'], 'gap')}" if counts["gaps"] else ""
+    lines.append(
+        f"{counted(counts['windows'], 'window')} of {found['window'] / found['rate_hz']:.4g} s, one every "
+        f"{found['hop'] / found['rate_hz']:.4g} s, {low_hz:.4g} … {high_hz:.4g} Hz, from {counts['samples']} samples"
+        f"{gaps}: {speed['recorded_s']:.1f} s of output in {speed['run_s']:.2f} s"
+    )
+    return lines
+
+
+def _no_mode(window_s: float) -> str:
+    """With the width 2ζf of a resonance whose decay fits ten times into the window."""
+    width_hz = 10 / (math.pi * window_s)
+    return (
+        f"no mode was found; a window of {window_s:.3g} s shows resonances wider than {width_hz:.2g} Hz: record longer "
+        "for narrower ones (or --window), or choose a band around the expected frequency (--band)"
+    )
+
+
+def _mode(track: dict[str, Any]) -> str:
+    newest = track["newest"]
+    return (
+        f"{track['name']}: {newest['frequency_hz']:.5g} ± {1.96 * newest['frequency_hz_sigma']:.2g} Hz, damping "
+        f"{100 * newest['damping']:.3g} ± {100 * 1.96 * newest['damping_sigma']:.2g} %, "
+        f"{100 * newest['share']:.0f} % of the power (newest); {_range(track)}"
+    )
+
+
+def _harmonic(track: dict[str, Any]) -> str:
+    return (
+        f"{track['name']}: {track['newest']['frequency_hz']:.5g} Hz, constant amplitude and almost no damping: not a "
+        f"mode; {_range(track)}"
+    )
+
+
+def _range(track: dict[str, Any]) -> str:
+    low, high = track["frequency_hz"]
+    return f"{low:.5g} … {high:.5g} Hz over {track['found']} of {counted(track['rows'], 'window')}"

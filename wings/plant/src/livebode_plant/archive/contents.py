@@ -1,0 +1,77 @@
+"""What a lake contains: runs by machine, and the recordings in quarantine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from packaging.version import Version
+
+from livebode.core import LEVELS
+from livebode_plant.lake import Lake
+
+_COLUMNS = ["content", "recipe", *LEVELS, "recorded_from", "alarms", "baseline"]
+
+
+@dataclass
+class MachineRuns:
+    """The runs of a machine: how many, and the days of the first and the last, as far as known.
+
+    `judged` of them were compared with a baseline, and `alarming` of these have an alarm.
+    """
+
+    machine: str
+    runs: int = 0
+    judged: int = 0
+    alarming: int = 0
+    quarantined: int = 0
+    first: datetime | None = None
+    last: datetime | None = None
+
+    def count(self, row: dict[str, Any]) -> None:
+        """Count the run of a row of `runs`."""
+        recorded = row["recorded_from"]
+        self.runs += 1
+        self.judged += row["baseline"] is not None
+        self.alarming += bool(row["alarms"])
+        if recorded is not None:
+            self.first = min(self.first or recorded, recorded)
+            self.last = max(self.last or recorded, recorded)
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """As plain data, the days in ISO 8601."""
+        days = {name: when and when.date().isoformat() for name, when in (("first", self.first), ("last", self.last))}
+        numbers = {name: getattr(self, name) for name in ("runs", "judged", "alarming", "quarantined")}
+        return {"machine": self.machine, **numbers, **days}
+
+
+def machines(lake: Lake) -> list[MachineRuns]:
+    """The machines of the lake by name, with the numbers of their runs and of recordings in quarantine."""
+    found: dict[str, MachineRuns] = {}
+    for row in lake.read("runs", _COLUMNS).to_pylist():
+        found.setdefault(path_of(row), MachineRuns(path_of(row))).count(row)
+    for row in quarantine(lake):
+        found.setdefault(path_of(row), MachineRuns(path_of(row))).quarantined += 1
+    return [found[name] for name in sorted(found)]
+
+
+def quarantine(lake: Lake) -> list[dict[str, Any]]:
+    """The recordings that could not be tracked, as the newest livebode that tried them reports."""
+    runs = lake.read("runs", ["content", "recipe"])
+    done, newest = set(zip(runs["content"].to_pylist(), runs["recipe"].to_pylist())), {}
+    for row in sorted(lake.read("quarantine").to_pylist(), key=lambda row: Version(row["livebode"])):
+        if (key := (row["content"], row["recipe"])) not in done:
+            newest[key] = row
+    return sorted(newest.values(), key=lambda row: (row["url"], row["recipe"]))
+
+
+def path_of(row: Mapping[str, Any]) -> str:
+    """The machine as site/line/machine/axis; levels that are not known are left out.
+
+    >>> path_of({"site": "Graz", "line": None, "machine": "press 4", "axis": "x"})
+    'Graz/press 4/x'
+    """
+    return "/".join(row[level] for level in LEVELS if row[level])

@@ -1,0 +1,240 @@
+"""The coordinator of an archive: finds what is new, distributes it, and alone commits results to the lake."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from packaging.version import Version
+
+from livebode.version import __version__
+from livebode_plant.archive.alone import handle_alone
+from livebode_plant.archive.committing import Committer
+from livebode_plant.archive.contents import quarantine
+from livebode_plant.archive.grouping import RecordingGroups
+from livebode_plant.archive.job import Job, short
+from livebode_plant.archive.recordings import (
+    ArchivedRecording,
+    RecordingPlace,
+    find_places,
+    known_contents,
+    longest_first,
+    place_of,
+    untracked,
+)
+from livebode_plant.archive.results import Failed, Handled, Hashed, Result, Tracked, each_result, lost
+from livebode_plant.archive.settings import ArchiveSettings
+from livebode_plant.archive.tasks import handle
+from livebode_plant.lake import Lake
+
+if TYPE_CHECKING:
+    from livebode_plant.archive.clusters import Cluster
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far an archive is.
+
+    Attributes
+    ----------
+    stage
+        "reading" (hashing what may be a copy) or "tracking".
+    done, total
+        Recordings.
+    done_bytes, total_bytes
+        Their lengths.
+    dashboard
+        Address of Dask's page, if a cluster runs.
+    """
+
+    stage: str
+    done: int
+    total: int
+    done_bytes: int
+    total_bytes: int
+    dashboard: str | None
+
+
+@dataclass
+class ArchiveOutcome:
+    """What a run of an archive did.
+
+    Attributes
+    ----------
+    recordings
+        Places that the inputs name.
+    known
+        Of these, those whose content was in the lake already, as a result or in quarantine, or is at another place.
+    tracked
+        Results that are in the lake now: one for each recording and axis of the recipe.
+    quarantined, unreadable
+        Recordings that could not be tracked, and those that could not be read; these are tried again next time.
+    stopped
+        Whether it was stopped before everything was tracked; `remaining` recordings are left.
+    """
+
+    recordings: int = 0
+    known: int = 0
+    tracked: int = 0
+    quarantined: list[Failed] = field(default_factory=list)
+    unreadable: list[Failed] = field(default_factory=list)
+    stopped: bool = False
+    remaining: int = 0
+
+
+Report = Callable[[Progress], None]
+
+
+class Coordinator:
+    """Tracks the recordings of an archive. Several of them may work on one lake at the same time.
+
+    Parameters
+    ----------
+    settings
+        The archive.
+    report
+        Receives the progress.
+
+    Raises
+    ------
+    ConfigError
+        If the recipe is not usable.
+    """
+
+    def __init__(self, settings: ArchiveSettings, report: Report) -> None:
+        self._settings, self._report = settings, report
+        self._lake = Lake(settings.lake)
+        memory_bytes = settings.cluster.memory_mb * 1_000_000
+        self._job = Job.of(settings.axes(), settings.lake, memory_bytes, settings.baselines)
+        self._outcome = ArchiveOutcome()
+        self._cluster: Cluster | None = None
+
+    def run(self) -> ArchiveOutcome:
+        """Track what the lake does not have; Ctrl-C and SIGTERM end it with the results of what was finished.
+
+        Raises
+        ------
+        LivebodeError
+            If no recording is found, or the storage, the lake or the cluster cannot be used.
+        """
+        outcome = self._outcome
+        self._lake.check()
+        places = find_places(self._settings.templates)
+        outcome.recordings = len(places)
+        with ExitStack() as stack:
+            try:
+                recordings = self._recordings(places, stack)
+                outcome.known = len(places) - len(recordings) - len(outcome.unreadable)
+                self._handle("tracking", recordings, stack)
+            except (KeyboardInterrupt, SystemExit):
+                outcome.stopped = True
+        return outcome
+
+    def retry(self, older: bool) -> ArchiveOutcome:
+        """Track what is in quarantine for this recipe again, each alone; with `older` what another livebode tried."""
+        rows = [row for row in quarantine(self._lake) if row["recipe"] in self._job.recipes]
+        if older:
+            rows = [row for row in rows if Version(row["livebode"]) < Version(__version__)]
+        self._outcome.recordings = len(rows)
+        recordings = [ArchivedRecording(place_of(row), (row["recipe"],), row["content"]) for row in rows]
+        with ExitStack() as stack:
+            try:
+                self._handle("tracking", recordings, stack, alone=True)
+            except (KeyboardInterrupt, SystemExit):
+                self._outcome.stopped = True
+        return self._outcome
+
+    def _recordings(self, places: Sequence[RecordingPlace], stack: ExitStack) -> list[ArchivedRecording]:
+        """What is to be tracked, the longest first: contents without a result, and places whose content is not known.
+
+        Only recordings of one length can have one content, so only those are hashed before any of them is tracked.
+        """
+        known, by_size = known_contents(self._lake)
+        skipped = {*self._lake.keys("runs"), *(key[:2] for key in self._lake.keys("quarantine"))}
+        recipes = tuple(self._job.recipes)
+
+        def waiting() -> list[ArchivedRecording]:
+            contents = [(place, known[place.known_as]) for place in places if place.known_as in known]
+            return untracked(contents, recipes, skipped)
+
+        new = [place for place in places if place.known_as not in known]
+        lengths = Counter(place.size_bytes for place in (*new, *(one.place for one in waiting())))
+        alike = [place for place in new if not place.size_bytes or lengths[place.size_bytes] > 1]
+        for result in self._handle("reading", [ArchivedRecording(place) for place in alike], stack):
+            if isinstance(result, Hashed):
+                known[result.place.known_as] = result.content
+        single = [ArchivedRecording(place, recipes) for place in new if lengths[place.size_bytes] == 1]
+        candidates = {content for one in single for content in by_size.get(one.size_bytes, ())}
+        done = {content for content in candidates if all((content, recipe) in skipped for recipe in recipes)}
+        self._job = replace(self._job, known=frozenset(map(short, done)))
+        return longest_first([*waiting(), *single])
+
+    def _handle(
+        self, stage: str, recordings: Sequence[ArchivedRecording], stack: ExitStack, alone: bool = False
+    ) -> list[Result]:
+        """Hash or track recordings, and commit what is found."""
+        if not recordings:
+            return []
+        committer, results = Committer(self._lake, self._job), []
+        tracking = stage == "tracking"
+        self._outcome.remaining = len(recordings) if tracking else 0
+        try:
+            for handled in self._distributed(stage, recordings, stack, alone):
+                found = each_result(handled)
+                self._count(found)
+                if tracking:
+                    self._outcome.remaining -= len(handled)
+                    self._outcome.known += sum(all(isinstance(x, Hashed) for x in one.results) for one in handled)
+                results += [] if tracking else found
+                committer.take(found)
+        finally:
+            committer.commit()
+        return results
+
+    def _count(self, results: Iterable[Result]) -> None:
+        for result in results:
+            if isinstance(result, Tracked):
+                self._outcome.tracked += 1
+            elif isinstance(result, Failed):
+                bad = self._outcome.unreadable if result.by_storage else self._outcome.quarantined
+                bad.append(result)
+
+    def _distributed(
+        self, stage: str, recordings: Sequence[ArchivedRecording], stack: ExitStack, alone: bool
+    ) -> Iterator[list[Handled]]:
+        """What was found, in the order in which it comes."""
+        cluster = self._started(stack)
+        from livebode_plant.archive.distributing import Distribution
+
+        groups = RecordingGroups([] if alone else recordings)
+        together, one = partial(handle, self._job), partial(handle_alone, self._job)
+        work: Distribution[ArchivedRecording, Handled] = Distribution(cluster, groups, together, one, _again, lost)
+        work.last.extend(recordings if alone else ())
+        done, done_bytes, total_bytes = 0, 0, sum(one.size_bytes for one in recordings)
+        self._report(Progress(stage, 0, len(recordings), 0, total_bytes, cluster.dashboard))
+        try:
+            for pairs in work.results():
+                for recording, handled in pairs:
+                    groups.learn(recording.size_bytes, handled.seconds)
+                    done, done_bytes = done + 1, done_bytes + recording.size_bytes
+                self._report(Progress(stage, done, len(recordings), done_bytes, total_bytes, cluster.dashboard))
+                yield [handled for _, handled in pairs]
+        except (KeyboardInterrupt, SystemExit):
+            yield [handled for _, handled in work.ready()]
+            raise
+
+    def _started(self, stack: ExitStack) -> Cluster:
+        """The cluster, which is started when there is something to do."""
+        if self._cluster is None:
+            from livebode_plant.archive.clusters import started
+
+            self._cluster = stack.enter_context(started(self._settings.cluster))
+        return self._cluster
+
+
+def _again(handled: Handled) -> bool:
+    return handled.again

@@ -1,0 +1,215 @@
+"""ArchiveSettings: which recordings are tracked, how, where, and where the results go; from archive.toml."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+from urllib.parse import urlsplit
+
+from pydantic import Field, ValidationError
+
+from livebode.configuration import Axis, File, Schema, read_table, schema_of, tables_of
+from livebode.core import ConfigError, on_loopback
+from livebode_plant.archive.template import Template
+from livebode_plant.settings_section import SettingsSection, first_error
+
+Text = Annotated[str, Field(min_length=1)]
+
+
+class ClusterSection(SettingsSection):
+    """[cluster]: the processes that track.
+
+    Parameters
+    ----------
+    kind
+        "local": processes on this computer. "ssh": on other computers. "slurm": jobs of Slurm.
+    address
+        Scheduler of Dask that is running already, such as "tls://head:8786", instead of starting workers.
+    workers
+        Number of processes. Default: of a local cluster one for each core.
+    memory_mb
+        Memory of a process, in MB. A recording that needs more is put in quarantine.
+    hosts
+        Computers of a cluster by ssh; the first one has the scheduler.
+    queue
+        Partition of Slurm.
+    certificate
+        Certificate of this computer in PEM, relative to this file. Required except on the loopback.
+    key
+        Its private key in PEM, relative to this file.
+    authority
+        Certificate of the authority that signed the certificates of all computers in the cluster, relative to this
+        file.
+    """
+
+    kind: Literal["local", "ssh", "slurm"] = "local"
+    address: Text | None = None
+    workers: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    memory_mb: Annotated[int, Field(ge=256)] = 1024
+    hosts: list[Text] = []
+    queue: Text | None = None
+    certificate: File | None = None
+    key: File | None = None
+    authority: File | None = None
+
+    @property
+    def encrypted(self) -> bool:
+        """Whether all three files of mutual TLS are named."""
+        return None not in (self.certificate, self.key, self.authority)
+
+    def checked(self) -> None:
+        """ConfigError if others could send it code: a port of Dask executes what it receives."""
+        remote = (
+            self.kind != "local" if self.address is None else not on_loopback(urlsplit(self.address).hostname or "")
+        )
+        if remote and (not self.encrypted or (self.address or "tls://").split("://")[0] != "tls"):
+            raise ConfigError(
+                "cluster-open",
+                f"the cluster {self.address or self.kind} is reached over a network without mutual TLS, and whoever "
+                "reaches a port of Dask can execute code",
+                "set cluster.certificate, cluster.key and cluster.authority, and write the address as tls://HOST:PORT",
+                key="cluster.address" if self.address else "cluster.kind",
+                value=self.address or self.kind,
+            )
+        if self.kind == "ssh" and self.address is None and len(self.hosts) < 2:
+            raise ConfigError(
+                "incomplete",
+                "a cluster by ssh needs cluster.hosts: the computer of the scheduler, and at least one for workers",
+                "add them; a computer may be there twice",
+                key="cluster.hosts",
+            )
+
+
+class ArchiveSettings(SettingsSection):
+    """An archive of recordings, and the lake of their results.
+
+    Parameters
+    ----------
+    inputs
+        Paths or URLs of the recordings, with * in a name and ** for any depth. {site}, {line}, {machine} and {axis}
+        name the machine of a recording: "s3://plant/{line}/{machine}/*.csv". Relative to this file.
+    recipe
+        An axis.toml without its source, relative to this file. Its [machine] applies where the inputs name none. With
+        [axes], each recording has all of these axes.
+    lake
+        Directory, relative to this file, or URL of the results.
+    baselines
+        Path of the baseline of each machine, with its levels in braces: "baselines/{machine}-{axis}.json". A recording
+        of a machine whose file exists is compared with it; `livebode archive learn` writes these files. Relative to
+        this file. Default: none.
+    cluster
+        The processes that track.
+    """
+
+    inputs: Annotated[list[Text], Field(min_length=1)]
+    recipe: File
+    lake: Text
+    baselines: Text | None = None
+    cluster: ClusterSection = ClusterSection()
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """The settings in a TOML file.
+
+        Raises
+        ------
+        ConfigError
+            If the file cannot be read, is not TOML, or a key or a value is invalid, or a cluster would be open to
+            others.
+        """
+        try:
+            found = cls.model_validate(read_table(path))
+            found.cluster.checked()
+            for template in found.templates:
+                template.checked()
+            if found.baselines is not None:
+                check_baselines(found.baselines, "baselines")
+        except ValidationError as error:
+            raise first_error(error, cls).at(str(path)) from None
+        except ConfigError as error:
+            raise (error if error.place else error.at(str(path))) from None
+        folder = path.absolute().parent
+        return found.model_copy(
+            update={
+                "inputs": [_beside(folder, one) for one in found.inputs],
+                "recipe": folder / found.recipe,
+                "lake": _beside(folder, found.lake),
+                "baselines": None if found.baselines is None else str(folder / found.baselines),
+                "cluster": found.cluster.with_files(folder, "certificate", "key", "authority"),
+            }
+        )
+
+    @property
+    def templates(self) -> list[Template]:
+        """The inputs."""
+        return [Template(one) for one in self.inputs]
+
+    def axes(self) -> dict[str, Axis]:
+        """The axes of the recipe by name, whose source.log is a placeholder; a single one has the empty name.
+
+        Raises
+        ------
+        ConfigError
+            If the recipe is not a configuration of axes without a source, or inputs name the axis as well.
+        """
+        found = {}
+        for name, data in tables_of(read_table(self.recipe), str(self.recipe)).items():
+            place = f"{self.recipe}, axis {name}" if name else str(self.recipe)
+            if name and any("{axis}" in text for text in self.inputs):
+                raise ConfigError(
+                    "key-conflict",
+                    "inputs name the axis of a recording by {axis}, and [axes] of the recipe name several in it",
+                    "write * in place of {axis}",
+                    key="inputs",
+                ).at(str(self.recipe))
+            found[name] = self._axis(name, data, place)
+        return found
+
+    def _axis(self, name: str, data: dict[str, Any], place: str) -> Axis:
+        source = data.get("source", {})
+        if isinstance(source, dict) and (named := [key for key in ("log", "url", "replay") if key in source]):
+            raise ConfigError(
+                "key-conflict",
+                f"the recipe of an archive has a source of its own (source.{named[0]})",
+                "remove it: the inputs of the archive are the sources",
+                key=f"source.{named[0]}",
+            ).at(place)
+        own = data | {"source": {**source, "log": "recording"}}
+        if name and isinstance(machine := data.get("machine", {}), dict):
+            own["machine"] = {"axis": name} | machine
+        axis = Axis.of(own, place).beside(self.recipe.parent)
+        if self.baselines is not None and axis.monitoring.baseline is not None:
+            raise ConfigError(
+                "key-conflict",
+                "the recipe has a baseline for all machines, and the archive one for each (baselines)",
+                "remove one of them",
+                key="monitoring.baseline",
+            ).at(place)
+        return axis
+
+
+def check_baselines(text: str, key: str) -> None:
+    """ConfigError if this is not the path of a file for each machine."""
+    Template(text).checked(key)
+    if "://" in text or any(sign in text for sign in "*?"):
+        raise ConfigError(
+            "value-invalid",
+            f"{key} = {text!r} is not a path on this computer with the levels of a machine in braces",
+            'write it as "baselines/{machine}-{axis}.json"',
+            key=key,
+            value=text,
+        )
+
+
+def archive_schema() -> Schema:
+    """JSON Schema of archive.toml."""
+    return schema_of(ArchiveSettings, "archive")
+
+
+def lake_url(target: str) -> str:
+    """The lake of an archive.toml, or this path or URL itself."""
+    return ArchiveSettings.read(Path(target)).lake if target.lower().endswith(".toml") else target
+
+
+def _beside(folder: Path, place: str) -> str:
+    return place if "://" in place else str(folder / place)

@@ -1,0 +1,1 @@
+"""`livebode archive` and `livebode fleet`."""

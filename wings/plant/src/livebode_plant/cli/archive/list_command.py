@@ -1,0 +1,55 @@
+"""`livebode archive list`: the runs of a lake by machine, and the recordings in quarantine."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from livebode.cli import Json, console, is_terminal
+from livebode_plant.cli.archive.options import LakeOf
+
+_COLUMNS = ("machine", "runs", "judged", "alarming", "quarantined", "first", "last")
+
+
+def list_command(
+    archive: LakeOf,
+    quarantined: Annotated[
+        bool, typer.Option("--quarantined", help="List the recordings in quarantine, with the reason of each.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """List the runs of a lake by machine, and the recordings in quarantine."""
+    from livebode.records import to_json
+    from livebode_plant.archive.contents import machines, quarantine
+    from livebode_plant.archive.settings import lake_url
+    from livebode_plant.lake import Lake
+
+    lake = Lake(lake_url(archive))
+    if quarantined:
+        bad = quarantine(lake)
+        if as_json:
+            print(to_json({"quarantine": bad}))
+        elif bad:
+            _print(("recording", "code", "reason"), [(one["url"], one["code"], one["sentence"]) for one in bad])
+        else:
+            print("no recording is in quarantine")
+        return
+    rows = [one.plain for one in machines(lake)]
+    if as_json:
+        print(to_json({"machines": rows}))
+    elif rows:
+        _print(_COLUMNS, [tuple(row.values()) for row in rows])
+    else:
+        print(f"the lake {lake.url} has no run yet")
+
+
+def _print(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, overflow="fold", justify="right" if column in _COLUMNS[1:5] else "left")
+    for row in rows:
+        table.add_row(*("" if value is None else str(value) for value in row))
+    console(width=None if is_terminal() else 1 << 14, markup=False).print(table)

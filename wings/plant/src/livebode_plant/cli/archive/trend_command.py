@@ -1,0 +1,195 @@
+"""`livebode archive trend`: how a quantity changes over months, for each machine of a lake."""
+
+from __future__ import annotations
+
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from livebode.cli import Json, console, is_terminal
+from livebode.core import UsageError
+from livebode_plant.cli.archive.options import LakeOf
+from livebode_plant.cli.archive.selection import Limit, SelectionOptions, with_selection
+
+if TYPE_CHECKING:
+    from livebode_plant.trending import Assessment, Ranked
+
+_NUMBERS = ("runs",)
+
+
+@with_selection("by", "below", "since", "until", "covariate", "recipe")
+def trend_command(
+    archive: LakeOf,
+    quantity: Annotated[
+        str, typer.Argument(metavar="QUANTITY", help="Name as in `livebode fit`, or MODEL:NAME if several have it.")
+    ],
+    chosen: SelectionOptions,
+    limit: Limit = 10.0,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Also write the worst machine's picture (.png) or the table of all machines (.csv)."
+        ),
+    ] = None,
+    dark: Annotated[bool, typer.Option("--dark", help="Draw the picture light on dark.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Find how a quantity changes over months, for each machine: slope, jumps and bends with bounds.
+
+    The influence of covariates, such as a temperature, is removed. Bounds cover 95 % and allow for outliers and for
+    scatter that is correlated from run to run. The worst machine comes first. An asterisk marks a significant change:
+    of the machines marked, at most 5 % are expected to be unchanged.
+    """
+    from livebode.records import to_json
+    from livebode_plant.archive.settings import lake_url
+    from livebode_plant.lake import Lake
+    from livebode_plant.trending import assess, history
+
+    if out is not None and out.suffix.lower() not in (".png", ".csv"):
+        raise UsageError(
+            "unreadable", f"--out={str(out)!r} is neither a .png nor a .csv", "choose one of them", argument="--out"
+        )
+    found = history(Lake(lake_url(archive)), quantity, chosen.selection())
+    (of,) = assess([found], limit)
+    if out is not None:
+        _write(of, out, dark=dark, force=force)
+    if as_json:
+        print(to_json(plain(of)))
+        return
+    _print(of, limit)
+    if out is not None:
+        print(out)
+
+
+def plain(of: Assessment) -> dict[str, Any]:
+    """For JSON."""
+    found = of.history
+    return {
+        "quantity": found.name,
+        "model": found.model,
+        "unit": found.unit,
+        "recipe": found.recipe,
+        "runs": found.runs,
+        "without_date": found.undated,
+        "other_recipes": found.other_recipes,
+        "machines": [_row(of, one) for one in of.ranked],
+        "not_assessed": [{"machine": machine, "reason": reason} for machine, reason in of.not_assessed.items()],
+        "silent": [{"machine": machine, "last": _day(time_s)} for machine, time_s in of.silent.items()],
+    }
+
+
+def _row(of: Assessment, one: Ranked) -> dict[str, Any]:
+    trend = one.trend
+    return {
+        "machine": one.machine,
+        "significant": one.significant,
+        "p": trend.p,
+        "months_to_limit": one.months if isfinite(one.months) else None,
+        "runs": trend.runs,
+        "outliers": trend.outliers,
+        "left_out": trend.left_out,
+        "from": _day(trend.since_s),
+        "to": _day(trend.until_s),
+        "unit": of.history.unit_of(one.machine),
+        "level": trend.level,
+        "per_month": trend.per_month,
+        "per_month_bound_95": trend.per_month_bound_95,
+        "since": _day(trend.slope_since_s),
+        "change": trend.change,
+        "change_bound_95": trend.change_bound_95,
+        "percent_of_unit": trend.relative if isfinite(trend.relative) else None,
+        "changes": [
+            {"kind": c.kind, "date": _day(c.time_s), "amount": c.amount, "bound_95": c.bound_95} for c in trend.changes
+        ],
+        "covariates": [{"name": e.name, "per_unit": e.per_unit, "bound_95": e.bound_95} for e in trend.effects],
+        "scatter": trend.scatter,
+        "correlation": trend.correlation,
+        "remarks": list(trend.remarks),
+    }
+
+
+def _print(of: Assessment, limit: float) -> None:
+    from rich.table import Table
+
+    from livebode.core import counted
+    from livebode_plant.report.trend_words import amount, change_words, months, scale
+
+    found, table = of.history, Table(box=None, pad_edge=False)
+    print(f"{found.name} ({found.model}): {counted(len(found.machines), 'machine')}, {counted(found.runs, 'run')}")
+    for column in ("machine", "runs", "a month", "since", "in all", "unit", "changes", "limit"):
+        table.add_column(column, overflow="fold", justify="right" if column in _NUMBERS else "left")
+    for one in of.ranked:
+        trend, unit = one.trend, found.unit_of(one.machine)
+        table.add_row(
+            one.machine + " *" * one.significant, str(trend.runs),
+            amount(trend, trend.per_month, trend.per_month_bound_95, unit), _day(trend.slope_since_s),
+            amount(trend, trend.change, trend.change_bound_95, unit), scale(trend, unit)[1],
+            ", ".join(change_words(trend, change, unit) for change in trend.changes), months(one, limit),
+        )  # fmt: skip
+    if of.ranked:
+        console(width=None if is_terminal() else 1 << 14, markup=False).print(table)
+    for line in remarks(of):
+        print(line)
+
+
+def remarks(of: Assessment) -> list[str]:
+    """What limits the result, as sentences."""
+    found = of.history
+    lines = ["*: significant; at most 5 % of the machines marked are expected to be unchanged"] * any(
+        one.significant for one in of.ranked
+    )
+    lines += [f"{one.machine}: {remark}" for one in of.ranked for remark in one.trend.remarks]
+    lines += [f"{one.machine}: {one.trend.left_out} runs without a value or a covariate are left out"
+              for one in of.ranked if one.trend.left_out]  # fmt: skip
+    several = {one.machine: len(found.machines[one.machine].axes) for one in of.ranked}
+    lines += [f"{machine}: {axes} axes together; --by axis shows each" for machine, axes in several.items() if axes > 1]
+    lines += [f"{machine}: not assessed: {reason}" for machine, reason in of.not_assessed.items()]
+    lines += [f"{machine}: no run since {_day(time_s)}" for machine, time_s in of.silent.items()]
+    if found.undated:
+        lines.append(f"{found.undated} runs without a date are left out")
+    if found.other_recipes:
+        lines.append(f"{found.other_recipes} runs with other settings than most of their axis are left out (--recipe)")
+    return lines
+
+
+def _write(of: Assessment, out: Path, *, dark: bool, force: bool) -> None:
+    from livebode.export import save
+
+    if out.suffix.lower() == ".csv":
+        save(out, lambda partial: _write_csv(of, partial), force=force)
+        return
+    from livebode.report import save as write_picture
+    from livebode.report import style
+    from livebode_plant.report.trend_words import year_of
+    from livebode_plant.report.year import year_figure
+
+    if not of.ranked:
+        raise UsageError(
+            "missing", "no machine has a trend to draw", "select others, or print the table", argument="--out"
+        )
+    worst = of.ranked[0]
+    figure = year_figure(year_of(of.history, worst.machine, worst.trend), dark=dark)
+    save(out, lambda partial: write_picture(figure, partial, style(dark)), force=force)
+
+
+def _write_csv(of: Assessment, path: Path) -> None:
+    import csv
+
+    rows = [_row(of, one) for one in of.ranked]
+    flat = [{key: value for key, value in row.items() if not isinstance(value, list)} for row in rows]
+    for row, own in zip(flat, rows):
+        row["significant"] = str(own["significant"]).lower()
+        row["changes"] = "; ".join(f"{c['kind']} {c['date']}" for c in own["changes"])
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, flat[0] if flat else (), lineterminator="\n")
+        table.writeheader()
+        table.writerows(flat)
+
+
+def _day(time_s: float) -> str:
+    from livebode_plant.report.year import day
+
+    return day(time_s)

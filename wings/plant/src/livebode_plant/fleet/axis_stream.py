@@ -1,0 +1,451 @@
+"""AxisStream: the messages of one axis in the order of the log become its responses and events."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.configuration import Axis, recipe_id
+from livebode.core import (
+    Block,
+    Event,
+    LivebodeError,
+    Parameters,
+    Responses,
+    SourceError,
+    Stage,
+    StatefulBase,
+    restore_parts,
+)
+from livebode.language import Message
+from livebode.monitoring import places
+from livebode.preparation import live_follower
+from livebode.runtime import ChangeDetection, SingleResponse
+from livebode.sources.live import LiveBlock, Sequencer, SourceEvents, join_blocks
+from livebode_plant.fleet.event_limits import EventLimits
+from livebode_plant.fleet.fits_together import Fitted, process_together
+from livebode_plant.fleet.main_quantity import MainQuantity, main_quantity, newest_of
+from livebode_plant.fleet.message import read_message
+from livebode_plant.fleet.usual_spectra import PendingSpectrum, UsualSpectra, spectra_together
+
+RESPONSE_BYTES = 130
+"""Of a response at a line, in a message of results."""
+_OUTPUT_BYTES_MAX = 4 << 20
+"""Most bytes of the responses to one message: a message of results must have room for them."""
+_EVENT_BYTES = 1000
+_FAILURE_LETTERS_MAX = 1000
+FITS_PER_S = 2.0
+"""Fits of an axis."""
+_NO_ROWS = np.zeros(0, dtype=np.int64)
+_NO_RECIPE = "unreadable"
+"""In place of the recipe of an axis whose files cannot be read: the same for every owner."""
+_logger = logging.getLogger(f"livebode.{__name__}")
+
+
+@dataclass(frozen=True)
+class Output:
+    """What messages of the log gave.
+
+    Attributes
+    ----------
+    number
+        Of the first response, counted from the beginning of the axis's run.
+    responses
+        None if there are none.
+    fitted
+        Numbers of the responses that were fitted, (rows,).
+    parameters
+        Their fits, the quantities derived from them, and the margins, (rows,) each.
+    events
+        Alarms of monitoring among them.
+    """
+
+    number: int
+    responses: Responses | None
+    fitted: NDArray[np.int64]
+    parameters: tuple[Parameters, ...]
+    events: list[Event]
+
+
+class UnfittedOutput(NamedTuple):
+    """What is known before fits: the number of the first response, all responses, which of them are fitted, events."""
+
+    number: int
+    responses: Responses | None
+    to_fit: NDArray[np.int64]
+    events: list[Event]
+
+
+class _Taken(NamedTuple):
+    """Messages that are tracked together: number in the log of the last one, its last sample and time, their Blocks,
+    and the most bytes of their responses; more than allowed only for a single message."""
+
+    position: int
+    end: tuple[int, float]
+    blocks: list[LiveBlock]
+    size_bytes: int
+
+
+class AxisStream(StatefulBase):
+    """Turns the messages of an axis into responses, depending on nothing but these messages.
+
+    Time is that of the log, never of the computer, so that another computer that processes the same messages again
+    gets the same bits.
+
+    Parameters
+    ----------
+    axis
+        Its configuration.
+    run
+        Number in the log of its first message.
+    """
+
+    _stage = Stage("fleet-axis", 2)
+    _STATE = ("run", "position", "responses", "failure", "changes", "changed_s", "log_s", "_fit_period", "_limits")
+
+    def __init__(self, axis: Axis, run: int) -> None:
+        self._axis = axis
+        self._refusal: Exception | None = None
+        try:
+            self.recipe = recipe_id(axis)
+        except Exception as error:  # its first message reports it: a stream without one has nothing to store it with
+            self.recipe, self._refusal = _NO_RECIPE, error
+        self.run = run
+        self.position = run - 1
+        """Number in the log of the last message that was processed."""
+        self.responses = 0
+        self.failure = ""
+        """Why it is not tracked any more; empty while it is."""
+        self.log_s = 0.0
+        """Time of the last message by the clock of the log."""
+        self.changes, self.changed_s = 0, 0.0
+        """Alarms of monitoring since the beginning of the run, and when the newest was raised, by the log's clock."""
+        self.main: MainQuantity | None = None
+        """The newest value of the quantity that a page shows first; None until a fit is valid."""
+        self._events = SourceEvents(clock=lambda: self.log_s)
+        self._limits = EventLimits()
+        self._fit_period = 0
+        settings = axis.source
+        self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
+        self._pipeline: SingleResponse | None = None
+        self._taken: list[_Taken] = []
+        self.usual: UsualSpectra | None = None
+        self.spectra: list[PendingSpectrum] = []
+        """The messages taken since the last output, while they are usual ones."""
+        self._responses: list[Responses] = []
+        self._tracked_events: list[Event] = []
+
+    @property
+    def lost(self) -> int:
+        """Samples known to be lost."""
+        return self._sequencer.lost
+
+    def process(self, message: bytes, position: int, log_s: float) -> Output:
+        """The responses and events of the next message; `position` is its number in the log, `log_s` its time there."""
+        self.take(message, position, log_s)
+        return self.output()
+
+    def take(self, message: bytes, position: int, log_s: float) -> int:
+        """Take the next message, to be tracked together with those after it: the cost is by call, not by sample.
+
+        Returns the most bytes that it adds to a message of results. The responses are those of `process`, bit for bit.
+        """
+        self.position, self.log_s = position, log_s
+        if self.failure:
+            return 0
+        before, new = self._events.pending, self._pipeline is None
+        spectrum = self.usual and self.usual.spectrum(message, position, log_s, self._sequencer, self._events)
+        if spectrum is not None and self.usual is not None and not self._taken:
+            self.spectra.append(spectrum)
+            return self.usual.size_bytes + _EVENT_BYTES * (self._events.pending - before)
+        try:
+            if self._refusal is not None:
+                raise self._refusal
+            self._read_spectra()
+            blocks = self._blocks(message) if spectrum is None else [self._block(spectrum)]
+            size = self._output_bytes_max(blocks) if blocks else 0
+        except Exception as error:  # a fault of one axis must not stop the others of its partition
+            self._track()
+            self._fail(error)
+            return _EVENT_BYTES
+        if spectrum is None:
+            self.usual = None
+            if self._pipeline is not None and size <= _OUTPUT_BYTES_MAX:
+                self.usual = UsualSpectra.after(message, blocks, size, self._sequencer, self._pipeline)
+        self._take_blocks(position, self._events.position, blocks, size)
+        if new:  # what a follower refuses, it refuses at its first message, without those after it
+            self._track()
+        return min(size, _OUTPUT_BYTES_MAX) + _EVENT_BYTES * (self._events.pending - before)
+
+    def _take_blocks(self, position: int, end: tuple[int, float], blocks: list[LiveBlock], size_bytes: int) -> None:
+        if self._taken and self._taken[-1].size_bytes + size_bytes <= _OUTPUT_BYTES_MAX:
+            before = self._taken.pop()
+            blocks, size_bytes = before.blocks + blocks, before.size_bytes + size_bytes
+        self._taken.append(_Taken(position, end, blocks, size_bytes))
+
+    def _read_spectra(self) -> None:
+        """Take usual messages as any others: they are not tracked with those of other axes."""
+        spectra, self.spectra = self.spectra, []
+        for one in spectra:
+            assert self.usual is not None
+            self._take_blocks(one.position, one.end, [self._block(one)], self.usual.size_bytes)
+
+    def _block(self, spectrum: PendingSpectrum) -> LiveBlock:
+        batch = read_message(spectrum.message, spectrum.log_s).with_kinds(self._axis.source.kinds)
+        return batch.block(spectrum.number, spectrum.first_sample, False)
+
+    def stacked(self) -> int:
+        """The first of the pending spectra was tracked with those of others; returns the number of its response."""
+        del self.spectra[0]
+        self.responses += 1
+        return self.responses - 1
+
+    @property
+    def has_more(self) -> bool:
+        """Whether it has taken messages that are not tracked, or has events."""
+        return bool(self.spectra or self._taken or self._tracked_events or self._events.pending)
+
+    def output(self) -> Output:
+        """The responses, fits and events of all messages taken since the last call."""
+        return outputs_together([self])[0]
+
+    def tracked(self) -> UnfittedOutput:
+        """The same before the fits; `finished` follows."""
+        self._track()
+        first, responses, self._responses = self.responses, self._responses, []
+        self.responses += sum(map(len, responses))
+        found = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
+        return self.unfitted(first, found)
+
+    def unfitted(self, number: int, responses: Responses | None) -> UnfittedOutput:
+        """These responses, from this number on, with the events until now."""
+        events, self._tracked_events = self._tracked_events, []
+        return UnfittedOutput(number, responses, self._to_fit(responses), events + self._events.take())
+
+    @property
+    def pipeline(self) -> SingleResponse:
+        """The stages; they exist from the first Block on."""
+        assert self._pipeline is not None
+        return self._pipeline
+
+    @property
+    def detection(self) -> ChangeDetection | None:
+        """What monitors the axis, from the first Block on."""
+        return None if self._pipeline is None else self._pipeline.detection
+
+    def finished(self, tracked: UnfittedOutput, fitted: Fitted | Exception) -> Output:
+        """The output, with the fits of the responses that `tracked` lists, or why there are none; monitors both."""
+        parameters, events = ((), []) if isinstance(fitted, Exception) else fitted
+        found = [*tracked.events, *events]
+        try:
+            if isinstance(fitted, Exception):
+                raise fitted
+            found += self._monitored(tracked.responses, parameters)
+        except Exception as error:
+            self._fail(error)
+            found, self._tracked_events = found + self._tracked_events, []
+        self._remember(found, parameters)
+        return Output(
+            tracked.number, tracked.responses, tracked.number + tracked.to_fit, parameters, self._limits.take(found)
+        )
+
+    def _monitored(self, responses: Responses | None, parameters: tuple[Parameters, ...]) -> list[Event]:
+        if self.detection is None or responses is None or self.failure:
+            return []
+        ready = responses if responses.ready.all() else responses[responses.ready]
+        return self.detection.take_responses(ready, parameters[0] if parameters else None)
+
+    def _remember(self, events: list[Event], parameters: tuple[Parameters, ...]) -> None:
+        if changes := sum(event.kind == "change" for event in events):
+            self.changes, self.changed_s = self.changes + changes, self.log_s
+        if parameters:
+            detection = self.detection
+            name = main_quantity(parameters, () if detection is None else detection.watched)
+            self.main = newest_of(parameters, name, detection) or self.main
+
+    def _to_fit(self, responses: Responses | None) -> NDArray[np.int64]:
+        """Which responses are fitted: the first one of each half second by the sender's sample numbers.
+
+        So another owner fits the same ones, however it takes the messages. Half a second is a whole number of windows,
+        and begins where monitoring expects its rows.
+        """
+        if self._pipeline is None or self._pipeline.fits is None or responses is None or self.failure:
+            return _NO_ROWS
+        settings = self._pipeline.follower.settings
+        window, rate_hz = settings.lines.window, settings.lines.rate_hz
+        apart = max(window, settings.step)
+        period = apart * max(1, round(rate_hz / FITS_PER_S / apart))
+        begun = (responses.sample + 1 - places(window, settings.step)[0]) // period
+        first = np.diff(begun, prepend=self._fit_period) != 0
+        self._fit_period = int(begun[-1])
+        return np.flatnonzero(first & responses.ready)
+
+    def _blocks(self, message: bytes) -> list[LiveBlock]:
+        blocks = self._sequencer.poll(self.log_s)
+        try:
+            batch = read_message(message, self.log_s)
+        except SourceError as error:
+            self._events.report(
+                "malformed",
+                Message("message {log_message} of the log was dropped: {why}", log_message=self.position, why=error),
+            )
+            return blocks
+        return blocks + self._sequencer.push(batch.with_kinds(self._axis.source.kinds))
+
+    def _output_bytes_max(self, blocks: list[LiveBlock]) -> int:
+        """Most bytes of the responses that these Blocks complete; [motion] delays them by a chunk and a window."""
+        if self._pipeline is None:
+            self._pipeline = self._new_pipeline(blocks[0].rate_hz)
+        settings = self._pipeline.follower.settings
+        samples = sum(block.stop - block.start for block in blocks)
+        if self._axis.motion is not None:
+            samples += round(self._axis.motion.chunk_s * settings.lines.rate_hz) + settings.lines.window
+        return (samples // settings.step + len(blocks) + 1) * len(settings.lines) * RESPONSE_BYTES
+
+    def _track(self) -> None:
+        self._read_spectra()
+        taken, self._taken = self._taken, []
+        for part in taken:
+            found: list[Responses] = []
+            if not self.failure:
+                try:
+                    found += map(self._tracked, join_blocks(part.blocks))
+                except Exception as error:
+                    self._fail(error)
+            if sum(one.value.size for one in found) * RESPONSE_BYTES > _OUTPUT_BYTES_MAX:
+                what = Message(
+                    "message {log_message} of the log has too many samples: its responses were dropped",
+                    log_message=part.position,
+                )
+                self._tracked_events.append(Event("malformed", *part.end, what))
+                found = []
+            self._responses += [one for one in found if len(one)]
+
+    def _new_pipeline(self, rate_hz: float) -> SingleResponse:
+        schema = self._sequencer.schema
+        follower = live_follower(self._axis, rate_hz, schema.spectra)
+        return SingleResponse.of(self._axis, follower, schema.channels, samples=schema.spectra is None)
+
+    def _tracked(self, block: LiveBlock) -> Responses:
+        pipeline, events = self.pipeline, self._tracked_events
+        readiness = pipeline.readiness
+        parts: list[Block] = [block]
+        if readiness is not None:
+            events += readiness.take(block)
+            pipeline.follower.set_aside(readiness.spans)
+            parts = readiness.condition.parts(block)
+        if pipeline.detection is not None:
+            for part in parts:
+                events += pipeline.detection.take_samples(part)
+        found = pipeline.follower.process(block, events.append)
+        if pipeline.fits is not None and len(found) and not self.responses:
+            pipeline.fits.process(found[0:0])  # what a model cannot be fitted to, it refuses here
+        return found if readiness is None else readiness.mark(found)
+
+    def _fail(self, error: Exception) -> None:
+        if not isinstance(error, LivebodeError):
+            _logger.exception("internal error at message %d of the log", self.position)
+        self.failure = (str(error) or type(error).__name__)[:_FAILURE_LETTERS_MAX]
+        what = Message("the axis is not tracked any more: {why}", why=self.failure)
+        self._tracked_events.append(Event("axis-failed", *self._events.position, what))
+
+    @property
+    def _identity(self) -> str:
+        return self.recipe
+
+    def _state(self) -> dict[str, Any]:
+        pending = self._taken or self.spectra
+        assert not pending, "a snapshot between take and output would lack samples"
+        parts = {} if self._pipeline is None else {name: part.snapshot() for name, part in self._pipeline.parts.items()}
+        own = {"sequencer": self._sequencer.snapshot(), "source_events": self._events.rates, "stages": list(parts)}
+        return super()._state() | own | parts
+
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
+        self._events.continue_at(state["source_events"])
+        self._sequencer.restore(state["sequencer"])
+        self._pipeline, self.main, self.usual = None, None, None
+        if state["stages"]:
+            rate_hz = self._sequencer.schema.rate_hz
+            assert rate_hz is not None
+            self._pipeline = self._new_pipeline(rate_hz)
+            restore_parts(self._pipeline.parts, {name: state[name] for name in self._pipeline.parts})
+
+
+class StackedRows(NamedTuple):
+    """A response of each of several streams: places among the streams, numbers of the responses, and a row for each."""
+
+    at: list[int]
+    numbers: list[int]
+    responses: Responses
+
+
+def outputs_together(streams: Sequence[AxisStream]) -> list[Output]:
+    """The output of each stream, of what it took; what they have in common is computed once, and none depends on
+    another."""
+    stacks, outputs = stacked_together(streams)
+    rows: dict[int, list[tuple[int, Responses]]] = {}
+    for stack in stacks:
+        for row, (i, number) in enumerate(zip(stack.at, stack.numbers)):
+            rows.setdefault(i, []).append((number, stack.responses[row : row + 1]))
+    for i, found in rows.items():
+        events, after = [], None
+        if i in outputs:
+            events, after = outputs[i].events, outputs[i].responses
+        every = Responses.join([*(one for _, one in found), *([] if after is None else [after])])
+        outputs[i] = Output(found[0][0], every, _NO_ROWS, (), events)
+    return [outputs[i] for i in range(len(streams))]
+
+
+def stacked_together(streams: Sequence[AxisStream]) -> tuple[list[StackedRows], dict[int, Output]]:
+    """The same: responses of axes that are alike in one piece, and the outputs of all others by their places.
+
+    An axis of the first kind is also among the others if it has events, or further responses.
+    """
+    stacks: list[StackedRows] = []
+    tracked: dict[int, UnfittedOutput] = {}
+    alike: dict[object, list[int]] = {}
+    for i, stream in enumerate(streams):
+        if stream.usual is not None and (len(stream.spectra) == 1 or (stream.spectra and stream.usual.results_only)):
+            alike.setdefault(stream.usual.kind, []).append(i)
+    for members in alike.values():
+        # The first spectrum of each, then the second one: several of a single axis cost less as one Block.
+        while members and (len(members) > 1 or len(streams[members[0]].spectra) == 1):
+            every = [(usual, streams[i].spectra[0]) for i in members if (usual := streams[i].usual) is not None]
+            try:
+                responses, taken = spectra_together(every)
+            except Exception:  # which of them it is shows only alone
+                _logger.exception("internal error while %d axes are tracked together", len(members))
+                break
+            if responses is None:
+                break
+            at = [i for i, one in zip(members, taken) if one]
+            stack = StackedRows(at, [streams[i].stacked() for i in at], responses)
+            if (usual := streams[at[0]].usual) is not None and usual.results_only:
+                stacks.append(stack)
+            else:
+                rows = enumerate(zip(at, stack.numbers))
+                tracked |= {i: streams[i].unfitted(number, responses[row : row + 1]) for row, (i, number) in rows}
+            members = [i for i in at if streams[i].spectra]
+    done = {i for stack in stacks for i in stack.at} | tracked.keys()
+    tracked |= {i: one.tracked() for i, one in enumerate(streams) if i not in done or one.has_more}
+    return stacks, dict(zip(tracked, _fitted_together([streams[i] for i in tracked], [*tracked.values()])))
+
+
+def _fitted_together(streams: Sequence[AxisStream], tracked: Sequence[UnfittedOutput]) -> list[Output]:
+    """What these become; the fits of all axes are one computation."""
+    at = [i for i, one in enumerate(tracked) if len(one.to_fit)]
+    fits, batches = [], []
+    for i in at:
+        found, stages = tracked[i].responses, streams[i].pipeline
+        assert found is not None
+        assert stages.fits is not None
+        fits.append(stages.fits)
+        batches.append(found[tracked[i].to_fit])
+    fitted: dict[int, Fitted | Exception] = dict(zip(at, process_together(fits, batches)))
+    return [stream.finished(one, fitted.get(i, ((), []))) for i, (stream, one) in enumerate(zip(streams, tracked))]

@@ -1,0 +1,169 @@
+"""Messages of results: responses and parameters of the axes of a partition, with its events."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import pyarrow as pa
+
+from livebode.core import FleetError
+from livebode_plant.fleet.axis_stream import RESPONSE_BYTES, AxisStream, Output, StackedRows
+from livebode_plant.fleet.wide_rows import (
+    PARAMETERS,
+    ROWS,
+    AxesRows,
+    AxisFits,
+    AxisRows,
+    grid_of,
+    parameter_table,
+    response_table,
+)
+
+_EVENT_BYTES = 500
+"""Of an event without its sentence."""
+_PARAMETER_BYTES = 100
+_HEAD = struct.Struct("<4sH")
+_MAGIC, _VERSION = b"LBRM", 2
+_LENGTH = struct.Struct("<I")
+
+
+@dataclass(frozen=True)
+class ResultMessage:
+    """What the owner of a partition stores at once.
+
+    Attributes
+    ----------
+    through
+        Number in the log: the outputs of all messages of the partition up to it are stored.
+    owner
+        Name of the process that stored it.
+    claim
+        Whether it only claims the partition, without results.
+    rows
+        Responses as in `wide_rows.ROWS`, one row for each (axis, run, number), rounded to float32, each with a digest
+        of its exact bits. `from_wide(rows of one axis, grids[axis])` gives them as Responses.
+    parameters
+        As in `wide_rows.PARAMETERS`: one row for each parameter, derived quantity and margin of (axis, run, number).
+    events
+        With axis, run, kind, sample, time_s, message and details each; alarms of monitoring are among them.
+    recipes
+        Recipe of each axis in it.
+    grids
+        Lines, quantity and unit of each axis in `rows`, as an entry ``found`` of run.json.
+    logged_s
+        When the log received the newest samples of each axis that are in it, seconds since 1970.
+    """
+
+    through: int
+    owner: str
+    claim: bool = False
+    rows: pa.Table = field(default_factory=ROWS.empty_table)
+    parameters: pa.Table = field(default_factory=PARAMETERS.empty_table)
+    events: Sequence[Mapping[str, Any]] = ()
+    recipes: Mapping[str, str] = field(default_factory=dict)
+    grids: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    logged_s: Mapping[str, float] = field(default_factory=dict)
+
+    def to_bytes(self) -> bytes:
+        """A head with the version, and compressed together JSON and both tables as Arrow streams.
+
+        All in one is much smaller than each buffer of Arrow by itself: these have a few rows.
+        """
+        names = ("through", "owner", "claim", "events", "recipes", "grids", "logged_s")
+        about = json.dumps({name: getattr(self, name) for name in names}).encode()
+        sink = pa.BufferOutputStream()
+        sink.write(_HEAD.pack(_MAGIC, _VERSION))
+        with pa.CompressedOutputStream(sink, "zstd") as packed:
+            packed.write(_LENGTH.pack(len(about)) + about)
+            for table in (self.rows, self.parameters):
+                with pa.ipc.new_stream(packed, table.schema) as writer:
+                    writer.write_table(table)
+        return bytes(sink.getvalue())
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> ResultMessage:
+        """The message in these bytes.
+
+        Raises
+        ------
+        FleetError
+            If another version of livebode wrote it in another form.
+        """
+        version = _HEAD.unpack_from(data)[1] if data[: len(_MAGIC)] == _MAGIC and len(data) >= _HEAD.size else 1
+        if version != _VERSION:
+            raise FleetError(
+                "results-of-other-version",
+                f"the results in the log have version {version}, and this livebode reads version {_VERSION}",
+                "continue with the livebode that wrote them, or start nats-server with an empty directory",
+                found=version,
+                readable=_VERSION,
+            )
+        with pa.CompressedInputStream(pa.BufferReader(data[_HEAD.size :]), "zstd") as packed:
+            about = json.loads(packed.read(_LENGTH.unpack(packed.read(_LENGTH.size))[0]))
+            rows, parameters = (pa.ipc.open_stream(packed).read_all() for _ in range(2))
+        return cls(rows=rows, parameters=parameters, **about)
+
+
+class PendingResults:
+    """Outputs that are not stored yet."""
+
+    def __init__(self) -> None:
+        self._responses: list[AxisRows | AxesRows] = []
+        self._parameters: list[AxisFits] = []
+        self._events: list[dict[str, Any]] = []
+        self._recipes: dict[str, str] = {}
+        self._logged_s: dict[str, float] = {}
+        self.nbytes = 0
+
+    def __bool__(self) -> bool:
+        return bool(self._responses or self._events)
+
+    def add(self, key: str, stream: AxisStream, output: Output) -> None:
+        """Append the output of a message of this axis."""
+        self._events += [{"axis": key, "run": stream.run, **asdict(event)} for event in output.events]
+        # The details repeat the message as its template and its facts.
+        self.nbytes += sum(_EVENT_BYTES + 3 * len(event.message) for event in output.events)
+        if output.responses is not None:
+            self._responses.append(AxisRows(key, stream.run, output.number, output.responses))
+            self.nbytes += output.responses.value.size * RESPONSE_BYTES
+        for parameters in output.parameters:
+            self._parameters.append(AxisFits(key, stream.run, output.fitted, parameters))
+            self.nbytes += parameters.value.size * _PARAMETER_BYTES
+        if output.responses is not None or output.events:
+            self._recipes[key], self._logged_s[key] = stream.recipe, stream.log_s
+
+    def add_rows(self, keys: Sequence[str], streams: Sequence[AxisStream], stack: StackedRows) -> None:
+        """Append the responses of several axes."""
+        runs = [stream.run for stream in streams]
+        self._responses.append(AxesRows(keys, runs, stack.numbers, stack.responses))
+        self.nbytes += stack.responses.value.size * RESPONSE_BYTES
+        for key, stream in zip(keys, streams):
+            self._recipes[key], self._logged_s[key] = stream.recipe, stream.log_s
+
+    def add_event(self, key: str, event: Mapping[str, Any]) -> None:
+        """Append an event that no message of the log causes."""
+        self._events.append({"axis": key, **event})
+
+    def message(self, through: int, owner: str) -> ResultMessage:
+        """All of them as one message."""
+        return ResultMessage(
+            through,
+            owner,
+            rows=response_table(self._responses),
+            parameters=parameter_table(self._parameters),
+            events=self._events,
+            recipes=self._recipes,
+            grids=self._grids(),
+            logged_s=self._logged_s,
+        )
+
+    def _grids(self) -> dict[str, Mapping[str, Any]]:
+        found: dict[str, Mapping[str, Any]] = {}
+        for part in self._responses:
+            grid = grid_of(part.responses)
+            found |= dict.fromkeys([part.axis] if isinstance(part, AxisRows) else part.axes, grid)
+        return found

@@ -1,0 +1,222 @@
+"""DataFile: a Parquet file of a table, whose name contains the SHA-256 of its bytes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any, Final, NamedTuple, Self
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from deltalake.transaction import AddAction, RemoveAction
+
+from livebode.core import replace_file
+from livebode.tables import text
+from livebode_plant.lake.schemas import TABLES
+from livebode_plant.lake.wide_responses import wide_options
+
+JOINED: Final = "part"
+"""What is in a file of several results: begin of its name."""
+_NAME: Final = re.compile(r"([\w-]+)-([0-9a-f]{64})\.parquet", re.ASCII)
+_GROUP_BYTES = 4 << 20
+_SMALL_BYTES, _JOINED_BYTES_MAX = 32 << 20, 128 << 20
+"""Smaller files are joined, up to the larger size together."""
+
+
+class Key(NamedTuple):
+    """What a result belongs to: the recording by its content, and the settings by the recipe's id."""
+
+    content: str
+    recipe: str
+
+
+@dataclass(frozen=True)
+class DataFile:
+    """A file in the directory of a table.
+
+    Attributes
+    ----------
+    table
+        Name of the table.
+    name
+        Of the file: what it contains, and the SHA-256 of its bytes. The same rows have the same one.
+    size_bytes, rows
+        For the table's log.
+    day
+        Of the rows, in a table that is divided by days.
+    """
+
+    table: str
+    name: str
+    size_bytes: int
+    rows: int
+    day: date | None = None
+
+    @property
+    def of(self) -> str:
+        """What it contains: CONTENT-RECIPE of one result, a day, "rows", or "part" of a joined file.
+
+        ValueError if no lake has a file of this name, for example one that leads out of the table's directory.
+        """
+        return self._parts[0]
+
+    @property
+    def sha256(self) -> str:
+        """Of its bytes, in hexadecimal digits."""
+        return self._parts[1]
+
+    @property
+    def key(self) -> Key | None:
+        """The result that it contains; None if there are several."""
+        content, _, recipe = self.of.partition("-")
+        return Key(content, recipe) if recipe and self.day is None else None
+
+    def added(self, *, changed: bool = True) -> AddAction:
+        """The action that adds it to the table; not `changed`: its rows were in other files.
+
+        Without the limits of columns: deltalake reads a column whose limits are missing as one between null and null,
+        so a filter on it finds no row as soon as another column has limits. The limits in the Parquet file are used.
+        """
+        statistics = json.dumps({"numRecords": self.rows})
+        return AddAction(self.name, self.size_bytes, self._partition, _now_ms(), changed, statistics)
+
+    def removed(self, *, changed: bool = True) -> RemoveAction:
+        """The action that removes it from the table."""
+        return RemoveAction(self.name, changed, _now_ms(), self.size_bytes, self._partition)
+
+    @property
+    def _parts(self) -> tuple[str, str]:
+        if (match := _NAME.fullmatch(self.name)) is None:
+            raise ValueError(f"{self.name[:200]!r} is not the name of a file in this table")
+        return match[1], match[2]
+
+    @property
+    def _partition(self) -> dict[str, str | None]:
+        return {} if self.day is None else {"day": str(self.day)}
+
+
+class DataFileWriter:
+    """Writes rows, as they come, to a file in this directory. A context manager.
+
+    Row groups have a bounded size, and follow from the rows alone.
+
+    Parameters
+    ----------
+    folder
+        An existing directory.
+    table
+        Of the lake.
+    of
+        What it contains: `DataFile.of`.
+    """
+
+    def __init__(self, folder: Path, table: str, of: str) -> None:
+        self._path, self._table, self._of = folder / f"{of}.partial", table, of
+        self._schema = TABLES[table].schema
+        self._writer = parquet_writer(self._path, self._schema)
+        self._waiting: list[pa.Table] = []
+        self._waiting_bytes = self._rows = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._writer.close()
+
+    def write(self, rows: pa.Table) -> None:
+        """Append rows; a column that they lack is null."""
+        self._waiting.append(pa.table([_column(rows, field) for field in self._schema], schema=self._schema))
+        self._rows += rows.num_rows
+        self._waiting_bytes += rows.nbytes
+        if self._waiting_bytes >= _GROUP_BYTES:
+            self._flush()
+
+    def finish(self) -> DataFile:
+        """Complete the file, and give it its name."""
+        self._flush()
+        self._writer.close()
+        with self._path.open("rb") as written:
+            name = _named(self._of, hashlib.file_digest(written, "sha256").hexdigest())
+        path = self._path.with_name(name)
+        replace_file(self._path, path)
+        return DataFile(self._table, name, path.stat().st_size, self._rows)
+
+    def _flush(self) -> None:
+        if self._waiting:
+            whole = pa.concat_tables(self._waiting)
+            self._waiting, self._waiting_bytes = [], 0
+            self._writer.write_table(whole, row_group_size=max(whole.num_rows, 1))
+
+
+class ResultFileWriter(DataFileWriter):
+    """Writes the rows of one result, without the key's columns, which it adds."""
+
+    def __init__(self, folder: Path, table: str, key: Key) -> None:
+        super().__init__(folder, table, "-".join(key))
+        self._key = key
+
+    def write(self, rows: pa.Table) -> None:
+        """Append rows without the key's columns; a column that they lack is null."""
+        own = {name: rows[name] for name in rows.column_names}
+        own |= {
+            name: text([word], np.zeros(rows.num_rows, dtype=np.int64)) for name, word in self._key._asdict().items()
+        }
+        super().write(pa.table(own))
+
+
+def _column(rows: pa.Table, field: pa.Field[Any]) -> Any:
+    if field.name in rows.column_names:
+        return rows[field.name].cast(field.type)
+    return pa.nulls(rows.num_rows, field.type)
+
+
+def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table]) -> DataFile:
+    """Write the rows of one result, without the key's columns, to a file in this directory; none if it has no rows."""
+    with ResultFileWriter(folder, table, key) as writer:
+        for part in parts:
+            writer.write(part)
+        return writer.finish()
+
+
+def parquet_writer(path: Path | pa.BufferOutputStream, schema: pa.Schema) -> pq.ParquetWriter:
+    """A Parquet file with the layout of wide responses, without Arrow's own schema: a lake has one for all files."""
+    return pq.ParquetWriter(path, schema, store_schema=False, **wide_options(schema))
+
+
+def file_bytes(
+    table: str, of: str, rows: pa.Table, day: date | None = None, group_rows: int | None = None
+) -> tuple[DataFile, bytes]:
+    """A file with these rows, and its bytes."""
+    buffer, schema = pa.BufferOutputStream(), TABLES[table].schema
+    with parquet_writer(buffer, schema) as writer:
+        writer.write_table(rows.cast(schema), row_group_size=group_rows)
+    data = buffer.getvalue().to_pybytes()
+    return DataFile(table, _named(of, hashlib.sha256(data).hexdigest()), len(data), rows.num_rows, day), data
+
+
+def small_files(files: Iterable[DataFile]) -> Iterator[list[DataFile]]:
+    """Small files of each day, as many together as may be joined in memory."""
+    group: list[DataFile] = []
+    small = (file for file in files if file.size_bytes < _SMALL_BYTES)
+    for file in sorted(small, key=lambda file: (str(file.day), file.name)):
+        full = sum(one.size_bytes for one in group) + file.size_bytes > _JOINED_BYTES_MAX
+        if group and (full or file.day != group[0].day):
+            yield from [group] * (len(group) > 1)
+            group = []
+        group.append(file)
+    yield from [group] * (len(group) > 1)
+
+
+def _named(of: str, sha256: str) -> str:
+    return f"{of}-{sha256}.parquet"
+
+
+def _now_ms() -> int:
+    return time.time_ns() // 1_000_000

@@ -1,0 +1,161 @@
+"""Responses in wide form: one row for each response, its lines as lists, for stores of very many runs.
+
+The run directory has one row for each response and line (`response_table`), which any tool reads with one line of SQL.
+An archive and a fleet store many years of them: the wide form has a third of the bytes, and one row instead of one for
+each line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from livebode.core import Lines, RecordError, Responses
+from livebode.records import lines_in
+from livebode.tables import from_numpy, to_numpy
+
+_COMPLEX = {"value": ("re", "im"), "weight": ("weight_re", "weight_im")}
+_REAL = ("sigma", "coherence", "input_coherence", "distortion")
+_LEVEL = 3
+_COUNTED, _ROUNDED = ("first", "sample"), ("schedule", "dof")
+
+
+def wide_schema(lines: int, *, lossless: bool = False) -> pa.Schema:
+    """The columns, with the names of the long form; those of a line are lists of fixed length.
+
+    Numbers of samples are 64-bit integers and times are float64, both exact; all others are float32, with `lossless`
+    float64. NaN marks missing values; there is no null.
+    """
+    number = pa.float64() if lossless else pa.float32()
+    per_line = [name for pair in _COMPLEX.values() for name in pair] + list(_REAL)
+    return pa.schema(
+        [
+            *((name, pa.int64()) for name in _COUNTED),
+            ("time_s", pa.float64()),
+            *((name, number) for name in _ROUNDED),
+            ("ready", pa.bool_()),
+            ("valid", pa.list_(pa.bool_(), lines)),
+            *((name, pa.list_(number, lines)) for name in per_line),
+        ]
+    )
+
+
+def to_wide(responses: Responses, *, lossless: bool = False) -> pa.Table:
+    """The responses, one row for each, rounded to float32 unless `lossless`.
+
+    Values beyond the range of float32 (3.4e38) become infinite, those below it (1e-45) zero.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> responses = livebode.example_responses()
+    >>> table = to_wide(responses)
+    >>> table.num_rows, str(table.schema.field("re").type)
+    (40, 'fixed_size_list<item: float>[13]')
+    """
+    schema = wide_schema(len(responses.lines), lossless=lossless)
+    columns: dict[str, NDArray[Any]] = {name: getattr(responses, name) for name in (*_COUNTED, "time_s", *_ROUNDED)}
+    columns |= {name: getattr(responses, name) for name in ("ready", "valid", *_REAL)}
+    for name, (real, imaginary) in _COMPLEX.items():
+        columns[real], columns[imaginary] = getattr(responses, name).real, getattr(responses, name).imag
+    with np.errstate(over="ignore", under="ignore"):
+        arrays = [as_arrow(columns[field.name], field.type) for field in schema]
+    return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def from_wide(table: pa.Table, found: Mapping[str, Any]) -> Responses:
+    """The responses in rows of `to_wide`; other columns are ignored.
+
+    Parameters
+    ----------
+    table
+        Rows of one run, as they were written or as another program wrote them again: lists may have any type of list.
+    found
+        Entry ``found`` of run.json: grid, quantity and unit.
+
+    Raises
+    ------
+    RecordError
+        If a column is missing, contains null, or has another number of lines than the grid.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> responses = livebode.example_responses()
+    >>> lines = responses.lines
+    >>> found = {"bins": lines.bins, "quiet_bins": lines.quiet, "window": lines.window, "rate_hz": lines.rate_hz}
+    >>> found |= {"quantity": responses.quantity, "unit": responses.unit}
+    >>> from_wide(to_wide(responses, lossless=True), found).equals(responses)
+    True
+    """
+    lines = lines_in(found)
+    schema = wide_schema(len(lines))
+    column = {field.name: as_numpy(table, field, lines) for field in schema}
+    values: dict[str, NDArray[Any]] = {name: column[name] for name in (*_COUNTED, "ready", "valid")}
+    for name in ("time_s", *_ROUNDED, *_REAL):
+        values[name] = column[name].astype(np.float64, copy=False)
+    for name, (real, imaginary) in _COMPLEX.items():
+        values[name] = np.empty(column[real].shape, dtype=np.complex128)
+        values[name].real, values[name].imag = column[real], column[imaginary]
+    return Responses(lines=lines, quantity=found["quantity"], unit=found["unit"], **values)
+
+
+def wide_options(schema: pa.Schema) -> dict[str, Any]:
+    """Arguments of `pyarrow.parquet.write_table` or `ParquetWriter` for this schema, also with further columns.
+
+    Bytes of equal place in numbers are stored together (byte-stream-split), so that exponents compress; numbers of
+    samples as differences; zstd compresses all of it. Text, which repeats, has a dictionary.
+    """
+    encodings, repeating = {}, []
+    for field in schema:
+        kind, path = field.type, field.name
+        if isinstance(kind, pa.FixedSizeListType | pa.ListType):
+            kind, path = kind.value_type, f"{field.name}.list.element"
+        if pa.types.is_floating(kind):
+            encodings[path] = "BYTE_STREAM_SPLIT"
+        elif pa.types.is_integer(kind):
+            encodings[path] = "DELTA_BINARY_PACKED"
+        elif pa.types.is_string(kind):
+            repeating.append(path)
+    return {
+        "compression": "zstd",
+        "compression_level": _LEVEL,
+        "column_encoding": encodings,
+        "use_dictionary": repeating or False,
+    }
+
+
+def as_arrow(values: NDArray[Any], kind: pa.DataType) -> pa.Array[Any]:
+    """A column of this type, shape (rows,), or of lists of fixed length, shape (rows, lines)."""
+    if not isinstance(kind, pa.FixedSizeListType):
+        return from_numpy(values.astype(kind.to_pandas_dtype(), copy=False))
+    flat = from_numpy(values.astype(kind.value_type.to_pandas_dtype(), copy=False).ravel())
+    return pa.FixedSizeListArray.from_arrays(flat, type=kind)
+
+
+def as_numpy(table: pa.Table, field: pa.Field[Any], lines: Lines) -> NDArray[Any]:
+    """A column, shape (rows,), or of lists, shape (rows, lines); RecordError if it is missing or has other lists."""
+    at = table.schema.get_field_index(field.name)
+    if at < 0:
+        raise unexpected_rows(f"has no column {field.name!r}")
+    array = table.column(at).combine_chunks()
+    if pa.types.is_fixed_size_list(field.type):
+        if not len(array):
+            return np.empty((0, len(lines)), dtype=field.type.value_type.to_pandas_dtype())
+        lengths = pc.unique(pc.list_value_length(array)).to_pylist()
+        if lengths != [len(lines)]:
+            raise unexpected_rows(f"has {lengths[0]} lines in a row of {field.name!r}, and its grid has {len(lines)}")
+        array = array.flatten()
+    if array.null_count:
+        raise unexpected_rows(f"has a null in {field.name!r}")
+    return to_numpy(array).reshape(table.num_rows, -1) if pa.types.is_fixed_size_list(field.type) else to_numpy(array)
+
+
+def unexpected_rows(what: str) -> RecordError:
+    """The error of rows that are not from a run."""
+    return RecordError("unexpected-content", f"the table of wide responses {what}", "write it again from the run")

@@ -1,0 +1,1 @@
+"""The page of a fleet in a browser (wings/plant/docs/fleet-page.md)."""

@@ -1,0 +1,1 @@
+"""Trends in pictures and words, and the report of a hall."""
