@@ -341,6 +341,7 @@ def test_tls_and_a_token_for_another_address(tmp_path: Path, monkeypatch: pytest
 
 def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
     with chromium() as browser, Tab(browser, watched.url, wait=False) as tab:
+        tab.page.locator("#log-in:enabled").wait_for()
         tab.page.fill("#token", "wrong" * 10)
         tab.page.keyboard.press("Enter")
         tab.page.locator("#wrong", has_text="token is wrong").wait_for()

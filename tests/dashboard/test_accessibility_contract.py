@@ -58,6 +58,7 @@ def enter(tab: Tab) -> None:
     """Show the page to an operator."""
     tab.page.locator("#token, #bode-kind button").first.wait_for()
     if tab.page.locator("#token").count():
+        tab.page.locator("#log-in:enabled").wait_for()
         tab.page.locator("#token").fill(TOKEN)
         tab.page.keyboard.press("Enter")
     tab.until("window.livebode?.bode.curves.measured")
