@@ -1,4 +1,4 @@
-"""Average of a run, and its overview for pictures: read once and in parts, so that memory does not depend on its length."""
+"""Average and overview of a run, read once and in parts, so that memory does not depend on the length of the run."""
 
 from __future__ import annotations
 

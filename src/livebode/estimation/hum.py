@@ -1,4 +1,4 @@
-"""Hum of the mains without excitation: its frequencies and amplitudes in a recording, and the lines where it does not decay."""
+"""Hum of the mains without excitation: its frequencies and amplitudes, and the lines where it does not decay."""
 
 from __future__ import annotations
 

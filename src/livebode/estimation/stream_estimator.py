@@ -1,4 +1,4 @@
-"""Interface of what turns samples into responses; the common part of Tracker and SpectraTracker, and of their counters."""
+"""Interface of what turns samples into responses; the common part of Tracker and SpectraTracker, with its counters."""
 
 from __future__ import annotations
 

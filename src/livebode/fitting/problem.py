@@ -1,5 +1,7 @@
-"""One model fitted to rows of measured values: weighted least squares in the parameters' own coordinates, in C where the
-model has a description for it.
+"""One model fitted to rows of measured values: weighted least squares in the parameters' own coordinates.
+
+The fit in C solves the problem where its model has a description for it.
+
 """
 
 from __future__ import annotations

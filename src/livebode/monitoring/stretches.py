@@ -1,4 +1,4 @@
-"""Samples cut into stretches of whole windows, with the samples before and after them, or into sections of one length."""
+"""Samples cut into stretches of whole windows, with the samples around them, or into sections of one length."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""Orders: torque that repeats with the motor's angle, such as cogging, found in a model's residual of usual strokes; their
-size, and their effect on the bounds.
+"""Orders: torque that repeats with the motor's angle, such as cogging, found in a model's residual of usual strokes.
+
+A RippleWatch finds them while the axis works, with their size and their effect on the bounds.
 """
 
 from __future__ import annotations
