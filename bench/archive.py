@@ -40,7 +40,7 @@ from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
 from livebode_plant.archive.alone import handle_alone
 from livebode_plant.archive.clusters import Cluster, started
-from livebode_plant.archive.committing import Committer
+from livebode_plant.archive.coordinator import Committer
 from livebode_plant.archive.distributing import Distribution
 from livebode_plant.archive.grouping import RecordingGroups
 from livebode_plant.archive.job import Job

@@ -24,8 +24,7 @@ from livebode_plant.page.fleet_alarms import FleetAct
 from livebode_plant.page.fleet_board import FleetBoard
 from livebode_plant.page.fleet_demo import DemoFleet
 from livebode_plant.page.fleet_feed import Hear
-from livebode_plant.page.fleet_frames import tiles_frame
-from livebode_plant.page.fleet_site import FleetSite
+from livebode_plant.page.fleet_pages import FleetSite, tiles_frame
 from livebode_plant.page.fleet_view import TICK_S, FleetView
 
 _FRAMES = """async (seconds) => {

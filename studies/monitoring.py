@@ -26,7 +26,7 @@ from livebode.monitoring import (
     MachineMonitor,
     learn_machine,
 )
-from livebode.monitoring.false_alarms import threshold
+from livebode.monitoring.charts import threshold
 from livebode.monitoring.machine_detector import CHARTS
 from livebode.simulation import DampingGrowth, LoadChange, SoftSpot, StrokeSequence, TensionLoss
 from studies.monitoring_axis import (

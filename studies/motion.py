@@ -14,7 +14,7 @@ import numpy as np
 from livebode.core import Block, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.fitting.windows import fit_windows
+from livebode.fitting.two_masses import fit_windows
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Strokes
 from studies.common import RATE_HZ, WINDOW, correct, decibels, lines, rms

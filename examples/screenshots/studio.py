@@ -142,7 +142,7 @@ class Studio(ExitStack):
     def fleet_url(self) -> str:
         """A simulated fleet with a floor plan, and a year of AXIS; one of its partitions has no worker."""
         from livebode_plant.page.fleet_demo import DemoFeed, DemoFleet
-        from livebode_plant.page.fleet_site import FleetSite
+        from livebode_plant.page.fleet_pages import FleetSite
         from livebode_plant.page.fleet_view import FleetView
         from livebode_plant.page.floor_plan import floor_plan
 

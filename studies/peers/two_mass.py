@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.fitting import two_masses
-from livebode.fitting.windows import fit_windows
+from livebode.fitting.two_masses import fit_windows
 
 RADIUS_M = 0.019
 ARM = np.array([1.0, RADIUS_M**2, RADIUS_M**2, RADIUS_M**2])  # to the motor's shaft

@@ -20,7 +20,7 @@ from livebode.cli.failures import exit_code_of
 from livebode.core import Channel, ConfigError, LivebodeError, OutputError, RecordError, not_written
 from livebode.records import Lock
 from livebode.sources.live import Batch, encode_line
-from livebode_plant.fleet.simulated import write_simulated_fleet
+from livebode_plant.fleet.demo import write_simulated_fleet
 from tests.support.command import RATE_HZ, Result, livebode, signals, write_csv
 from tests.support.live_runs import started
 from tests.support.peers.peer import PATIENCE_S, free_port

@@ -15,7 +15,7 @@ import pytest
 from livebode.analysis import Overview
 from livebode.core import Event
 from livebode.dashboard import AlarmShelf, Dashboard, Hub, Serving
-from livebode.dashboard.alarm_actions import shelving, unshelving
+from livebode.dashboard.alarm_requests import shelving, unshelving
 from livebode.dashboard.notices import event_id
 from livebode.dashboard.state import State
 from livebode.dashboard.verdict import AxisVerdict, verdict

@@ -16,7 +16,7 @@ from livebode.analysis import Overview
 from livebode.configuration import LoopSection
 from livebode.core import Block, Event, Lines, Responses, ServerError
 from livebode.dashboard import Hub, Past, Quantities
-from livebode.dashboard.alarm_actions import acknowledgement
+from livebode.dashboard.alarm_requests import acknowledgement
 from livebode.dashboard.frames import KINDS, frame
 from livebode.dashboard.hub import EVENTS_MAX, ITEMS_MAX, VALUES_MAX
 from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id

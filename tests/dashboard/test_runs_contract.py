@@ -20,8 +20,8 @@ from starlette.applications import Starlette
 from livebode.core import RecordError, ServerError
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.access import Access
-from livebode.dashboard.opened_runs import OPEN_MAX, OpenedRuns
 from livebode.dashboard.run_catalogue import RunCatalogue
+from livebode.dashboard.runs_pages import OPEN_MAX, OpenedRuns
 from livebode.language import for_page
 from livebode.records import Lock, Notes, RunRecord, delete, read_notes, write_notes
 from tests.support.command import livebode

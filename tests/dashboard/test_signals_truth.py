@@ -17,11 +17,9 @@ from playwright.sync_api import Browser
 from livebode.core import Block, Channel, Lines, Spectra, SpectraLayout, UsageError
 from livebode.dashboard import Hub, signal_tap
 from livebode.dashboard.queries import signals_asked
-from livebode.dashboard.recorded_signals import recorded_answer
-from livebode.dashboard.signal_answer import answer
-from livebode.dashboard.signal_points import POINTS_MAX, columns_of, extremes, remark_of
-from livebode.dashboard.signal_spectrum import amplitude_spectrum
+from livebode.dashboard.signal_answer import POINTS_MAX, amplitude_spectrum, answer, columns_of, extremes, remark_of
 from livebode.dashboard.signal_tap import WATCHED_S, SignalTap, span_samples
+from livebode.dashboard.signals import recorded_answer
 from livebode.runtime import Channels, TrackerResults
 from tests.support.browser import Tab
 from tests.support.dashboards import BAD, LINES, RATE_HZ, Watched, data

@@ -35,7 +35,7 @@ WRITING_MODULES = {
         "experiments/designing", "experiments/matrix_designing", "interface/example_recordings",
         "livebode_plant/fleet/credentials", "records/run_directory", "records/table_file",
     ),
-    _TEMPORARY: ("livebode_plant/archive/alone", "livebode_plant/fleet/server", "livebode_plant/fleet/simulated"),
+    _TEMPORARY: ("livebode_plant/archive/alone", "livebode_plant/fleet/server", "livebode_plant/fleet/demo"),
     "the null device": ("cli/app", "livebode_plant/archive/clusters"),
     "a lock without content": ("records/segments/lock",),
     "a file that grows, and is the run's own": ("records/segments/disk",),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from livebode.monitoring.charts import Charts
-from livebode.monitoring.newest_rows import NewestRows
+from livebode.monitoring.table_monitor import NewestRows
 
 evidence = st.floats(-1e3, 1e3)
 

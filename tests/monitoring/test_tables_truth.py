@@ -7,8 +7,7 @@ import pytest
 
 from livebode.core import BaselineError
 from livebode.monitoring import DEFAULT_INTERVAL_S, TableMonitor, WindowRows, learn_table
-from livebode.monitoring.charts import Charts
-from livebode.monitoring.false_alarms import threshold
+from livebode.monitoring.charts import Charts, threshold
 from tests.support.errors import refused
 
 NAMES = ("20 Hz", "60 Hz", "100 Hz")

@@ -12,7 +12,7 @@ import pytest
 from livebode.core import BaselineError, Block, Channel, Event
 from livebode.estimation import Settings
 from livebode.monitoring import DEFAULT_INTERVAL_S, Baseline, Monitor, TorqueMonitor, learn_torque
-from livebode.monitoring.torque_file import torque_plain
+from livebode.monitoring.baseline_file import torque_plain
 from livebode.motion import Shaft
 from tests.support.monitored import pieces
 from tests.support.stateful_cases import baseline

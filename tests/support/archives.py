@@ -15,8 +15,7 @@ import pyarrow.parquet as pq
 from deltalake import DeltaTable
 from distributed import LocalCluster
 
-from livebode_plant.archive.committing import Committer
-from livebode_plant.archive.coordinator import Coordinator, Progress
+from livebode_plant.archive.coordinator import Committer, Coordinator, Progress
 from livebode_plant.archive.job import Job
 from livebode_plant.archive.recordings import ArchivedRecording, RecordingPlace, find_places, known_contents, untracked
 from livebode_plant.archive.results import Hashed, each_result

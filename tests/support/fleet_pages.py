@@ -15,7 +15,7 @@ from livebode_plant.page.fleet_alarms import FleetAct
 from livebode_plant.page.fleet_board import LOOKS
 from livebode_plant.page.fleet_demo import DemoFleet
 from livebode_plant.page.fleet_feed import Hear
-from livebode_plant.page.fleet_site import FleetSite
+from livebode_plant.page.fleet_pages import FleetSite
 from livebode_plant.page.fleet_view import FleetView
 
 

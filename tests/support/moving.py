@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.core import Block, Responses
 from livebode.estimation import Settings
-from livebode.fitting.windows import fit_windows
+from livebode.fitting.two_masses import fit_windows
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Sensor, Strokes
 from tests.support.axes import LINES, MULTISINE, RATE_HZ

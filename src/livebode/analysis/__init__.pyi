@@ -1,4 +1,6 @@
+from livebode.analysis._averaged import LIVE_VALUES_MAX as LIVE_VALUES_MAX
 from livebode.analysis._averaged import Averaged as Averaged
+from livebode.analysis._averaged import Overview as Overview
 from livebode.analysis._averaged import averaged as averaged
 from livebode.analysis._averaged import mean_of as mean_of
 from livebode.analysis._changes import Changes as Changes
@@ -29,15 +31,13 @@ from livebode.analysis.loop_verdict import CheckedLoop as CheckedLoop
 from livebode.analysis.loop_verdict import checked_loop as checked_loop
 from livebode.analysis.matrices import fit_matrix_run as fit_matrix_run
 from livebode.analysis.matrices import read_gantry as read_gantry
-from livebode.analysis.overview import LIVE_VALUES_MAX as LIVE_VALUES_MAX
-from livebode.analysis.overview import Overview as Overview
 from livebode.analysis.parameter_track import MARGINS as MARGINS
 from livebode.analysis.parameter_track import Track as Track
 from livebode.analysis.parameter_track import failed as failed
 from livebode.analysis.parameter_track import tracks as tracks
+from livebode.analysis.place_fits import by_place as by_place
 from livebode.analysis.place_fits import lpv_model as lpv_model
 from livebode.analysis.place_fits import modes_by_place as modes_by_place
-from livebode.analysis.places import by_place as by_place
 from livebode.analysis.poles import fit_poles as fit_poles
 from livebode.analysis.poles import plain_poles as plain_poles
 from livebode.analysis.run_trend import ALARMS as ALARMS

@@ -10,7 +10,7 @@ import numpy as np
 
 from livebode.analysis.fits import fit_run
 from livebode.analysis.loop_verdict import NOT_CHECKED, CheckedLoop, checked_loop
-from livebode.analysis.places import by_place
+from livebode.analysis.place_fits import by_place
 from livebode.configuration import Axis, FitSection, LoopSection, recorded_configuration
 from livebode.core import FitError, Loop, Parameters, Responses
 from livebode.fitting import Fit, Fitter, mean_response

@@ -1,4 +1,4 @@
-"""The model of a run fitted at each place of its schedule."""
+"""The mean responses of a run at places of its schedule, and its model fitted to each of them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,26 @@ import numpy as np
 
 from livebode.analysis._averaged import averaged
 from livebode.analysis.fits import MISFIT_MAX, better_output
-from livebode.analysis.places import by_place
 from livebode.analysis.poles import fit_poles
 from livebode.configuration import FitSection, fitter_of, recorded_configuration
 from livebode.core import Parameters, Responses, TuneError, UsageError
 from livebode.export import LpvModel
-from livebode.fitting import PhysicalModel
+from livebode.fitting import PhysicalModel, mean_response
 from livebode.records import RunRecord
+
+_PLACES = 12
+
+
+def by_place(responses: Responses) -> Responses:
+    """The mean response at each of twelve places of the schedule; one row without a schedule."""
+    use = np.flatnonzero(responses.valid.all(axis=1) & np.isfinite(responses.schedule))
+    if not use.size:
+        return mean_response(responses)
+    at = responses.schedule[use]
+    edges = np.linspace(at.min(), at.max(), _PLACES + 1)
+    place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, _PLACES - 1)
+    groups = [use[place == i] for i in range(_PLACES)]
+    return Responses.join([mean_response(responses[group]) for group in groups if group.size])
 
 
 def fits_by_place(directory: Path, model: str | None = None) -> tuple[PhysicalModel, Parameters]:

@@ -1,5 +1,6 @@
 from livebode.core._block import Block as Block
 from livebode.core._block import Channel as Channel
+from livebode.core._block import PlantKinds as PlantKinds
 from livebode.core._block import nearest_name as nearest_name
 from livebode.core._event import Emit as Emit
 from livebode.core._event import Event as Event
@@ -13,7 +14,6 @@ from livebode.core._loop import Loop as Loop
 from livebode.core._matrix_responses import CHANNELS_MAX as CHANNELS_MAX
 from livebode.core._matrix_responses import REASONS as REASONS
 from livebode.core._matrix_responses import MatrixResponses as MatrixResponses
-from livebode.core._plant_kinds import PlantKinds as PlantKinds
 from livebode.core._plotting import plot_responses as plot_responses
 from livebode.core._response import PER_RESPONSE as PER_RESPONSE
 from livebode.core._response import Response as Response
@@ -57,6 +57,7 @@ from livebode.core.document import Document as Document
 from livebode.core.document import Finding as Finding
 from livebode.core.document import Listing as Listing
 from livebode.core.document import Logo as Logo
+from livebode.core.document import Paper as Paper
 from livebode.core.document import Paragraph as Paragraph
 from livebode.core.document import Part as Part
 from livebode.core.document import Picture as Picture
@@ -90,7 +91,7 @@ from livebode.core.errors import SourceError as SourceError
 from livebode.core.errors import StateError as StateError
 from livebode.core.errors import TuneError as TuneError
 from livebode.core.errors import UsageError as UsageError
-from livebode.core.errors.signal import ANY_EXCITATION as ANY_EXCITATION
+from livebode.core.errors.computation import ANY_EXCITATION as ANY_EXCITATION
 from livebode.core.files import move_directory as move_directory
 from livebode.core.files import replace_file as replace_file
 from livebode.core.files import sync_directory as sync_directory
@@ -118,7 +119,6 @@ from livebode.core.model import Algebra as Algebra
 from livebode.core.model import Gain as Gain
 from livebode.core.model import Model as Model
 from livebode.core.model import as_model as as_model
-from livebode.core.paper import Paper as Paper
 from livebode.core.parameters import OK as OK
 from livebode.core.parameters import Parameters as Parameters
 from livebode.core.parameters import half_width as half_width

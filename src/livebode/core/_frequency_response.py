@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Floats
 from livebode.core._kinds import PlotKind
-from livebode.core._line_selection import position, within
-from livebode.core.lines import Lines
+from livebode.core.lines import Lines, position, within
 from livebode.drawing import decibels
 
 if TYPE_CHECKING:

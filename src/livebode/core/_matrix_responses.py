@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core._line_selection import ends, position, within
 from livebode.core._matrix_conversion import dataset, frd
 from livebode.core._response import Responses, widened
 from livebode.core.errors import GridError, UsageError
-from livebode.core.lines import Lines
+from livebode.core.lines import Lines, ends, position, within
 from livebode.core.rows import RowArrays
 from livebode.language import Message
 

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.arrays import Floats
 from livebode.core import _conversion, _description
 from livebode.core._frequency_response import PER_LINE, FrequencyResponse, Quantity
-from livebode.core._line_selection import ends
 from livebode.core.errors import GridError
-from livebode.core.lines import Lines
+from livebode.core.lines import Lines, ends
 from livebode.core.rows import RowArrays
 
 if TYPE_CHECKING:

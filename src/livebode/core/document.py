@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from livebode.core.paper import Paper
 from livebode.language import Message
+
+Paper = Literal["a4", "letter"]
+
 
 Tone = Literal["ok", "check", "alarm", "differs", "open", "pass", "fail", "undecided"]
 """Nothing to do; a person should look; an alarm is active; two runs differ; not assessed; and the three results of a

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from livebode.core.errors.extra import ExtraError
+from livebode.core.errors.inputs import ExtraError
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement

@@ -10,6 +10,7 @@ from livebode.dashboard.alarm_requests import Act as Act
 from livebode.dashboard.alarm_requests import AlarmRequest as AlarmRequest
 from livebode.dashboard.alarm_requests import alarm_request as alarm_request
 from livebode.dashboard.board import Board as Board
+from livebode.dashboard.board import Pulse as Pulse
 from livebode.dashboard.browser_socket import BrowserSocket as BrowserSocket
 from livebode.dashboard.dashboard import Dashboard as Dashboard
 from livebode.dashboard.dashboard import listening as listening
@@ -18,7 +19,6 @@ from livebode.dashboard.overlays import grid_hz as grid_hz
 from livebode.dashboard.past import Past as Past
 from livebode.dashboard.plugin_pages import Order as Order
 from livebode.dashboard.plugin_pages import PluginPages as PluginPages
-from livebode.dashboard.pulse import Pulse as Pulse
 from livebode.dashboard.quantities import Quantities as Quantities
 from livebode.dashboard.queries import json_object as json_object
 from livebode.dashboard.settings import Serving as Serving

@@ -1,9 +1,11 @@
-"""The routes of the dashboard. GET requests change nothing."""
+"""The routes of the dashboard, and what a person saves with a run. GET requests change nothing."""
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
@@ -25,8 +27,8 @@ from livebode.dashboard.guard import Guard, body
 from livebode.dashboard.matrix_answer import matrix_answer
 from livebode.dashboard.past import Past
 from livebode.dashboard.plugin_pages import PluginPages
+from livebode.dashboard.queries import SavedChange
 from livebode.dashboard.runs_pages import RunsPages
-from livebode.dashboard.saved import applied, listed
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
@@ -34,6 +36,33 @@ from livebode.dashboard.trials import loop_trials
 from livebode.language import Message, catalogue_for_page, negotiated
 from livebode.plugins import loaded
 from livebode.records import SavedCurves, change_saved, read_saved
+
+
+def listed(saved: SavedCurves) -> dict[str, Any]:
+    """Names and times for the page; the curves themselves are sent as frames."""
+    references = [
+        {"id": one.id, "name": one.name, "saved": one.saved, "time_s": float(one.response.time_s[0])}
+        for one in saved.references
+    ]
+    return {"references": references, "annotations": [vars(one) for one in saved.annotations]}
+
+
+def applied(change: SavedChange, past: Past, state: State) -> Callable[[SavedCurves], SavedCurves]:
+    """The change as a function; it reads the record, so it is called in another thread."""
+    if change.kind == "annotation":
+        return lambda saved: saved.with_annotation(change.text, change.at)
+    if change.kind == "remove":
+        return lambda saved: saved.without(change.text)
+    quantities = state.quantities
+
+    def add(saved: SavedCurves) -> SavedCurves:
+        response = past.at(change.at)
+        if quantities is None or not quantities.fit(response):
+            raise ServerError("not-begun", "the response belongs to a previous run", "choose one of this run")
+        return saved.with_reference(change.text, response)
+
+    return add
+
 
 _HERE = Path(__file__).parent
 _FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}

@@ -1,4 +1,4 @@
-"""Board: the states of all axes in the server's thread, and the operations of requests on them."""
+"""Board: the states of all axes in the server's thread, the operations of requests on them, and their updates."""
 
 from __future__ import annotations
 
@@ -11,15 +11,30 @@ from typing import Any, TypeVar
 from livebode.core import Event, LivebodeError, ServerError
 from livebode.dashboard.access import Access
 from livebode.dashboard.alarm import AlarmShelf
-from livebode.dashboard.alarm_actions import acknowledgement, shelving, unshelving
-from livebode.dashboard.alarm_requests import Act, AlarmRequest
+from livebode.dashboard.alarm_requests import Act, AlarmRequest, acknowledgement, shelving, unshelving
 from livebode.dashboard.notices import Notice
 from livebode.dashboard.places import Places
-from livebode.dashboard.pulse import Pulse
 from livebode.dashboard.state import State
 from livebode.dashboard.verdict import verdict
 from livebode.dashboard.viewed import Viewed
 from livebode.language import Message
+
+
+class Pulse:
+    """Wakes all that wait for the next update."""
+
+    def __init__(self) -> None:
+        self._next = asyncio.Event()
+
+    async def wait_next(self) -> None:
+        """Wait for the next update."""
+        await self._next.wait()
+
+    def beat(self) -> None:
+        """Wake all that wait now."""
+        before, self._next = self._next, asyncio.Event()
+        before.set()
+
 
 UPDATES_PER_S = 30.0
 _IDLE_S = 0.5

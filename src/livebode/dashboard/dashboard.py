@@ -139,8 +139,7 @@ class Dashboard:
             import uvicorn
 
             from livebode.dashboard.patience import IDLE_S, PatientProtocol
-            from livebode.dashboard.server import Server
-            from livebode.dashboard.web_socket import WebSocketProtocol
+            from livebode.dashboard.server import Server, WebSocketProtocol
         except ImportError as error:
             raise not_installed(
                 f"the dashboard needs {error.name}, which is not installed",

@@ -1,28 +1,179 @@
-"""The pages over all runs of a directory: list, trends, comparison, and the page of each run below /run/NAME/."""
+"""The pages over all runs of a directory: list, trends, comparison, their requests, and the page of each run below
+/run/NAME/, which is opened when it is asked for.
+"""
 
 from __future__ import annotations
 
+import asyncio
+import os
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
 from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from livebode.core import LivebodeError, ServerError
-from livebode.dashboard import run_requests
-from livebode.dashboard.access import Role, error_answer
+from livebode.core import LivebodeError, ServerError, UsageError
+from livebode.dashboard.access import Access, Role, error_answer
 from livebode.dashboard.board import Board
 from livebode.dashboard.guard import body
-from livebode.dashboard.opened_runs import OpenedRuns
+from livebode.dashboard.matrix_view import views_of
+from livebode.dashboard.queries import json_object
 from livebode.dashboard.run_catalogue import RunCatalogue, details
 from livebode.language import Message, in_language, negotiated
-from livebode.records import delete, to_json, write_notes
+from livebode.records import Notes, delete, to_json, write_notes
+
+NAME_LETTERS_MAX = 255
+VERSION_MAX = 1 << 53
+
+
+def version(query: Mapping[str, str]) -> int:
+    """The version that the page has; 0 without one.
+
+    >>> version({"since": "12"}), version({})
+    (12, 0)
+    """
+    text = query.get("since", "0")
+    if not (text.isascii() and text.isdigit() and len(text) <= 16 and int(text) <= VERSION_MAX):
+        raise UsageError(
+            "unreadable", f"since={text[:20]!r} is not a version", Message("reload the page"), value=text[:20]
+        )
+    return int(text)
+
+
+def run_name(value: object) -> str:
+    """The name of a run in a request."""
+    if not isinstance(value, str) or not 0 < len(value) <= NAME_LETTERS_MAX:
+        raise ServerError("request-malformed", "the request does not name a run", Message("reload the page"))
+    return value
+
+
+def notes_of(data: bytes | None) -> tuple[str, Notes]:
+    """Name and notes of a request; LivebodeError if they are invalid."""
+    message = _object(data)
+    try:
+        notes = Notes.model_validate({name: message.get(name) for name in ("tags", "text")})
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise ServerError(
+            "request-malformed",
+            f"the notes are not valid ({place}: {first['msg']})",
+            "shorten them: at most 20 tags of 40 letters, and 2,000 letters of notes",
+        ) from None
+    return run_name(message.get("run")), notes
+
+
+def deletion_of(data: bytes | None) -> str:
+    """Name of the run to delete; ServerError if the person did not confirm it by its name."""
+    message = _object(data)
+    name = run_name(message.get("run"))
+    if message.get("confirmed") != name:
+        raise ServerError("request-malformed", f"the deletion of {name[:80]!r} is not confirmed", "enter its name")
+    return name
+
+
+def _object(data: bytes | None) -> dict[str, Any]:
+    if data is None:
+        raise ServerError("request-malformed", "the request is too long or incomplete", "send a shorter one")
+    return json_object(data)
+
+
+OPEN_MAX = 8
+"""Largest number of runs in memory."""
+
+
+@dataclass(eq=False)
+class _OpenedRun:
+    """A run in memory: its board, the page over it, and how many requests use it now."""
+
+    board: Board
+    page: ASGIApp
+    beating: asyncio.Task[None]
+    directory: tuple[int, int]
+    users: int = 0
+
+
+@dataclass
+class OpenedRuns:
+    """The runs in memory, at most 8; used in the server's thread.
+
+    Parameters
+    ----------
+    access
+        The access control of their boards.
+    page
+        Creates the application that serves a board.
+    """
+
+    access: Access
+    page: Callable[[Board], ASGIApp]
+    _runs: OrderedDict[str, _OpenedRun] = field(default_factory=OrderedDict)
+    _opening: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    @asynccontextmanager
+    async def opened(self, directory: Path) -> AsyncIterator[ASGIApp]:
+        """The application of a run, which stays in memory at least as long as the context.
+
+        Raises
+        ------
+        RecordError, GridError
+            If the run cannot be read.
+        ServerError
+            If 8 other runs are in use.
+        """
+        async with self._opening:
+            found = self._runs.get(directory.name)
+            # Another run of the same name, or an internal error has stopped it.
+            if found is not None and (found.directory != _identity(directory) or found.beating.done()):
+                self.close(directory.name)
+                found = None
+            if found is None:
+                self._make_room()
+                found = self._runs[directory.name] = await self._open(directory)
+        self._runs.move_to_end(directory.name)
+        found.users += 1
+        try:
+            yield found.page
+        finally:
+            found.users -= 1
+
+    def close(self, name: str) -> None:
+        """Remove a run from memory and disconnect its browsers."""
+        if (found := self._runs.pop(name, None)) is not None:
+            found.board.places.displace_all()
+            found.beating.cancel()
+            found.board.close()
+
+    async def _open(self, directory: Path) -> _OpenedRun:
+        identity = _identity(directory)
+        views = await asyncio.get_running_loop().run_in_executor(None, views_of, directory)
+        board = Board([state for state, _ in views], {state.axis: viewed for state, viewed in views}, self.access)
+        return _OpenedRun(board, self.page(board), asyncio.create_task(board.run()), identity)
+
+    def _make_room(self) -> None:
+        if len(self._runs) < OPEN_MAX:
+            return
+        idle = next((name for name, run in self._runs.items() if not run.users), None)
+        if idle is None:
+            raise ServerError(
+                "busy", f"{OPEN_MAX} runs are open in browsers already", "close the page of one of them", limit=OPEN_MAX
+            )
+        self.close(idle)
+
+
+def _identity(directory: Path) -> tuple[int, int]:
+    found = os.stat(directory)
+    return found.st_dev, found.st_ino
+
 
 BODY_BYTES_MAX = 16 << 10
 _COMPARISONS_MAX = 8
@@ -89,14 +240,14 @@ class RunsPages:
         """Rows that changed since the version that the page has."""
         if (role := self._role(request)) is None:
             return _unknown()
-        found = await self._board.elsewhere(self._catalogue.rows, run_requests.version(request.query_params))
+        found = await self._board.elsewhere(self._catalogue.rows, version(request.query_params))
         return _json(found | {"role": role, "directory": self._catalogue.directory.resolve().name})
 
     async def trends(self, request: Request) -> Response:
         """Points and alarms of runs that changed since the version that the page has."""
         if self._role(request) is None:
             return _unknown()
-        found = await self._board.elsewhere(self._catalogue.trends, run_requests.version(request.query_params))
+        found = await self._board.elsewhere(self._catalogue.trends, version(request.query_params))
         return _json(found)
 
     async def trend(self, request: Request) -> Response:
@@ -120,7 +271,7 @@ class RunsPages:
     async def notes(self, request: Request) -> Response:
         if (refused := self._not_operator(request)) is not None:
             return refused
-        name, notes = run_requests.notes_of(await body(request, BODY_BYTES_MAX))
+        name, notes = notes_of(await body(request, BODY_BYTES_MAX))
         path = await self._path(name)
         await self._board.elsewhere(write_notes, path, notes)
         self._catalogue.forget()
@@ -129,7 +280,7 @@ class RunsPages:
     async def delete(self, request: Request) -> Response:
         if (refused := self._not_operator(request)) is not None:
             return refused
-        path = await self._path(run_requests.deletion_of(await body(request, BODY_BYTES_MAX)))
+        path = await self._path(deletion_of(await body(request, BODY_BYTES_MAX)))
         to = await self._board.elsewhere(delete, path)
         self._opened.close(path.name)
         self._catalogue.forget()
@@ -173,7 +324,7 @@ class RunsPages:
         return self._comparisons[key]
 
     async def _path(self, name: object) -> Path:
-        return await self._board.elsewhere(self._catalogue.path, run_requests.run_name(name))
+        return await self._board.elsewhere(self._catalogue.path, run_name(name))
 
     def _html(self, request: Request, name: str) -> Response:
         return RedirectResponse("/login", 303) if self._role(request) is None else self._file(name)

@@ -1,19 +1,41 @@
-"""The server: uvicorn behind a Listener, and the report of its internal errors."""
+"""The server: uvicorn behind a Listener, its web socket, and the report of its internal errors."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import gc
 import socket
 import time
 import traceback
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import uvicorn
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.protocol import State
 
 from livebode.dashboard.listener import Listener
 from livebode.dashboard.patience import PatientProtocol
+
+
+class WebSocketProtocol(WebSocketsSansIOProtocol):
+    """Under TLS a connection remains for a while after both have said goodbye, and a second goodbye is an error."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Keep the socket: a TLS transport that was closed twice cannot be aborted any more."""
+        super().connection_made(cast("asyncio.Transport", transport))
+        self._socket = cast("socket.socket", transport.get_extra_info("socket"))
+
+    def shutdown(self) -> None:
+        """End the connection, as the server ends."""
+        if self.handshake_complete and self.conn.state is not State.OPEN:
+            self.stop_keepalive()
+            with contextlib.suppress(OSError):  # the browser has closed it at this moment
+                self._socket.shutdown(socket.SHUT_RDWR)
+        else:
+            super().shutdown()
+
 
 _OBJECTS_NEW = 5_000
 """Most new objects of Python after which cycles are searched while a page is served: a closed connection under TLS is a

@@ -3,14 +3,48 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 
-from livebode.core import Lines
+import numpy as np
+
+from livebode.core import Block, Lines
 from livebode.dashboard.board import Board
 from livebode.dashboard.queries import SignalsAsked
-from livebode.dashboard.recorded_signals import recorded_answer
 from livebode.dashboard.signal_answer import Picture, answer, why_not
-from livebode.dashboard.signal_tap import SignalTap
+from livebode.dashboard.signal_tap import SignalTap, span_samples
 from livebode.dashboard.state import State
+from livebode.records import RunRecord, channels_of
+from livebode.tables import Table
+
+
+def recorded_answer(directory: Path, entry: str | None, at_s: float, picture: Picture) -> bytes:
+    """The answer with the recorded samples around a time, which is in the middle of them."""
+    run = RunRecord.open(directory, entry=entry)
+    block = recorded_block(run, at_s)
+    if block is not None:
+        return answer(block, run.lines, picture)
+    return why_not("unrecorded" if next(run.tables("samples"), None) is None else "outside")
+
+
+def recorded_block(run: RunRecord, at_s: float) -> Block | None:
+    """The recorded samples around a time, NaN where samples are missing; None if there are none."""
+    lines = run.lines
+    half_s = span_samples(lines.rate_hz, lines.window, 1) / lines.rate_hz / 2
+    found = []
+    for table in run.tables("samples", span_s=(at_s - half_s, at_s + half_s)):
+        time_s = table["time_s"]
+        within = np.flatnonzero((time_s >= at_s - half_s) & (time_s < at_s + half_s))
+        if within.size:
+            found.append(table.slice(int(within[0]), int(within[-1]) + 1 - int(within[0])))
+    if not found:
+        return None
+    table = Table.join(found)
+    sample, time_s, *values = (table[name] for name in table.column_names)
+    start = int(sample[0])
+    channels = channels_of(table.schema)
+    data = np.full((len(channels), int(sample[-1]) + 1 - start), np.nan)
+    data[:, sample - start] = values
+    return Block(data, channels, lines.rate_hz, start, float(time_s[0]) - start / lines.rate_hz)
 
 
 async def signals(board: Board, state: State, asked: SignalsAsked) -> bytes:

@@ -19,7 +19,7 @@ from livebode.analysis import Overview
 from livebode.configuration import recorded_configuration
 from livebode.core import Event, LivebodeError, Quantity, Responses, RunClock
 from livebode.dashboard.alarm import AlarmShelf
-from livebode.dashboard.alarm_actions import shelving, unshelving
+from livebode.dashboard.alarm_requests import shelving, unshelving
 from livebode.dashboard.frames import curve, frame
 from livebode.dashboard.hub import Hub, Item
 from livebode.dashboard.matrix_group import MatrixGroup

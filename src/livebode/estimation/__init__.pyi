@@ -21,8 +21,6 @@ from livebode.estimation.repeating import hum_events as hum_events
 from livebode.estimation.ripple import RippleOrder as RippleOrder
 from livebode.estimation.ripple import RippleSpeed as RippleSpeed
 from livebode.estimation.ripple import ripple_power as ripple_power
-from livebode.estimation.set_aside import NOTHING as NOTHING
-from livebode.estimation.set_aside import contains as contains
 from livebode.estimation.settings import DETECTION_LINES_MIN as DETECTION_LINES_MIN
 from livebode.estimation.settings import Settings as Settings
 from livebode.estimation.settings import default_hop as default_hop
@@ -38,9 +36,11 @@ from livebode.estimation.spectra_tracker import SpectraTracker as SpectraTracker
 from livebode.estimation.spikes import SpikeGate as SpikeGate
 from livebode.estimation.stream_estimator import Follower as Follower
 from livebode.estimation.successive import SuccessiveTrackers as SuccessiveTrackers
+from livebode.estimation.tracker import NOTHING as NOTHING
 from livebode.estimation.tracker import Tracker as Tracker
+from livebode.estimation.tracker import contains as contains
 from livebode.estimation.uneven import UnevenSpectra as UnevenSpectra
+from livebode.estimation.uneven import UnevenTracker as UnevenTracker
 from livebode.estimation.uneven import UnevenWindow as UnevenWindow
-from livebode.estimation.uneven_tracker import UnevenTracker as UnevenTracker
 from livebode.estimation.watch import InputStatistics as InputStatistics
 from livebode.estimation.welch_average import WINDOWS as WINDOWS

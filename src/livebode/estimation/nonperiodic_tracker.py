@@ -8,14 +8,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Block, Emit, Event, Responses, Stage, UsageError, hand_over, ignore
+from livebode.core import Block, Emit, Event, Responses, Stage, StatefulBase, UsageError, hand_over, ignore
 from livebode.estimation.centre import Centre
-from livebode.estimation.newest_samples import NewestSamples
 from livebode.estimation.nonperiodic_stage import NonPeriodicStage, Row
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.stream_estimator import StreamEstimator, signals_of
 from livebode.estimation.watch import InputStatistics
+
+
+class NewestSamples(StatefulBase):
+    """A ring of the newest samples of `signals` signals. `count` is the number since the last start."""
+
+    _stage = Stage("newest-samples", 1)
+    _STATE = ("_ring", "_at", "count")
+
+    def __init__(self, signals: int, size: int) -> None:
+        self._ring = np.zeros((signals, size))
+        self._at = self.count = 0
+
+    def add(self, data: Floats) -> None:
+        """Add samples, shape (signals, samples)."""
+        size, samples = self._ring.shape[1], data.shape[1]
+        data = data[:, -size:]
+        start = (self._at + samples - data.shape[1]) % size
+        first = min(size - start, data.shape[1])
+        self._ring[:, start : start + first] = data[:, :first]
+        self._ring[:, : data.shape[1] - first] = data[:, first:]
+        self._at = (self._at + samples) % size
+        self.count += samples
+
+    @property
+    def window(self) -> Floats:
+        """The newest samples, the oldest first, shape (signals, size)."""
+        return np.concatenate([self._ring[:, self._at :], self._ring[:, : self._at]], axis=1)
 
 
 class NonPeriodicTracker(StreamEstimator[InputStatistics]):

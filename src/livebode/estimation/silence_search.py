@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Lines, Stage, StatefulBase
-from livebode.estimation.hum import SECONDS_MIN, Hum, disturbed_lines, find_hum
-from livebode.estimation.silence import GONE
+from livebode.estimation.hum import GONE, SECONDS_MIN, Hum, disturbed_lines, find_hum
 
 _VALUES_MAX = 1 << 15  # of a stretch in a state: 256 kB, 16 s of two signals at 1 kHz
 

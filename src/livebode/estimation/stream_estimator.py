@@ -1,14 +1,34 @@
-"""Interface of what turns samples into responses; the common part of Tracker and SpectraTracker."""
+"""Interface of what turns samples into responses; the common part of Tracker and SpectraTracker, with its counters."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
 from livebode.arrays import Floats, Integers
 from livebode.core import Block, Emit, Event, Responses, SignalError, Stateful, StatefulBase, ignore, same_rate
 from livebode.estimation.settings import Settings
-from livebode.estimation.stream_counters import StreamCounters
+
+
+class StreamCounters(StatefulBase):
+    """Counts and Events of a stream of Blocks.
+
+    Events are appended to `events`. `kinds` are reasons for exclusion, `also` further counts, and `last` the sample at
+    which each kind was before the first one.
+    """
+
+    _STATE = ("_next", "_last", "counts")
+
+    def __init__(self, events: list[Event], kinds: Iterable[str], last: int, also: tuple[str, ...] = ()) -> None:
+        self._kinds = tuple(kinds)
+        self._next = -1
+        self._last = dict.fromkeys(self._kinds, last)
+        self.counts = dict.fromkeys(("samples", "gaps", "missing", *also, *self._kinds), 0)
+        self._events = events
+
+    def _report(self, kind: str, block: Block, sample: int, message: str, **details: int) -> None:
+        self._events.append(Event(kind, sample, block.origin_s + sample / block.rate_hz, message, dict(details)))
+
 
 W = TypeVar("W", bound=StreamCounters)
 

@@ -1,14 +1,17 @@
-"""Line spectra of samples at uneven times: least squares at the times themselves."""
+"""Line spectra of samples at uneven times, by least squares at the times themselves, and the responses from them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
+from livebode.core import Stage
+from livebode.estimation.spectra_tracker import SpectraTracker
 
 _ONE, _X, _U, _UU, _XU = range(5)  # rows of the sums; the last three for a trend
 _TABLE = 32  # powers of e^(jφ) that one factor covers
@@ -206,3 +209,22 @@ class UnevenSpectra:
                 continue
             order = (np.arange(self._places) + number + 1) % self._places
             yield self.window(ring[order])
+
+
+class UnevenTracker(SpectraTracker):
+    """A SpectraTracker for recordings whose channels have clocks of their own.
+
+    What the uneven times add to the error of a spectrum differs from period to period, and is in sigma as all of the
+    scatter is.
+    """
+
+    _stage = Stage("uneven-tracker", 1)
+    _sentences: Mapping[str, str] = {
+        "not-whole": "a window has too few samples of a channel",
+        "implausible": "a spectrum is more than 1e8 times larger than all in the period before",
+        "spike": "a window has a spike",
+    }
+
+    def found(self) -> dict[str, Any]:
+        """The basis of the responses as plain data for a record."""
+        return super().found() | {"from": "samples at their own times"}

@@ -6,7 +6,7 @@ import numpy as np
 
 from livebode.core import Block, Event, SignalError, Stage
 from livebode.estimation.spectra import SpectraRows
-from livebode.estimation.stream_counters import StreamCounters
+from livebode.estimation.stream_estimator import StreamCounters
 from livebode.language import Message
 
 _KINDS = {

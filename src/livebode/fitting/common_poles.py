@@ -13,10 +13,9 @@ from livebode.arrays import Complex, Floats
 from livebode.core import OK, FitError, GridError, Parameters, Response, Responses, UsageError, counted
 from livebode.fitting.fitter import measured_of
 from livebode.fitting.mean import mean_response
-from livebode.fitting.partial_fractions import PartialFractions
+from livebode.fitting.partial_fractions import PartialFractions, PoleQuantities
 from livebode.fitting.patterns import RUNS, neighbours
 from livebode.fitting.physical import EvaluationGrid, Hold
-from livebode.fitting.pole_quantities import PoleQuantities
 from livebode.fitting.pole_search import ORDER_MAX, Kind, possible, search
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import EPSILON_MAX, NO_FIT, NO_RESPONSE, NOT_CONVERGED, NOT_SEEN, SENTENCES

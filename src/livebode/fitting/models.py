@@ -12,8 +12,8 @@ from livebode.plugins import loaded, named
 MODELS: Mapping[str, str] = {
     "rigid": "livebode.fitting.chains:Rigid",
     "two-mass": "livebode.fitting.chains:TwoMass",
-    "three-mass": "livebode.fitting.three_mass:ThreeMass",
-    "two-mass-gain": "livebode.fitting.unknown_gain:TwoMassGain",
+    "three-mass": "livebode.fitting.chains:ThreeMass",
+    "two-mass-gain": "livebode.fitting.chains:TwoMassGain",
 }
 """livebode's models by name, each with "module:name" of its class, a `PhysicalModel`."""
 

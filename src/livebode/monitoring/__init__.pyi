@@ -14,13 +14,13 @@ from livebode.monitoring.baseline import signals_of as signals_of
 from livebode.monitoring.baseline_version import BaselineVersion as BaselineVersion
 from livebode.monitoring.baseline_version import file_of as file_of
 from livebode.monitoring.baseline_version import retained_file as retained_file
+from livebode.monitoring.charts import DEFAULT_INTERVAL_S as DEFAULT_INTERVAL_S
 from livebode.monitoring.evidence import Evidence as Evidence
-from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S as DEFAULT_INTERVAL_S
 from livebode.monitoring.learned_torque import LearnedTorque as LearnedTorque
 from livebode.monitoring.learning import learn_machine as learn_machine
 from livebode.monitoring.machine import LearnedMachine as LearnedMachine
 from livebode.monitoring.machine_detector import MachineDetector as MachineDetector
-from livebode.monitoring.machine_monitor import MachineMonitor as MachineMonitor
+from livebode.monitoring.machine_detector import MachineMonitor as MachineMonitor
 from livebode.monitoring.monitor import Monitor as Monitor
 from livebode.monitoring.rows import PLACES as PLACES
 from livebode.monitoring.rows import NonOverlappingWindows as NonOverlappingWindows

@@ -12,7 +12,7 @@ from livebode.arrays import Floats
 from livebode.language import Message
 from livebode.monitoring.order_amplitudes import TorqueNoise, normal_values, powers, together
 from livebode.monitoring.rows import WindowRows
-from livebode.monitoring.sections import SampleSection
+from livebode.monitoring.stretches import SampleSection
 from livebode.monitoring.table import STILL, ScheduleTable
 from livebode.monitoring.torque_model import StrokeFriction, TorqueModel
 from livebode.motion import Shaft

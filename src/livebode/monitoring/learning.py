@@ -1,4 +1,4 @@
-"""From healthy runs to a Machine: one model for all runs, driven by their torque."""
+"""From healthy runs to a Machine: one model for all runs, driven by their torque, and the orders in its residual."""
 
 from __future__ import annotations
 
@@ -15,16 +15,67 @@ from livebode.monitoring.accuracy import ChangeAccuracy, accuracy, scatter_error
 from livebode.monitoring.amplitude import InputAmplitude
 from livebode.monitoring.between_runs import KNOWN, between_runs
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
-from livebode.monitoring.evidence import Evidence
+from livebode.monitoring.evidence import JUDGED, Evidence
 from livebode.monitoring.machine import LearnedMachine, cells
 from livebode.monitoring.machine_fit import joint_step, moved, normal, normal_of, step_of
 from livebode.monitoring.model_evidence import SIGNALS, ModelEvidence, held, missing, wave, way
 from livebode.monitoring.offset import Offset
-from livebode.monitoring.order_search import find_orders, peak_torques
 from livebode.monitoring.ripple import Ripple, amplitudes, noise_power
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.stretches import Stretches
-from livebode.motion import MotionFitOptions, WeightedResponses
+from livebode.motion import MotionFitOptions, OrderSpectrum, WeightedResponses
+
+
+def find_orders(
+    runs: Iterable[Iterable[Block]], machine: LearnedMachine, lines: Lines, names: tuple[str, ...]
+) -> Floats:
+    """Orders in cycles a metre, the strongest first."""
+    if machine.way_m == 0:
+        return np.zeros(0)
+    spectrum = OrderSpectrum(lines, machine.way_m, machine.slowest_m_per_s)
+    for run in runs:
+        for rows in _strokes(run, machine, lines, names):
+            spectrum.add(rows[0], rows[-1])
+    return spectrum.found()
+
+
+def peak_torques(
+    runs: Iterable[Iterable[Block]], machine: LearnedMachine, lines: Lines, names: tuple[str, ...]
+) -> Floats:
+    """Amplitude of each order of the Machine's ripple, N m (orders,); 0 where it is not above the noise.
+
+    From the strokes in which an order is away from the lines. At the lines, what the model omits of the excitation's
+    motion, such as dry friction that it reverses, has the power of a ripple of several times the true size.
+    """
+    orders = machine.ripple.cycles_per_m
+    spectrum, total = OrderSpectrum(lines, machine.way_m, machine.slowest_m_per_s), np.zeros((2, orders.size))
+    for run in runs:
+        for rows in _strokes(run, machine, lines, names):
+            total += spectrum.explained(rows[0], rows[1:-1], rows[-1], orders)
+    squared = total[0] / np.where(total[1] > 0, total[1], 1.0)
+    return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+
+
+def _strokes(run: Iterable[Block], machine: LearnedMachine, lines: Lines, names: tuple[str, ...]) -> Iterator[Floats]:
+    """Rows of `ModelEvidence.residual` over windows in a row that are judged."""
+    source, stretches = ModelEvidence(machine, lines), Stretches(names, lines.window, lines.rate_hz)
+    parts: list[Floats] = []
+    stop, sign = -1, 0.0
+    for stretch in (s for block in run for s in stretches.process(block)):
+        rows = source.residual(stretch, Offset())
+        _, speed, status = source.way(stretch)
+        for i, first in enumerate(range(stretch.first * lines.window, stretch.last * lines.window, lines.window)):
+            forward, judged = float(np.sign(speed[i])), status[i] == JUDGED
+            if parts and (first != stop or forward != sign or not judged):
+                yield np.concatenate(parts, axis=1)
+                parts = []
+            if judged:
+                begin = first - stretch.start
+                parts.append(rows[:, begin : begin + lines.window])
+                stop, sign = first + lines.window, forward
+    if parts:
+        yield np.concatenate(parts, axis=1)
+
 
 Run = Callable[[], Iterable[Block]]
 """Each call gives the samples of a run from the first one."""

@@ -11,8 +11,8 @@ from livebode.core import Block, Event, Parameters, Responses, Stage, StatefulBa
 from livebode.estimation import Settings
 from livebode.monitoring._result_sentence import result_sentence
 from livebode.monitoring.baseline import Baseline
-from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S
-from livebode.monitoring.machine_monitor import MachineMonitor
+from livebode.monitoring.charts import DEFAULT_INTERVAL_S
+from livebode.monitoring.machine_detector import MachineMonitor
 from livebode.monitoring.rows import NonOverlappingWindows, WindowRows, places
 from livebode.monitoring.table_monitor import TableMonitor
 from livebode.monitoring.torque_monitor import TorqueMonitor

@@ -1,14 +1,35 @@
-"""Samples cut into stretches of whole windows, with the samples before and after them."""
+"""Samples cut into stretches of whole windows, with the samples around them, or into sections of one length."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import Block, Stage
-from livebode.monitoring.sample_buffer import SampleBuffer
+from livebode.core import Block, Stage, StatefulBase
+
+
+class SampleBuffer(StatefulBase):
+    """Base class of what cuts Blocks into pieces of other lengths; the state contains the samples in `_parts`."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names = names
+        self._parts: list[Floats] = []
+
+    def _rows(self, block: Block) -> Floats:
+        """The channels of a Block, (channels, samples); LivebodeError where one is missing."""
+        return block.data[[block.index(name) for name in self._names]]
+
+    def _state(self) -> dict[str, Any]:
+        data = np.concatenate(self._parts, axis=1) if self._parts else np.zeros((len(self._names), 0))
+        return super()._state() | {"data": data}
+
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
+        self._parts = [state["data"]] if state["data"].size else []
+
 
 WINDOWS = 10  # of a stretch: the lead is then half of the work, and an alarm at most a second late
 LEAD_S = 0.5  # for a model to reach the machine's state; a Q of 10 at 50 Hz decays in 0.06 s
@@ -76,3 +97,44 @@ class Stretches(SampleBuffer):
         keep = max(self._start, last * self._window - self._lead)
         self._parts, self._start = [data[:, keep - self._start :].copy()], keep
         return stretch
+
+
+SECTION_S = 10.0
+"""Length of a section: some strokes, and an alarm about friction or orders at most half a minute late."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampleSection:
+    """Samples without a gap, (channels, samples); the number of the newest one, and the time of the middle."""
+
+    data: Floats
+    sample: int
+    time_s: float
+
+
+class Sections(SampleBuffer):
+    """Cuts Blocks into sections on the grid of sample numbers; a section with a gap or a bad sample is left out."""
+
+    _stage = Stage("sections", 1)
+    _STATE = ("_start", "_stop")
+
+    def __init__(self, names: tuple[str, ...], rate_hz: float) -> None:
+        super().__init__(names)
+        self._rate_hz, self._size = rate_hz, round(SECTION_S * rate_hz)
+        self._start, self._stop = 0, -1
+
+    def process(self, block: Block) -> list[SampleSection]:
+        """Sections that this Block completes; LivebodeError where a channel is missing."""
+        data = self._rows(block)
+        if block.gap or block.start != self._stop:
+            self._parts, self._start = [], block.start
+        self._parts.append(data)
+        self._stop = block.stop
+        done: list[SampleSection] = []
+        while self._stop >= (end := (self._start // self._size + 1) * self._size):
+            cut = np.concatenate(self._parts, axis=1)
+            part, rest = np.split(cut, [end - self._start], axis=1)
+            if part.shape[1] == self._size and np.isfinite(part).all():
+                done.append(SampleSection(part, end - 1, block.origin_s + (end - self._size / 2) / self._rate_hz))
+            self._parts, self._start = [rest.copy()], end
+        return done

@@ -1,4 +1,4 @@
-"""Sequential detection of changes relative to a Table: which lines, or which parameters."""
+"""Sequential detection of changes relative to a Table: which lines, which parameters, or only the noise."""
 
 from __future__ import annotations
 
@@ -12,15 +12,108 @@ from livebode.core import Event, Stage, StatefulBase
 from livebode.language import Message
 from livebode.monitoring import evidence as word
 from livebode.monitoring.change_date import date_of, rows_of
-from livebode.monitoring.charts import Charts
+from livebode.monitoring.charts import Charts, threshold
 from livebode.monitoring.evidence import PLACE
-from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.monitored_time import INVALID, THE_MACHINE, WEAK, MonitoredTime
-from livebode.monitoring.newest_rows import NewestRows
-from livebode.monitoring.noise_level import NoiseLevel
 from livebode.monitoring.rows import WindowRows
 from livebode.monitoring.table import FRICTION, ORDERS, SECTIONS, ScheduleTable
 from livebode.monitoring.table_sentences import cleared, differs, unknown
+
+_ROWS = 31  # fewer scatter so much that rows get too little variance where the noise has risen
+_MEDIAN = 0.4549364  # of chi square with one degree of freedom
+_BELIEVED = 3.0  # times the excess of the differences over the learned noise
+
+
+class NoiseLevel(StatefulBase):
+    """Limits the rows' own noise estimates by the differences of neighbouring rows.
+
+    A response's sigma is from the scatter of periods. For some periods after a step of the machine it contains the
+    step, so that rows after the step would weigh a hundredth of those before it. A step affects one difference of
+    neighbouring rows; noise affects all. The median over the newest 31 rows and all components of a line shows only
+    the noise. A row's noise beyond the learned one is limited to three times that median.
+
+    Parameters
+    ----------
+    components
+        Columns of a deviation.
+    together
+        Components of one line: 2, or 1 for a parameter.
+    """
+
+    _stage = Stage("noise-level", 1)
+    _STATE = ("_before", "_squares")
+
+    def __init__(self, components: int, together: int) -> None:
+        self._together = together
+        self._before = np.full((2, 1, components), np.nan)
+        self._squares = np.full((_ROWS - 1, components), np.nan)
+
+    def process(self, deviation: Floats, own: Floats, more: Floats) -> Floats:
+        """Variance of rows from their deviation, the learned variance and their own excess, (rows, components)."""
+        if not len(own):
+            return own
+        known = np.where(np.isfinite(own), own, np.nan)
+        both = np.concatenate([self._before, np.stack([np.where(np.isfinite(own), deviation, np.nan), known])], axis=1)
+        square = np.diff(both[0], axis=0) ** 2 / (both[1, 1:] + both[1, :-1])
+        squares = np.concatenate([self._squares, square])
+        self._before, self._squares = both[:, -1:], squares[len(square) :]
+        newest = np.lib.stride_tricks.sliding_window_view(squares, _ROWS, axis=0)
+        level = _median(newest.reshape(len(own), -1, self._together * _ROWS)) / _MEDIAN
+        shown = np.repeat(np.maximum(level - 1.0, 0.0), self._together, axis=1)
+        return np.asarray(own + np.minimum(more, np.nan_to_num(_BELIEVED * shown * known)))
+
+
+def _median(values: Floats) -> Floats:
+    """Median over the last axis of the known values; 0 where none is known."""
+    count = np.isfinite(values).sum(axis=-1, keepdims=True)
+    order = np.sort(values, axis=-1)  # NaN is sorted last
+    middle = [np.take_along_axis(order, np.maximum(count - 1 + i, 0) // 2, axis=-1) for i in (0, 1)]
+    return np.where(count > 0, (middle[0] + middle[1]) / 2, 0.0)[..., 0]
+
+
+_FIRST = 16
+
+
+class NewestRows:
+    """Rows of equal length, of which at most `most` are retained.
+
+    Examples
+    --------
+    >>> rows = NewestRows(columns=1, most=2)
+    >>> for number in range(3):
+    ...     rows.append(np.array([float(number)]))
+    >>> rows.array
+    array([[1.],
+           [2.]])
+    """
+
+    def __init__(self, columns: int, most: int) -> None:
+        self._most = most
+        self._memory, self._begin, self._end = np.empty((_FIRST, columns)), 0, 0
+
+    @property
+    def array(self) -> Floats:
+        """The rows, (rows, columns); valid until the next change."""
+        return self._memory[self._begin : self._end]
+
+    def append(self, row: Floats | tuple[float, ...]) -> None:
+        """Add a row; the oldest one may be dropped."""
+        if self._end == len(self._memory):
+            self.fill(self.array)
+        self._memory[self._end] = row
+        self._end += 1
+        self._begin = max(self._begin, self._end - self._most)
+
+    def fill(self, rows: Floats) -> None:
+        """Replace all rows by these, (rows, columns), with room for some more."""
+        memory = np.empty((len(rows) + max(_FIRST, len(rows) // 4), self._memory.shape[1]))
+        memory[: len(rows)] = rows
+        self._memory, self._begin, self._end = memory, 0, len(rows)
+
+    def clear(self) -> None:
+        """Drop all rows."""
+        self._begin = self._end = 0
+
 
 _LOOK_WINDOWS = 10  # rows between detection and report, so that all changes are visible
 _LOOK_SECTIONS = 2  # the same of friction and orders: the second one is the first that is whole

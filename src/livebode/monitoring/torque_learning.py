@@ -19,7 +19,7 @@ from livebode.monitoring.learned_torque import (
     order_names,
 )
 from livebode.monitoring.order_amplitudes import TorqueNoise, normal_values, powers, together
-from livebode.monitoring.sections import SECTION_S, Sections
+from livebode.monitoring.stretches import SECTION_S, Sections
 from livebode.monitoring.table import FRICTION, ORDERS, STILL, WAYS, WINDOWS_MIN, ScheduleTable
 from livebode.monitoring.torque_model import OrderWindows, StrokeFriction, TorqueModel
 from livebode.motion import OutputKind, Shaft

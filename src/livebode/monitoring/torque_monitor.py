@@ -6,7 +6,7 @@ from typing import Any
 
 from livebode.core import Block, Event, Stage, StatefulBase
 from livebode.monitoring.learned_torque import LearnedTorque
-from livebode.monitoring.sections import SECTION_S, Sections
+from livebode.monitoring.stretches import SECTION_S, Sections
 from livebode.monitoring.table_monitor import TableMonitor
 
 

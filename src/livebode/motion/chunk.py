@@ -1,4 +1,4 @@
-"""The samples of one fit, and their buffer."""
+"""The samples of one fit, their buffer, their windows of steady motion, and the responses that wait for them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Block, Lines, Stage, StatefulBase
+from livebode.core import PER_LINE, PER_RESPONSE, Block, Lines, Responses, Stage, StatefulBase
 from livebode.estimation import PlausibleRange
 from livebode.kernel import SlidingDFT
 
@@ -118,3 +118,57 @@ class RecentSamples(StatefulBase):
         self._parts = [data] if data.size else []
         self.start = int(state["start"])
         self.stop = self.start + data.shape[1]
+
+
+_ARRAYS = PER_LINE + PER_RESPONSE
+
+
+class PendingResponses(StatefulBase):
+    """The Tracker's responses from the newest chunk on."""
+
+    _stage = Stage("waiting-responses", 1)
+
+    def __init__(self, lines: Lines) -> None:
+        self._lines = lines
+        self._parts: list[Responses] = []
+
+    def append(self, responses: Responses) -> None:
+        self._parts.append(responses)
+
+    def take(self, stop: int) -> Responses:
+        """Remove and return those whose newest sample is before `stop`."""
+        whole = Responses.join(self._parts)
+        count = int(np.searchsorted(whole.sample, stop))
+        # Joining copies, so that the removed responses do not remain in memory behind a view.
+        self._parts = [Responses.join([whole[count:]])]
+        return whole[:count]
+
+    def _state(self) -> dict[str, Any]:
+        if not self._parts:
+            return {"unit": None}
+        whole = Responses.join(self._parts)
+        return {name: getattr(whole, name) for name in _ARRAYS} | {"unit": whole.unit}
+
+    def _load(self, state: dict[str, Any]) -> None:
+        arrays = {name: array for name, array in state.items() if name != "unit"}
+        self._parts = [Responses(lines=self._lines, unit=state["unit"], **arrays)] if arrays else []
+
+
+_UNEVEN = 0.1
+_STANDSTILL = 0.5
+FLAT_M = 1e-3  # a chunk with less travel has no curves to fit
+
+
+def steady_rows(sample: NDArray[np.int64], chunk: Chunk, window: int) -> NDArray[np.bool_]:
+    """Rows whose window and the previous one have a constant speed that is near the usual one.
+
+    Elsewhere accelerations excite oscillations, and dry friction may stop the axis. Constant: the travel of the two
+    windows differs by up to 10 % from twice that of one. Near the usual speed: at least half of the farthest travel of
+    the stretch, and more than 1 mm.
+    """
+    x, last = chunk.x, sample - chunk.start
+    known = last >= 2 * window
+    here, middle, there = (x[(last - back).clip(0)] for back in (0, window, 2 * window))
+    travel = np.abs(here - there)
+    even = np.abs(here - 2 * middle + there) <= _UNEVEN * travel
+    return np.asarray(known & even & (travel >= max(_STANDSTILL * np.max(travel, initial=0.0), FLAT_M)))

@@ -12,15 +12,13 @@ from livebode.arrays import Complex, Floats
 from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, Stage, StatefulBase, hand_over, ignore
 from livebode.estimation import NOTHING, Settings, Tracker, contains
 from livebode.motion.checks import check
-from livebode.motion.chunk import Chunk, RecentSamples
-from livebode.motion.drive import drive_of
+from livebode.motion.chunk import Chunk, PendingResponses, RecentSamples
 from livebode.motion.learner import Learner, Replayed, frozen
 from livebode.motion.model import MovingModel
-from livebode.motion.replay import by_excitation
+from livebode.motion.orders import RippleMonitor
+from livebode.motion.replay import by_excitation, drive_of
 from livebode.motion.residual import Scatter, residual
-from livebode.motion.ripple_watch import RippleMonitor
 from livebode.motion.standstill import StandstillDetector, without
-from livebode.motion.waiting import PendingResponses
 
 _LEAD_S = 0.5  # before a chunk, for the model to reach the machine's state; a Q of 10 at 50 Hz decays in 0.06 s
 

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core import Responses, Stage, StatefulBase
 from livebode.estimation import Settings
-from livebode.motion.chunk import Chunk
+from livebode.motion.chunk import FLAT_M, Chunk, steady_rows
 from livebode.motion.fit import MotionFitOptions, WeightedResponses, sampled
 from livebode.motion.model import MovingModel, PositionCurve
 from livebode.motion.residual import Residual
 from livebode.motion.standstill import turns
-from livebode.motion.steady import FLAT_M, steady_rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Simulation of a MovingModel driven as the machine was, along its measured positions."""
+"""Simulation of a MovingModel driven as the machine was, along its measured positions, by the described controllers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import SimulationError
+from livebode.core import PID, Cascade, Loop, SimulationError
 from livebode.kernel import BeltCourse, BeltMasses, belt_replay
 from livebode.motion.model import MovingModel
 from livebode.simulation import BeltAxis, Drive, Engine, Mechanics, Standstill, engine_settings
@@ -108,3 +108,64 @@ def _engine(model: MovingModel, drive: Drive, most: tuple[float, float]) -> dict
     )
     axis = BeltAxis(mechanics=mechanics, drive=drive, motion=Standstill(position_m=_PLACE_M))
     return engine_settings(axis) | {"position_m_min": -_ANYWHERE_M, "position_m_max": _ANYWHERE_M}
+
+
+def drive_of(loop: Loop, rate_hz: float) -> Drive:
+    """The described controllers as parameters of the simulation.
+
+    Raises
+    ------
+    SimulationError
+        If the feedback is not a P or PI velocity controller with backward integrator, alone or under a P position
+        controller (a `Cascade`), if the excitation does not enter at the torque, or rates do not divide.
+    """
+    velocity, position = _controllers(loop)
+    ticks = velocity.rate_divider * (position.rate_divider if position else 1)
+    return Drive(
+        rate_hz=rate_hz,
+        velocity_rate_hz=rate_hz / velocity.rate_divider,
+        position_rate_hz=rate_hz / ticks,
+        velocity_gain_n_m_s=velocity.gain,
+        integral_time_s=min(velocity.integral_time_s, 1e12),
+        position_gain_per_s=position.gain if position else 0.0,
+        velocity_feedforward=0.0,
+        delay_ticks=velocity.delay_ticks,
+    )
+
+
+def _controllers(loop: Loop) -> tuple[PID, PID | None]:
+    given = loop.feedback
+    cascade = given if isinstance(given, Cascade) else None
+    feedback, position = (cascade.velocity, cascade.position) if cascade else (given, None)
+    if not isinstance(feedback, PID) or not (position is None or isinstance(position, PID)):
+        raise SimulationError(
+            "loop-unsupported",
+            f"a loop with a feedback of type {type(given).__name__} cannot be simulated",
+            "describe the feedback as Cascade(velocity=PID(...), position=PID(...)) or a PID on the velocity, or drive "
+            "the model by 'torque'",
+            key="loop.feedback",
+        )
+    if feedback.derivative_time_s or (np.isfinite(feedback.integral_time_s) and feedback.integrator != "backward"):
+        raise SimulationError(
+            "loop-unsupported",
+            "only P and PI velocity controllers with a backward integrator can be simulated",
+            "drive the model by 'torque'",
+            key="loop.feedback",
+        )
+    if position is not None and (
+        position.derivative_time_s or np.isfinite(position.integral_time_s) or position.delay_ticks
+    ):
+        raise SimulationError(
+            "loop-unsupported",
+            "only P position controllers without a delay of their own can be simulated",
+            "drive the model by 'torque'",
+            key="loop.feedback",
+        )
+    if loop.entry is not None:
+        raise SimulationError(
+            "loop-unsupported",
+            "only an excitation that is added to the torque reference can be simulated",
+            "drive the model by 'torque'",
+            key="loop.entry",
+        )
+    return feedback, position

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from livebode.core import ConfigError
 from livebode.publishing import open_sink
-from livebode_connect.sparkplug_payload import BOOLEAN, DOUBLE, STRING, UINT64, Metric, payload
+from livebode_connect.sparkplug import BOOLEAN, DOUBLE, STRING, UINT64, Metric, payload
 from tests.support.errors import refused
 from tests.support.peers.broker import Mosquitto, publisher, stop
 from tests.support.receivers import PublishedAxis, configured, until

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from livebode.core import ConfigError, SourceError
 from livebode.sources.live import SourceSettings, make_source
 from livebode_drives.live.can_bus import FOREIGN_FRAMES
-from livebode_drives.live.can_samples import SETTLED, CanSamples, signals_of
-from livebode_drives.live.frame_clock import FrameClock
+from livebode_drives.live.can_samples import SETTLED, CanSamples, FrameClock, signals_of
 from livebode_drives.recordings.dbc import messages_of
 from tests.support.errors import refused
 from tests.support.peers.can_bus import CanPeer

@@ -16,7 +16,7 @@ import pytest
 from livebode.core import Channel, SourceError
 from livebode.sources.live import LiveSource, SourceSettings, make_source, open_source
 from livebode_drives.live import daq as daq_module
-from livebode_drives.live.daq_signals import BEHIND_MAX, TogetherByNumber, chosen_signals
+from livebode_drives.live.daq import BEHIND_MAX, TogetherByNumber, chosen_signals
 from tests.support.errors import refused
 from tests.support.peers.peer import PATIENCE_S, free_port, until
 

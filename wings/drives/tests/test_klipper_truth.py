@@ -9,8 +9,7 @@ import pytest
 
 from livebode.core import Channel, ConfigError, SourceError
 from livebode.sources.live import SourceSettings, make_source
-from livebode_drives.live.klipper import WAIT_S
-from livebode_drives.live.klipper_moves import MOVES_MAX, Moves
+from livebode_drives.live.klipper import MOVES_MAX, WAIT_S, Moves
 from livebode_drives.live.on_grid import OnGrid
 from tests.support.errors import refused
 from tests.support.peers.klipper import COMMAND, MOVE_S, PERIOD_S, Printer, response

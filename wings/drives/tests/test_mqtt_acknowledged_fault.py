@@ -11,7 +11,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from livebode.records import RunRecord
-from livebode_drives.live.in_flight import ANSWER_S, InFlight
+from livebode_drives.live.mqtt import ANSWER_S, InFlight
 from tests.support.live_session import LiveSession
 from tests.support.peers.broker import Mqtt311Peer, MqttPeer, Nats
 from tests.support.peers.peer import batches, until

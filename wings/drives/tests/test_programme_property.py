@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode_drives.players.programme import Programme
+from livebode_drives.players.hal import Programme
 
 
 @given(

@@ -25,7 +25,7 @@ SCOPE_HEAD = struct.Struct("<QQI")
 """Of a Scope project: offset and length of its XML, number of acquisitions."""
 SCOPE_ENTRY = struct.Struct("<QQI")
 """Offset and length of an acquisition, and its handle."""
-_BAG = "livebode_drives.recordings.bag:parts_of"
+_BAG = "livebode_drives.recordings.ros:parts_of"
 
 
 def is_xml(head: bytes) -> bool:

@@ -20,15 +20,13 @@ from hypothesis import strategies as st
 from livebode.core import Channel, FleetError, SpectraLayout
 from livebode.sources.live import Batch, SpectraBatch
 from livebode_plant.fleet import edge as edge_module
-from livebode_plant.fleet import sole_sender
-from livebode_plant.fleet.edge import Edge, send_edges
+from livebode_plant.fleet.edge import Edge, SoleSender, send_edges
 from livebode_plant.fleet.edge_buffer import EdgeBuffer
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message, write_message
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.fleet.settings import LogSection
-from livebode_plant.fleet.sole_sender import SoleSender
 from livebode_plant.fleet.subjects import LOG, LOG_STREAM
 from tests.support.fleet_runs import CHANNELS, PARTITIONS, RATE_HZ, batch, fleet_axes, log_section
 
@@ -252,7 +250,7 @@ def test_a_full_disk_does_not_matter_while_the_log_is_there_and_holds_up_the_sou
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(edge_module, "HELD_BYTES_MAX", 3000)
-    monkeypatch.setattr(sole_sender, "QUIET_S", 0.1)
+    monkeypatch.setattr(edge_module, "QUIET_S", 0.1)
     server = LogServer(tmp_path / "log", PARTITIONS)
     key = next(iter(fleet_axes(1)))
     buffer = EdgeBuffer(tmp_path / "edge", 1 << 20)
@@ -300,7 +298,7 @@ def test_a_second_sender_of_an_axis_waits_for_the_end_of_the_first_and_both_are_
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """An edge that was copied with its configuration; each has its own buffer, and another epoch."""
-    monkeypatch.setattr(sole_sender, "QUIET_S", 0.5)
+    monkeypatch.setattr(edge_module, "QUIET_S", 0.5)
     key = next(iter(fleet_axes(1)))
 
     async def run(settings: LogSection) -> list[int]:
@@ -336,7 +334,7 @@ def test_a_second_sender_of_an_axis_waits_for_the_end_of_the_first_and_both_are_
 def test_a_sender_continues_where_one_was_killed_and_one_that_was_frozen_stops(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(sole_sender, "QUIET_S", 0.2)
+    monkeypatch.setattr(edge_module, "QUIET_S", 0.2)
     key = next(iter(fleet_axes(1)))
     messages = [write_message(batch(0, first)) for first in range(0, 400, 50)]
 

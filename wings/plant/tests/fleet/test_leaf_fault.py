@@ -19,7 +19,7 @@ from livebode_plant.fleet.edge_buffer import EdgeBuffer
 from livebode_plant.fleet.encrypted_client import EncryptedClient
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import NatsServer, free_port
-from livebode_plant.fleet.server_leaf import leaf_configuration
+from livebode_plant.fleet.server_config import leaf_configuration
 from livebode_plant.fleet.settings import FleetSettings, LogSection
 from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM
 from tests.support.command import livebode

@@ -18,7 +18,7 @@ import pyarrow.compute as pc
 import pytest
 
 from livebode.core import LEVELS
-from livebode_plant.fleet import sink_means, sink_tables
+from livebode_plant.fleet import sink_tables
 from livebode_plant.fleet.log import FleetLog, StoredMessage
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.result_message import ResultMessage
@@ -77,7 +77,7 @@ def numbers_as_times(began_s: float) -> None:
 
     So many periods end during a test, and which ones does not depend on how long it takes.
     """
-    sink_tables._TIERS, sink_means._LATE_S = {"minute": 5, "hour": 10}, 0.1  # type: ignore[attr-defined]
+    sink_tables._TIERS, sink_tables._LATE_S = {"minute": 5, "hour": 10}, 0.1  # type: ignore[attr-defined]
     process = SinkTables.process
 
     def timed(self: SinkTables, messages: list[StoredMessage]) -> list[pa.Table]:

@@ -15,8 +15,8 @@ from livebode import example_responses
 from livebode.core import Responses
 from livebode.fitting import mean_response
 from livebode.records import parameter_table
-from livebode_plant.fleet.sink_means import Closed, MeanTier
 from livebode_plant.fleet.sink_rows import RunKey, RunPart, SinkRows
+from livebode_plant.fleet.sink_tables import Closed, MeanTier
 from livebode_plant.lake.wide_responses import from_wide, to_wide
 
 EVERY_S, PERIOD_S = 14.0, 60

@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode_plant.fleet.stored_states import REPLAY_S_MAX, STATE_S_MIN, STATE_SHARE, StoredStates
+from livebode_plant.fleet.partition import REPLAY_S_MAX, STATE_S_MIN, STATE_SHARE, StoredStates
 
 STEP_S, BLOCK_BYTES = 0.5, 24_000
 

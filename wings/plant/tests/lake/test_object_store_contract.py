@@ -11,14 +11,14 @@ import pyarrow as pa
 import pytest
 
 from livebode.locations import Url, find, write_whole
-from livebode_plant.archive.committing import Committer
+from livebode_plant.archive.coordinator import Committer
 from livebode_plant.archive.job import Job
 from livebode_plant.archive.recordings import find_places, untracked
 from livebode_plant.archive.results import Hashed, Tracked, each_result
 from livebode_plant.archive.settings import ArchiveSettings
 from livebode_plant.archive.tasks import handle
 from livebode_plant.lake import DataFile, Lake
-from livebode_plant.lake.delta import delta_options
+from livebode_plant.lake.table_directory import delta_options
 from tests.support.archives import contents_of, write_archive
 from tests.support.object_storage import BUCKET, object_storage
 

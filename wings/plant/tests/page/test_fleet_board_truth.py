@@ -25,7 +25,7 @@ from livebode_plant.fleet.status_message import (
 from livebode_plant.page.fleet_alarms import CONDITIONS, FleetAct, FleetAlarms
 from livebode_plant.page.fleet_board import LOOKS, LOST_S, FleetBoard
 from livebode_plant.page.fleet_demo import DemoFeed, DemoFleet
-from livebode_plant.page.fleet_frames import tiles_frame
+from livebode_plant.page.fleet_pages import tiles_frame
 from tests.support.fleet_pages import expected_looks
 
 NOW = 1_800_000_000.0

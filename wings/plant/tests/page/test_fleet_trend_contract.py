@@ -21,7 +21,7 @@ from livebode.dashboard import Dashboard, Serving
 from livebode_plant.fleet.status_message import encode_names
 from livebode_plant.lake import TABLES, Lake
 from livebode_plant.page.fleet_demo import DemoFeed, DemoFleet
-from livebode_plant.page.fleet_site import FleetSite
+from livebode_plant.page.fleet_pages import FleetSite
 from livebode_plant.page.fleet_trend import POINTS_MAX
 from livebode_plant.page.fleet_view import FleetView
 from tests.support.axe import violations, with_axe

@@ -1,12 +1,86 @@
-"""BLF, the binary log of Vector: frames read by python-can, after a check of its containers."""
+"""BLF, the binary log of Vector: frames read by python-can, after a check of the objects and their sizes.
+
+python-can decompresses a container of any size at once, keeps an object that never ends in memory, and does not return
+from one of size 0.
+"""
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 from typing import IO, Any, ClassVar
 
-from livebode_drives.recordings.blfcheck import check
+from livebode.sources import damaged, oversized, truncated
 from livebode_drives.recordings.can import VectorRecording, import_can
+
+FILE_HEAD = struct.Struct("<4sL")
+OBJECT_HEAD = struct.Struct("<4sHHLL")
+CONTAINER_HEAD = struct.Struct("<H6xL4x")
+CONTAINER = 10
+CONTAINER_BYTES_MAX = 1 << 26
+OBJECT_BYTES_MAX = 1 << 24
+
+
+def check(file: IO[bytes], size: int) -> None:
+    """RecordingError for a file whose objects contradict their sizes.
+
+    Parameters
+    ----------
+    file
+        The file at its beginning.
+    size
+        Its length in bytes.
+    """
+    _, at = FILE_HEAD.unpack(file.read(FILE_HEAD.size).ljust(FILE_HEAD.size, b"\0"))
+    if not 144 <= at <= size:
+        raise damaged(f"its header declares {at} bytes of {size}", size=at)
+    rest = b""
+    while at < size:
+        file.seek(at)
+        signature, _, _, length, kind = OBJECT_HEAD.unpack(file.read(OBJECT_HEAD.size).ljust(OBJECT_HEAD.size, b"\0"))
+        if signature != b"LOBJ" or length < OBJECT_HEAD.size:
+            raise damaged(f"there is no object at byte {at}", byte=at)
+        if at + length > size:
+            raise truncated(f"the object at byte {at} ends {at + length - size} bytes early", byte=at)
+        if kind == CONTAINER:
+            rest = after_objects(rest + content_of(file, at, length), at)
+        at += length + length % 4
+    if rest.strip(b"\0"):
+        raise truncated(f"its last object ends {len(rest)} bytes after its beginning")
+
+
+def content_of(file: IO[bytes], at: int, length: int) -> bytes:
+    """The bytes of a container at `at`, at most as many as it declares."""
+    if not OBJECT_HEAD.size + CONTAINER_HEAD.size <= length <= CONTAINER_BYTES_MAX:
+        raise oversized(f"the container at byte {at} has {length} bytes", CONTAINER_BYTES_MAX, byte=at)
+    raw = file.read(length - OBJECT_HEAD.size)
+    method, declared = CONTAINER_HEAD.unpack_from(raw)
+    if method != 2:
+        return raw[CONTAINER_HEAD.size :] if method == 0 else b""
+    if declared > CONTAINER_BYTES_MAX:
+        raise oversized(f"the container at byte {at} declares {declared} bytes", CONTAINER_BYTES_MAX, byte=at)
+    content = zlib.decompressobj().decompress(raw[CONTAINER_HEAD.size :], declared + 1)
+    if len(content) != declared:
+        raise damaged(f"the container at byte {at} does not have the {declared} bytes that it declares", byte=at)
+    return content
+
+
+def after_objects(data: bytes, at: int) -> bytes:
+    """The object at the end of the container at byte `at` that continues in the next container, or nothing."""
+    here = 0
+    while True:
+        found = data.find(b"LOBJ", here, here + 8)
+        if found < 0 and here + 8 <= len(data):
+            raise damaged(f"the container at byte {at} has no object at its byte {here}", byte=at)
+        if found < 0 or found + OBJECT_HEAD.size > len(data):
+            return data[here:]
+        _, head, _, length, _ = OBJECT_HEAD.unpack_from(data, found)
+        if not OBJECT_HEAD.size < head <= length <= OBJECT_BYTES_MAX:
+            raise damaged(f"the container at byte {at} has an object of {length} bytes", byte=at, size=length)
+        if found + length > len(data):
+            return data[here:]
+        here = found + length
 
 
 class BlfRecording(VectorRecording):

@@ -1,7 +1,8 @@
-"""The coordinator of an archive: finds what is new, distributes it, and alone commits results to the lake."""
+"""The coordinator of an archive: finds what is new, distributes it, and alone commits results to the lake in groups."""
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
@@ -9,19 +10,21 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+import pyarrow as pa
 from packaging.version import Version
 
 from livebode.version import __version__
 from livebode_plant.archive.alone import handle_alone
-from livebode_plant.archive.committing import Committer
 from livebode_plant.archive.contents import quarantine
 from livebode_plant.archive.grouping import RecordingGroups
 from livebode_plant.archive.job import Job, short
 from livebode_plant.archive.recordings import (
     ArchivedRecording,
     RecordingPlace,
+    file_rows,
     find_places,
     known_contents,
+    levels_of,
     longest_first,
     place_of,
     untracked,
@@ -29,10 +32,73 @@ from livebode_plant.archive.recordings import (
 from livebode_plant.archive.results import Failed, Handled, Hashed, Result, Tracked, each_result, lost
 from livebode_plant.archive.settings import ArchiveSettings
 from livebode_plant.archive.tasks import handle
-from livebode_plant.lake import Lake
+from livebode_plant.lake import QUANTITIES, QUARANTINE, RUNS, DataFile, Lake
 
 if TYPE_CHECKING:
     from livebode_plant.archive.clusters import Cluster
+
+
+_EVERY_S = 2.0
+_RESULTS_MAX = 500
+
+
+@dataclass
+class Committer:
+    """Collects results, and commits them some seconds later together: a commit takes as long as reading a short file.
+
+    Attributes
+    ----------
+    lake
+        Where to.
+    job
+        What the results are of.
+    """
+
+    lake: Lake
+    job: Job
+    _waiting: list[Result] = field(default_factory=list)
+    _committed_s: float = field(default_factory=time.monotonic)
+
+    def take(self, results: Iterable[Result]) -> None:
+        """Take results, and commit if it is time."""
+        self._waiting += results
+        if time.monotonic() - self._committed_s > _EVERY_S or len(self._waiting) >= _RESULTS_MAX:
+            self.commit()
+
+    def commit(self) -> None:
+        """Commit what waits; ArchiveError or LocationError if the lake cannot be written."""
+        hashed = [one for one in self._waiting if isinstance(one, Hashed)]
+        tracked = [one for one in self._waiting if isinstance(one, Tracked)]
+        bad = [one for one in self._waiting if isinstance(one, Failed) and not one.by_storage]
+        if hashed:  # first: what has a result and no known place would be tracked again
+            rows = file_rows([(one.place, one.content) for one in hashed], self.job.common_machine)
+            self.lake.add_rows("files", rows)
+        by_table: dict[str, list[DataFile]] = {}
+        for one in tracked:
+            for file in one.files:
+                by_table.setdefault(file.table, []).append(file)
+        for table, files in by_table.items():
+            self.lake.add_files(table, files)
+        quantities = [row for one in tracked for row in one.quantities]
+        for name, found, schema in (
+            ("quantities", quantities, QUANTITIES),
+            ("runs", [one.run for one in tracked], RUNS),
+            ("quarantine", [self._quarantined(one) for one in bad], QUARANTINE),
+        ):
+            if found:
+                self.lake.add_rows(name, pa.Table.from_pylist(found, schema=schema))
+        self._waiting.clear()
+        self._committed_s = time.monotonic()
+
+    def _quarantined(self, one: Failed) -> dict[str, str | None]:
+        return {
+            "content": one.content,
+            "recipe": one.recipe,
+            "url": str(one.place.url),
+            "code": one.code,
+            "sentence": one.sentence,
+            "livebode": __version__,
+        } | levels_of(one.place, self.job.machine(one.recipe))
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,222 @@
-"""What a worker does with a recording: hash it, then track it, while it is in memory; a failure touches no other."""
+"""Tasks of a worker: a recording is hashed, tracked and written to the lake's directory; a failure touches no other."""
 
 from __future__ import annotations
 
+import json
+import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, suppress
+from datetime import datetime
+from math import isfinite, nan
 from pathlib import Path
+from typing import Any, Self
 
-from livebode.core import ArchiveError
+import numpy as np
+import pyarrow as pa
+
+from livebode.analysis import FittedQuantities
+from livebode.configuration import Axis, open_recording, recorded_configuration
+from livebode.core import ArchiveError, Event, MatrixResponses, Responses, writing
 from livebode.locations import local_copy
-from livebode.records import content_sha256
+from livebode.records import content_sha256, entries_of, lines_in, parameter_rows, to_json
+from livebode.runtime import Destination, Document, FitResults, RecordInOnePiece, run
+from livebode.tables import from_numpy, text
+from livebode.version import __version__
 from livebode_plant.archive.job import Job
-from livebode_plant.archive.recordings import ArchivedRecording
-from livebode_plant.archive.results import Handled, Hashed, Result, failed
-from livebode_plant.archive.tracking import track
-from livebode_plant.lake import Key
+from livebode_plant.archive.recordings import ArchivedRecording, RecordingPlace, levels_of
+from livebode_plant.archive.results import Handled, Hashed, Result, Tracked, failed
+from livebode_plant.lake import DataFile, Key, Lake
+from livebode_plant.lake.data_file import ResultFileWriter
+from livebode_plant.lake.wide_matrices import covariance_to_wide, entries_to_wide
+from livebode_plant.lake.wide_responses import to_wide
+
+_EVENTS = 10_000
+
+
+class LakeRecord(RecordInOnePiece):
+    """Writes responses or matrices of them, parameters and events to files of the lake's layout as they come.
+
+    Parameters
+    ----------
+    path
+        An existing directory for the files: PATH/TABLE/NAME.
+    key
+        The result.
+
+    Attributes
+    ----------
+    files
+        The files with rows, when the run is finished.
+    fitted
+        The valid fits.
+    summary
+        The run as in run.json.
+    """
+
+    def __init__(self, path: Path, key: Key) -> None:
+        self.path, self._key = path, key
+        self.files: tuple[DataFile, ...] = ()
+        self.fitted = FittedQuantities()
+        self.summary: dict[str, Any] = {}
+        self._events: list[Event] = []
+        self._open = ExitStack()
+        self._writers: dict[str, ResultFileWriter] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        with suppress(*((OSError, pa.ArrowException) if error else ())):  # on a full disk, closing fails as well
+            self._open.close()
+
+    def take(self, document: Document) -> None:
+        with writing(self.path):
+            match document:
+                case Responses():
+                    self._write("responses", to_wide(document))
+                case MatrixResponses():
+                    self._write("responses", entries_to_wide(document))
+                    self._write("covariance", covariance_to_wide(document))
+                case FitResults(parts):
+                    for part in parts:
+                        rows = parameter_rows(part)
+                        self._write("parameters", pa.table(rows))
+                        self.fitted.add(rows)
+                case Event():
+                    self._events.append(document)
+                    if len(self._events) == _EVENTS:
+                        self._write_events()
+
+    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:  # noqa: ARG002 - no pictures
+        self.summary = summary
+        with writing(self.path):
+            self._write_events()
+            written = [writer.finish() for writer in self._writers.values()]
+        self.files = tuple(file for file in written if file.rows)
+
+    def _write(self, table: str, rows: pa.Table) -> None:
+        if table not in self._writers:
+            (self.path / table).mkdir()
+            self._writers[table] = self._open.enter_context(ResultFileWriter(self.path / table, table, self._key))
+        self._writers[table].write(rows)
+
+    def _write_events(self) -> None:
+        events, self._events = self._events, []
+        if events:
+            self._write("events", _rows_of(events))
+
+
+def _rows_of(events: list[Event]) -> pa.Table:
+    times = [event.time_s if isfinite(event.time_s) else nan for event in events]
+    columns = {
+        "kind": _text([event.kind for event in events]),
+        "sample": from_numpy(np.array([event.sample for event in events], dtype=np.int64)),
+        "time_s": from_numpy(np.array(times, dtype=np.float64)),
+        "message": _text([event.message for event in events]),
+        "details": _text([_details(event) for event in events]),
+    }
+    return pa.table(list(columns.values()), names=list(columns))
+
+
+def _details(event: Event) -> str:
+    return json.dumps(json.loads(to_json(event.details)), sort_keys=True, ensure_ascii=False)
+
+
+def _text(words: list[str]) -> pa.Array[Any]:
+    return text(words, np.arange(len(words)))
+
+
+def track(job: Job, place: RecordingPlace, path: Path, key: Key, scratch: Path | None = None) -> Tracked:
+    """Track a recording by a recipe, and put the files of its result in the lake's directory.
+
+    Raises
+    ------
+    LivebodeError
+        If the recording cannot be tracked by this recipe, or the lake not written.
+    """
+    levels = levels_of(place, job.machine(key.recipe))
+    axis = job.axis_for(key.recipe, path, levels)
+    with tempfile.TemporaryDirectory(prefix="livebode-", dir=scratch) as folder:
+        record = LakeRecord(Path(folder), key)
+        run(axis, Destination(Path(folder), _no_pictures, record=record))
+        lake = Lake(job.lake)
+        for file in record.files:
+            lake.store(Path(folder) / file.table / file.name, file.table)
+    common = key._asdict() | levels
+    return Tracked(record.files, common | _about(record, place), tuple(_quantities(axis, record, common)))
+
+
+def _no_pictures(*_: object) -> None:
+    """An archive draws when somebody looks."""
+
+
+def _about(record: LakeRecord, place: RecordingPlace) -> dict[str, Any]:
+    """Row of the table `runs`, without what all tables have; an output-only run has no response and no lines.
+
+    Of a matrix run, `responses` counts its matrices.
+    """
+    found, recorded = record.summary["found"], record.summary.get("recorded") or {}
+    monitoring = record.summary.get("monitoring", {})
+    rows = {file.table: file.rows for file in record.files}
+    lines = lines_in(found) if "bins" in found else None
+    if entries := entries_of(record.summary):
+        rows["responses"] //= len(entries)  # of a matrix there is a row for each entry
+    return {
+        "url": str(place.url),
+        "recorded_from": _moment(recorded.get("from")),
+        "recorded_to": _moment(recorded.get("to")),
+        "clock": recorded.get("clock", "unknown"),
+        "duration_s": record.summary["counts"]["samples"] / found["rate_hz"],
+        "rate_hz": float(found["rate_hz"]),
+        "window": found["window"],
+        "quantity": found.get("quantity"),
+        "unit": found.get("unit"),
+        "frequencies_hz": [] if lines is None else lines.frequency_hz.tolist(),
+        "quiet_bins": [] if lines is None else list(lines.quiet),
+        "livebode": __version__,
+        "alarms": monitoring.get("changes", 0),
+        "baseline": monitoring.get("baseline_id"),
+        "summary": json.dumps(_summary(record), sort_keys=True, ensure_ascii=False),
+    } | {name: rows.get(name, 0) for name in ("responses", "parameters", "events")}
+
+
+def _summary(record: LakeRecord) -> dict[str, Any]:
+    """What `LakeRun` needs of run.json: nothing in it depends on where and when the recording was tracked."""
+    summary = json.loads(to_json(record.summary))
+    configuration = recorded_configuration(summary)
+    del configuration["source"]["log"]
+    configuration.pop("machine", None)
+    for file in ("baseline", "gantry"):
+        configuration.get("monitoring", {}).pop(file, None)
+    more = {name: summary[name] for name in ("left_out_samples", "matrix") if name in summary}
+    return {"configuration": configuration, "found": summary["found"]} | more
+
+
+def _quantities(axis: Axis, record: LakeRecord, common: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Rows of the table `quantities`."""
+    recorded_from = _moment((record.summary.get("recorded") or {}).get("from"))
+    points = sorted(record.fitted.points(record.summary), key=lambda point: (point.model, point.name))
+    covariates = sorted(_means(axis).items()) if points else []
+    for point in points:
+        yield common | vars(point) | {"recorded_from": recorded_from, "covariates": covariates}
+
+
+def _means(axis: Axis) -> dict[str, float]:
+    """Mean of each covariate over the recording; one without a finite sample is left out."""
+    names = axis.monitoring.covariates
+    if not names:
+        return {}
+    total, count = np.zeros(len(names)), np.zeros(len(names))
+    for block in open_recording(axis).naming(names).blocks(names):
+        finite = np.isfinite(block.data)
+        total += np.where(finite, block.data, 0.0).sum(axis=1)
+        count += finite.sum(axis=1)
+    return {name: float(of / n) for name, of, n in zip(names, total, count) if n and isfinite(of)}
+
+
+def _moment(text: str | None) -> datetime | None:
+    return None if text is None else datetime.fromisoformat(text)
 
 
 def handle(job: Job, recordings: Sequence[ArchivedRecording], scratch: Path | None = None) -> list[Handled]:

@@ -32,10 +32,9 @@ from livebode.locations import (
 )
 from livebode.records import VerifiedFiles
 from livebode_plant.lake.data_file import DataFile, Key, file_bytes
-from livebode_plant.lake.delta import delta_options
 from livebode_plant.lake.schemas import TABLES
 from livebode_plant.lake.snapshot import DamagedTableError, Snapshot
-from livebode_plant.lake.table_directory import check_directory, check_names, remove_data
+from livebode_plant.lake.table_directory import check_directory, check_names, delta_options, remove_data
 
 Row = tuple[Any, ...]
 FOLDER = "tables"

@@ -1,21 +1,183 @@
-"""The page of a fleet and its requests."""
+"""The page of a fleet and its requests; a browser gets frames of the looks of all axes, or of those that changed.
+
+| byte | type | content of a frame |
+|---|---|---|
+| 0 | 4 bytes | `LBFT` |
+| 4 | u8 | version, 1 |
+| 5 | u8 | kind: 0 all, 1 changes |
+| 8 | u32 | layout: the numbers of the axes belong to it |
+| 12 | u32 | number of axes, or of changes |
+| 16 | | all: a byte for two axes, the first in its low 4 bits; changes: u32 each, axis in the low 28 bits, look above |
+
+Numbers are little endian.
+"""
 
 from __future__ import annotations
 
 import gzip
+import struct
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
+import numpy as np
 from starlette.requests import Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from livebode.core import ServerError
-from livebode.dashboard import Act, Board, Order, Role, alarm_request, error_answer, serve_browser
+from livebode.dashboard import (
+    Act,
+    Board,
+    BrowserSocket,
+    Order,
+    Role,
+    alarm_request,
+    error_answer,
+    json_object,
+    serve_browser,
+)
 from livebode.language import Message
 from livebode.records import to_json
-from livebode_plant.page.fleet_client import FleetClient
 from livebode_plant.page.fleet_view import FleetView
+
+if TYPE_CHECKING:
+    from starlette.responses import Response
+    from starlette.routing import BaseRoute
+
+    from livebode.dashboard import Board
+
+
+_HEADER = struct.Struct("<4sBBxxII")
+_MAGIC, _VERSION, _ALL, _CHANGES = b"LBFT", 1, 0, 1
+_AXIS_BITS = 28
+
+
+def tiles_frame(layout: int, looks: np.ndarray[Any, Any], before: np.ndarray[Any, Any] | None) -> bytes:
+    """What a page that shows `before` needs to show `looks`, in the shorter form; nothing if they are equal.
+
+    >>> before = np.zeros(100_000, np.uint8)
+    >>> after = before.copy()
+    >>> after[70_000] = 3
+    >>> len(tiles_frame(1, after, None)), len(tiles_frame(1, after, before)), len(tiles_frame(1, after, after))
+    (50016, 20, 0)
+    """
+    if before is not None and len(before) == len(looks):
+        changed = np.flatnonzero(looks != before)
+        if not len(changed):
+            return b""
+        if 8 * len(changed) < len(looks):
+            words = changed.astype("<u4") | (looks[changed].astype("<u4") << _AXIS_BITS)
+            return _HEADER.pack(_MAGIC, _VERSION, _CHANGES, layout, len(changed)) + bytes(words.astype("<u4").tobytes())
+    even = np.zeros(len(looks) + len(looks) % 2, np.uint8)
+    even[: len(looks)] = looks
+    pairs = even[::2] | (even[1::2] << 4)
+    return _HEADER.pack(_MAGIC, _VERSION, _ALL, layout, len(looks)) + bytes(pairs.tobytes())
+
+
+ListName = Literal["worst", "alarms", "workers", "gaps"]
+LISTS_EVERY_S = 0.5
+
+
+@dataclass(frozen=True)
+class Watched:
+    """Which list a page shows, and the number of its chosen axis; None without one."""
+
+    list: ListName = "worst"
+    axis: int | None = None
+
+
+def watched(text: str) -> Watched:
+    """Parse a message of the page; ServerError if it is invalid.
+
+    >>> watched('{"list": "alarms", "axis": 7}')
+    Watched(list='alarms', axis=7)
+    """
+    message = json_object(text, "message")
+    name, axis = message.get("list"), message.get("axis")
+    if name not in get_args(ListName) or not (axis is None or (type(axis) is int and 0 <= axis < 1 << 28)):
+        raise ServerError(
+            "request-malformed", "the message does not name a list and an axis", Message("reload the page")
+        )
+    return Watched(cast(ListName, name), axis)
+
+
+class FleetClient(BrowserSocket):
+    """Sends changes of the tiles some times a second, and lists twice a second."""
+
+    def __init__(self, view: FleetView, socket: WebSocket, role: Role) -> None:
+        super().__init__(socket)
+        self._view, self._role = view, role
+        self._watched = Watched()
+        self._layout: int | None = None
+        self._looks: np.ndarray[Any, Any] | None = None
+        self._sent: dict[str, Any] = {}
+        self._due_s = 0.0
+
+    async def run(self) -> None:
+        """Serve until the browser disconnects or exceeds a limit."""
+        self._view.browsers += 1
+        try:
+            await super().run()
+        finally:
+            self._view.browsers -= 1
+
+    async def heed(self, text: str) -> None:
+        """Show another list or axis."""
+        self._watched, self._due_s = watched(text), 0.0
+
+    async def send_news(self) -> None:
+        """Send changes until it is cancelled."""
+        while True:
+            await self._send_tiles()
+            if time.monotonic() >= self._due_s:
+                self._due_s = time.monotonic() + LISTS_EVERY_S
+                await self._send_lists()
+            await self._view.pulse.wait_next()
+
+    async def _send_tiles(self) -> None:
+        board = self._view.board
+        if board.layout != self._layout:
+            self._layout, self._looks = board.layout, None
+            await self.send({"fleet": self._facts()})
+        looks = board.looks
+        if data := tiles_frame(board.layout, looks, self._looks):
+            await self.send_bytes(data)
+        self._looks = looks
+
+    async def _send_lists(self) -> None:
+        board, now_s = self._view.board, time.time()
+        name = self._watched.list
+        found: dict[str, Any] = {"trouble": self._view.feed.trouble, "layout": board.layout}
+        found["open"] = board.open_count
+        if name == "worst":
+            found["worst"] = board.worst()
+        elif name == "alarms":
+            found["alarms"] = board.open_alarms(now_s)
+        elif name == "gaps":
+            found["gaps"] = board.gaps()
+        else:
+            found["workers"] = board.workers(now_s)
+        if self._watched.axis is not None:
+            found["axis"] = board.axis(self._watched.axis, now_s)
+        news = {key: value for key, value in found.items() if self._sent.get(key) != value or key == "layout"}
+        self._sent |= news
+        if len(news) > 1:
+            await self.send(news)
+
+    def _facts(self) -> dict[str, Any]:
+        view = self._view
+        return {
+            "name": view.feed.name,
+            "role": self._role if view.feed.may_act else "viewer",
+            "layout": view.board.layout,
+            "axes": len(view.board.axes),
+            "plan": view.plan is not None,
+            "trends": view.trends,
+        }
 
 
 class FleetPages:
@@ -114,3 +276,25 @@ class FleetPages:
 
 def _unknown() -> Response:
     return JSONResponse(error_answer(Message("log in first")), 401)
+
+
+@dataclass(frozen=True)
+class FleetSite:
+    """A fleet for `Dashboard.show`; it can be made without the packages of the dashboard."""
+
+    view: FleetView
+
+    @property
+    def static(self) -> Path:
+        """Directory of the files of the page."""
+        return Path(__file__).parent / "static"
+
+    def routes(self, board: Board, file: Callable[[str], Response], order: Order) -> list[BaseRoute]:
+        """The routes of the page."""
+        from livebode_plant.page.fleet_pages import FleetPages
+
+        return FleetPages(self.view, board, file, order).routes
+
+    async def run(self) -> None:
+        """Follow the fleet until it is cancelled."""
+        await self.view.run()

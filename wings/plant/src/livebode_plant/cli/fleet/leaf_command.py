@@ -21,7 +21,7 @@ def leaf_command(
     It has public keys and paths, no secrets.
     """
     from livebode.records import to_json
-    from livebode_plant.fleet.server_leaf import leaf_configuration
+    from livebode_plant.fleet.server_config import leaf_configuration
     from livebode_plant.fleet.settings import FleetSettings
 
     text = leaf_configuration(FleetSettings.read(fleet), host=host, port=port)

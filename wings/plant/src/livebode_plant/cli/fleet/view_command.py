@@ -50,7 +50,7 @@ def view_command(
     if trends and not trends.startswith(("https://", "http://", "/")):
         raise UsageError("unreadable", f"{trends!r} is not an address", "begin it with https://", argument="trends")
     dashboard = dashboard_of(ServeSection() if axis is None else read_serve_section(axis), port)
-    from livebode_plant.page.fleet_site import FleetSite
+    from livebode_plant.page.fleet_pages import FleetSite
     from livebode_plant.page.fleet_view import FleetView
     from livebode_plant.page.floor_plan import floor_plan
 
