@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode import preparation
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
 from livebode.core import Block, Channel, Event, LivebodeError, Responses, Stateful
 from livebode.estimation import Follower, Settings, plant_kinds, response_unit
-from livebode.preparation import check_excitation, check_some_valid, live_follower
+from livebode.preparation import check_excitation, check_some_valid
 from livebode.records import RESPONSE_TABLES
 from livebode.runtime import summary
 from livebode.runtime.change_detection import ChangeDetection, change_detection
@@ -87,7 +88,7 @@ class SingleResponse(Estimate):
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> Self:
         """For a live source, whose channels and rate are known; LivebodeError if they do not fit."""
-        follower = live_follower(axis, source.rate_hz, source.spectra)
+        follower = preparation.live_follower(axis, source.rate_hz, source.spectra)
         estimate = cls.of(axis, follower, source.channels, samples=source.spectra is None)
         check_channels(estimate.channels, source)
         return estimate
