@@ -20,7 +20,7 @@ from livebode.estimation import Settings, Tracker, plant_kinds
 from livebode.excitation import multisine
 from livebode.mimo import MatrixExcitation
 from livebode.monitoring import Baseline, Monitor
-from livebode.runtime import ChangeDetection, Destination, Fits, RunLoop, SingleResponse
+from livebode.runtime import ChangeDetection, Destination, Feed, Fits, RunLoop, SingleResponse
 from livebode.runtime._demo import RATE_HZ, demo_axis, described_loop
 from livebode.simulation import BeltAxis, GantryLoop, Sensor, SimulatedAxis, Standstill, TwoMassLoop
 
@@ -132,7 +132,7 @@ class Tracked:
         configuration = {"loop": loop.model_dump(mode="json")} | ({"fit": fit.model_dump()} if enough else {})
         about = {"configuration": configuration, "found": {"clock": "relative"}}
         destination = Destination(to, lambda *_: None, subscribers=() if hub is None else (hub,))
-        run = RunLoop(held, pipeline, destination, about=about, block_samples=BLOCK)
+        run = RunLoop(Feed(held, block_samples=BLOCK), pipeline, destination, about=about)
         self._held = held
         self._thread = threading.Thread(target=run.run)
 

@@ -12,8 +12,8 @@ from livebode.configuration import Axis, RecordSection
 from livebode.estimation import Follower
 from livebode.records import RUN, RunRecord
 from livebode.records.summary_file import to_document
-from livebode.runtime import ChangeDetection, Destination, Fits, Outcome, RunLoop, SingleResponse, Subscriber, run
-from livebode.runtime.estimate import Source
+from livebode.runtime import ChangeDetection, Destination, Feed, Fits, Outcome, RunLoop, SingleResponse, Subscriber, run
+from livebode.runtime.feed import Source
 from tests.support.command import write_parquet
 from tools.parquet_parts import parts_of
 
@@ -49,4 +49,4 @@ def record(
     to = Destination(directory, lambda *_: None, subscribers=tuple(subscribers))
     estimate = SingleResponse(follower, fits, detection)
     about = {"configuration": {}} if about is None else dict(about)
-    return RunLoop(source, estimate, to, about=about, segments=segments, again=again).run()
+    return RunLoop(Feed(source, again=again), estimate, to, about=about, segments=segments).run()

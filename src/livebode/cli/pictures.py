@@ -15,12 +15,12 @@ from livebode.cli.picture_support import can_draw, tell_how_to_draw
 from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.configuration import Axis
 from livebode.core import RunClock, counted, moment, moments_by
-from livebode.fitting import CommonPoles, Fit
 from livebode.locations import original
-from livebode.runtime import Draw, Outcome
+from livebode.runtime import Outcome
 
 if TYPE_CHECKING:
-    from livebode.runtime import SingleResponse
+    from livebode.fitting import CommonPoles, Fit
+    from livebode.runtime import Draw, SingleResponse
 
 _ALARMS_SHOWN = 8
 _ONE_AT_A_TIME = threading.Lock()

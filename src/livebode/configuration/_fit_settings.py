@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from livebode import fitting
 from livebode.configuration.fit_section import FitSection
 from livebode.core import ConfigError, PlantKinds
-from livebode.fitting import POLE_MODELS, Fitter, PhysicalModel, model_named
 
 
-def fitter_of(section: FitSection, kinds: PlantKinds) -> Fitter:
+def fitter_of(section: FitSection, kinds: PlantKinds) -> fitting.Fitter:
     """The section's Fitter for the response of a plant of these kinds; ConfigError as in `chosen_model`."""
-    return Fitter(chosen_model(section, kinds), **fit_settings(section))
+    return fitting.Fitter(chosen_model(section, kinds), **fit_settings(section))
 
 
 def check_fit(section: FitSection) -> None:
@@ -20,7 +20,7 @@ def check_fit(section: FitSection) -> None:
         fitter_of(section, PlantKinds())
 
 
-def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
+def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalModel:
     """The section's model; "auto" is two masses if the input is a torque, else two masses with an unknown gain.
 
     With a torque that is not in N m, or an output in rpm or degrees, the gain is unknown too: the parameters of all
@@ -33,7 +33,7 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
         nor a position; or if it specifies a model in SI units and a unit is not one.
     """
     name = section.model
-    if name in POLE_MODELS:
+    if name in fitting.POLE_MODELS:
         raise ConfigError(
             "value-invalid",
             f"fit.model = {name!r} is fitted to finished runs only, not to every response",
@@ -60,7 +60,7 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> PhysicalModel:
     # The gain model is of the motor's side only: naming it is no conflict.
     side = None if name == "two-mass-gain" and section.side == "motor" else section.side
     options = {"side": side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
-    return model_named(name, output=output, **options)
+    return fitting.model_named(name, output=output, **options)
 
 
 def _output_of(kinds: PlantKinds) -> Literal["velocity", "position"]:

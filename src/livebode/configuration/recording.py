@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from livebode import sources
 from livebode.configuration.axis import Axis
-from livebode.core import LivebodeError, RecordingError
-from livebode.locations import local_copy
-from livebode.sources import UNEVEN, Log, UnevenLog, open_log, open_uneven
+from livebode.sources import Log, open_log
 
 _NAMES = {
     "signals": ("outputs", "inputs", "excitations", "schedule", "ready"),
@@ -23,24 +22,15 @@ def open_recording(axis: Axis) -> Log:
     return open_log(path, **_reading(axis), channels=axis.signals.listed("output"))
 
 
-def open_even_or_uneven(axis: Axis) -> Log | UnevenLog:
-    """The same; an UnevenLog if the clock of the output jitters, or if the other channels have other clocks."""
+def open_even_or_uneven(axis: Axis) -> Log:
+    """The same; a Log that is not `even` if the clock of the output jitters, or other channels have other clocks."""
     source, signals = axis.source, axis.signals
     (path,) = source.logs
     named = [signals.excitation, signals.input, signals.output, signals.schedule, *axis.monitoring.covariates]
     if axis.tracking.estimator == "direct":
         named = [signals.input, *named]
     names = list(dict.fromkeys(name for name in named if name))
-    with local_copy(path):
-        try:
-            log = open_recording(axis)
-            for name in names:
-                _check_clock(log, name)
-            return log
-        except RecordingError as error:
-            if error.code not in UNEVEN or source.time == "none":
-                raise
-        return open_uneven(path, names, **_reading(axis))
+    return sources.open_even_or_uneven(path, names, signals.listed("output"), **_reading(axis))
 
 
 def with_shared_names(axis: Axis, log: Log) -> Axis:
@@ -67,12 +57,3 @@ def _reading(axis: Axis) -> dict[str, Any]:
         "clock": source.clock,
         "dbc": source.dbc,
     }
-
-
-def _check_clock(log: Log, name: str) -> None:
-    """RecordingError if the channel has another clock; other errors are left to the reading."""
-    try:
-        log.naming([name])
-    except LivebodeError as error:
-        if error.code in UNEVEN:
-            raise

@@ -22,6 +22,7 @@ from livebode.estimation.ripple import RippleOrder as RippleOrder
 from livebode.estimation.ripple import RippleSpeed as RippleSpeed
 from livebode.estimation.ripple import ripple_power as ripple_power
 from livebode.estimation.settings import DETECTION_LINES_MIN as DETECTION_LINES_MIN
+from livebode.estimation.settings import WINDOWS as WINDOWS
 from livebode.estimation.settings import Settings as Settings
 from livebode.estimation.settings import default_hop as default_hop
 from livebode.estimation.settings import nearest_hop as nearest_hop
@@ -43,4 +44,3 @@ from livebode.estimation.uneven import UnevenSpectra as UnevenSpectra
 from livebode.estimation.uneven import UnevenTracker as UnevenTracker
 from livebode.estimation.uneven import UnevenWindow as UnevenWindow
 from livebode.estimation.watch import InputStatistics as InputStatistics
-from livebode.estimation.welch_average import WINDOWS as WINDOWS

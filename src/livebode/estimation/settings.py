@@ -10,8 +10,9 @@ from typing import Literal
 from livebode.core import Lines, Loop, Quantity, UsageError
 from livebode.estimation.estimators import DIRECT, ESTIMATORS, JOINT, NON_PERIODIC, Estimator, Role
 from livebode.estimation.ripple import RippleOrder
-from livebode.estimation.welch_average import WINDOWS
 
+WINDOWS = 8
+"""Windows of Welch's method in the samples of one response."""
 DETECTION_LINES_MIN = 4
 """Smallest number of detection lines for an estimate of the noise."""
 

@@ -7,9 +7,7 @@ import numpy as np
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, Stage, StatefulBase
 from livebode.estimation.quotient import Quotient, triangular
-
-WINDOWS = 8
-"""Windows in the samples of one response."""
+from livebode.estimation.settings import WINDOWS
 
 
 class WelchAverage(StatefulBase):

@@ -17,12 +17,12 @@ from livebode.preparation.contents import ChannelSummary as ChannelSummary
 from livebode.preparation.contents import contents_of as contents_of
 from livebode.preparation.inspection import Inspection as Inspection
 from livebode.preparation.inspection import inspect as inspect
+from livebode.preparation.live_plan import LIVE_RESPONSES_PER_S as LIVE_RESPONSES_PER_S
+from livebode.preparation.live_plan import live_follower as live_follower
 from livebode.preparation.part import chosen_part as chosen_part
 from livebode.preparation.part import configured_part as configured_part
 from livebode.preparation.part import motion_part as motion_part
-from livebode.preparation.plan import LIVE_RESPONSES_PER_S as LIVE_RESPONSES_PER_S
 from livebode.preparation.plan import beginnings as beginnings
-from livebode.preparation.plan import live_follower as live_follower
 from livebode.preparation.plan import make_follower as make_follower
 from livebode.preparation.plan import make_settings as make_settings
 from livebode.preparation.plan import roles_in_doubt as roles_in_doubt

@@ -13,9 +13,10 @@ from livebode.excitation import Excitation, pattern, recognise
 from livebode.locations import Location
 from livebode.preparation._uneven_grid import measured_grid
 from livebode.preparation.contents import Contents, read_contents
+from livebode.preparation.live_plan import LIVE_RESPONSES_PER_S
 from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.part import chosen_part
-from livebode.preparation.plan import LIVE_RESPONSES_PER_S, SEARCHED, beginning
+from livebode.preparation.plan import SEARCHED, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
 from livebode.preparation.stretches import Stretch, stretches
 from livebode.preparation.uneven_plan import clock_facts

@@ -1,4 +1,4 @@
-"""Window and lines for an excitation that does not repeat, where they are not specified."""
+"""Settings for an excitation that does not repeat, with window and lines where they are not specified."""
 
 from __future__ import annotations
 
@@ -7,12 +7,50 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Lines, SignalError
-from livebode.estimation import WINDOW_MIN, LocalPolynomial, separable
+from livebode.configuration import Axis
+from livebode.core import ConfigError, Lines, SignalError
+from livebode.estimation import WINDOW_MIN, WINDOWS, LocalPolynomial, Settings, separable
+from livebode.preparation.checks import check_length
+from livebode.preparation.plan import SEARCHED, joined, settings_of
+from livebode.sources import Log
 
 LINES_MAX = 1000
 """Lines that are chosen at most, at equal ratios."""
 _POWER = 1e-3  # of the excitation's power, in the weakest bins, is left out
+
+
+def nonperiodic_settings(axis: Axis, log: Log) -> Settings:
+    """Settings of the tracker for this recording; lines need not be on its grid.
+
+    With window "auto", one response from the longest stretch without gap.
+    """
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    windows = WINDOWS if axis.tracking.estimator == "welch" else 1
+    hop = None
+    if window != "auto":
+        check_length(log.samples, windows * window)
+    if frequencies != "auto" and window != "auto":
+        return settings_of(axis, log.rate_hz, Lines.parse(frequencies, log.rate_hz, window, rounded=True))
+    signals = axis.signals
+    reference = signals.input if signals.excitation is None else signals.excitation
+    if reference is None:
+        raise ConfigError(
+            "auto-needs-recording",
+            "lines or window are 'auto', but signals.excitation and signals.input are missing",
+            "name the channel of the excitation, or in an open loop of the input",
+            key="signals.excitation",
+        )
+    names = list(dict.fromkeys(name for name in (reference, signals.input, signals.output) if name))
+    samples, seams = joined(log, names, SEARCHED)
+    stretch = whole_stretch(samples, windows * (WINDOW_MIN if window == "auto" else window), seams)
+    if window == "auto":
+        window = (stretch.stop - stretch.start) // windows
+        hop = axis.tracking.hop or windows * window
+    if frequencies != "auto":
+        lines = Lines.parse(frequencies, log.rate_hz, window, rounded=True)
+    else:
+        lines = excited_lines(samples[0, stretch], window, log.rate_hz, hann=windows > 1)
+    return settings_of(axis, log.rate_hz, lines, hop)
 
 
 def whole_stretch(signals: NDArray[np.float64], samples_min: int, seams: Sequence[int] = ()) -> slice:

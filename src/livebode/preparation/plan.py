@@ -7,28 +7,15 @@ from typing import Protocol
 
 import numpy as np
 
+from livebode import estimation
 from livebode.configuration import Axis
-from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines, SpectraLayout
-from livebode.estimation import (
-    WINDOW_MIN,
-    WINDOWS,
-    Follower,
-    NonPeriodicTracker,
-    RippleOrder,
-    Settings,
-    SpectraTracker,
-    Tracker,
-    nearest_hop,
-)
+from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines
+from livebode.estimation import Follower, RippleOrder, Settings, Tracker
 from livebode.preparation.checks import check_length
-from livebode.preparation.nonperiodic import excited_lines, whole_stretch
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
-from livebode.preparation.spectra_plan import check_spectra
 from livebode.preparation.window_check import WINDOWS_COMPARED, divided_window, window_doubt
 from livebode.sources import Log
 
-LIVE_RESPONSES_PER_S = 20.0
-"""Default for a live source: sufficient for display, with a tenth of the work of a hop of a twentieth of the window."""
 SEARCHED = 1 << 22
 """Samples that "auto" and `inspect` use: half an hour at 2 kHz, and 100 MB of work."""
 _ROLES_SAMPLES, _ROLES_WINDOWS = 1 << 17, 32  # to judge the roles, whichever is longer
@@ -45,28 +32,11 @@ class RecordedSource(Protocol):
 
 def make_follower(axis: Axis, log: Log) -> Follower:
     """A Tracker for this recording, or with [motion] a MotionCorrection; LivebodeError if they do not fit."""
-    return _follower(axis, make_settings(axis, log))
+    return follower_of(axis, make_settings(axis, log))
 
 
-def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = None) -> Follower:
-    """The same for a live source: samples, whose lines and window must be given, or spectra of a layout."""
-    if layout is not None:
-        lines = check_spectra(axis, layout, rate_hz)
-        return SpectraTracker(settings_of(axis, rate_hz, lines, layout.hop), layout)
-    frequencies, window = axis.lines.frequencies, axis.lines.window
-    if frequencies == "auto" or window == "auto":
-        raise ConfigError(
-            "auto-needs-recording",
-            "lines or window are 'auto', which needs a recording",
-            "set lines.frequencies and lines.window for a live source",
-            key="lines",
-        )
-    lines = Lines.parse(frequencies, rate_hz, window, rounded=not axis.tracking.periodic)
-    hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
-    return _follower(axis, settings_of(axis, rate_hz, lines, hop))
-
-
-def _follower(axis: Axis, settings: Settings) -> Follower:
+def follower_of(axis: Axis, settings: Settings) -> Follower:
+    """The follower with these settings; ConfigError if the axis has a [motion] that they do not permit."""
     if not settings.periodic:
         if axis.motion is not None:
             raise ConfigError(
@@ -75,7 +45,7 @@ def _follower(axis: Axis, settings: Settings) -> Follower:
                 "remove [motion], or choose another estimator",
                 key="motion",
             )
-        return NonPeriodicTracker(settings)
+        return estimation.NonPeriodicTracker(settings)
     if axis.motion is None:
         return Tracker(settings)
     # The simulation, which its model needs, is slow to import.
@@ -100,39 +70,10 @@ def _follower(axis: Axis, settings: Settings) -> Follower:
 def make_settings(axis: Axis, log: Log) -> Settings:
     """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
     if not axis.tracking.periodic:
-        return _nonperiodic_settings(axis, log)
+        from livebode.preparation.nonperiodic import nonperiodic_settings  # loads the method of local polynomials
+
+        return nonperiodic_settings(axis, log)
     return settings_of(axis, log.rate_hz, make_lines(axis, log))
-
-
-def _nonperiodic_settings(axis: Axis, log: Log) -> Settings:
-    """With window "auto", one response from the longest stretch without gap; lines need not be on its grid."""
-    frequencies, window = axis.lines.frequencies, axis.lines.window
-    windows = WINDOWS if axis.tracking.estimator == "welch" else 1
-    hop = None
-    if window != "auto":
-        check_length(log.samples, windows * window)
-    if frequencies != "auto" and window != "auto":
-        return settings_of(axis, log.rate_hz, Lines.parse(frequencies, log.rate_hz, window, rounded=True))
-    signals = axis.signals
-    reference = signals.input if signals.excitation is None else signals.excitation
-    if reference is None:
-        raise ConfigError(
-            "auto-needs-recording",
-            "lines or window are 'auto', but signals.excitation and signals.input are missing",
-            "name the channel of the excitation, or in an open loop of the input",
-            key="signals.excitation",
-        )
-    names = list(dict.fromkeys(name for name in (reference, signals.input, signals.output) if name))
-    samples, seams = _joined(log, names, SEARCHED)
-    stretch = whole_stretch(samples, windows * (WINDOW_MIN if window == "auto" else window), seams)
-    if window == "auto":
-        window = (stretch.stop - stretch.start) // windows
-        hop = axis.tracking.hop or windows * window
-    if frequencies != "auto":
-        lines = Lines.parse(frequencies, log.rate_hz, window, rounded=True)
-    else:
-        lines = excited_lines(samples[0, stretch], window, log.rate_hz, hann=windows > 1)
-    return settings_of(axis, log.rate_hz, lines, hop)
 
 
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
@@ -235,10 +176,10 @@ def beginning(log: Log, channel: str, samples: int = SEARCHED) -> np.ndarray:
 
 def beginnings(log: RecordedSource, channels: Sequence[str], samples: int) -> np.ndarray:
     """The same of several channels, shape (channels, samples)."""
-    return _joined(log, channels, samples)[0]
+    return joined(log, channels, samples)[0]
 
 
-def _joined(log: RecordedSource, channels: Sequence[str], samples: int) -> tuple[np.ndarray, list[int]]:
+def joined(log: RecordedSource, channels: Sequence[str], samples: int) -> tuple[np.ndarray, list[int]]:
     """The same, and the places of gaps in which no sample is missing, as between two records of one file."""
     parts: list[np.ndarray] = []
     seams: list[int] = []

@@ -18,6 +18,7 @@ from livebode.runtime.documents import TrackerResults as TrackerResults
 from livebode.runtime.estimate import Estimate as Estimate
 from livebode.runtime.estimate import ExaminedRecording as ExaminedRecording
 from livebode.runtime.estimate import Outcome as Outcome
+from livebode.runtime.feed import Feed as Feed
 from livebode.runtime.fits import Fits as Fits
 from livebode.runtime.matrix_baseline import MatrixBaseline as MatrixBaseline
 from livebode.runtime.provenance import dated as dated

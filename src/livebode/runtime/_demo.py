@@ -12,6 +12,7 @@ from livebode.monitoring import Baseline, Monitor, learn_machine
 from livebode.runtime.change_detection import ChangeDetection
 from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import Outcome
+from livebode.runtime.feed import Feed
 from livebode.runtime.fits import Fits
 from livebode.runtime.run_loop import RunLoop
 from livebode.runtime.single_response import SingleResponse
@@ -97,7 +98,8 @@ def demo(to: Destination, *, seconds: float, seed: int, real_time: bool, baselin
         ChangeDetection(Monitor(baseline, settings), f"{LEARNED_S:g} s of healthy strokes"),
     )
     about = {"configuration": configuration, "found": {"clock": "relative"}}
-    return RunLoop(machine, estimate, to, about=about, block_samples=400, real_time=real_time).run()
+    feed = Feed(machine, block_samples=400, real_time=real_time)
+    return RunLoop(feed, estimate, to, about=about).run()
 
 
 def described_loop(drive: Drive) -> LoopSection:

@@ -9,6 +9,7 @@ from livebode.core import RunClock, moments_by
 from livebode.estimates import rule
 from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import ExaminedRecording, Outcome
+from livebode.runtime.feed import Feed
 from livebode.runtime.provenance import provenance
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import RunLoop
@@ -40,9 +41,7 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
     of: ExaminedRecording = rule(axis.kind, "recording")(axis, to)
     about = {"configuration": of.axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": of.found}
     about |= provenance(of.axis, of.digests)
-    loop = RunLoop(
-        of.source, of.estimate, to, about=about, segments=of.axis.record, started=started, control=control,
-        noticed=of.noticed, recorded=of.recorded,
-    )  # fmt: skip
+    feed = Feed(of.source, control, noticed=of.noticed, recorded=of.recorded, started=started)
+    loop = RunLoop(feed, of.estimate, to, about=about, segments=of.axis.record)
     with moments_by(RunClock.of_kind(of.clock)):
         return loop.run()

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import time
 from math import inf
+from typing import TYPE_CHECKING
 
 from livebode.core import Emit, Event, RunClock, ignore
 from livebode.language import Message
-from livebode.sources.live import LiveBlock, Origin
+
+if TYPE_CHECKING:
+    from livebode.sources.live import LiveBlock, Origin
 
 REFINED_FOR_S = 10.0
 """The relation is that of the Block with the least delay in the first so many seconds."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from livebode.runtime.documents import Subscriber
-from livebode.runtime.recorder import Recorder
+
+if TYPE_CHECKING:
+    from livebode.runtime.recorder import Recorder
 
 Draw = Callable[[Any, Path], None]
 """Draws an estimate (`Estimate`, which cannot be named here without a circle) into a directory."""

@@ -10,49 +10,30 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.analysis import Overview
 from livebode.configuration import Axis
-from livebode.core import (
-    Block,
-    Channel,
-    ClockKind,
-    Event,
-    MatrixResponses,
-    Responses,
-    SignalError,
-    Stateful,
-    nearest_name,
-)
-from livebode.fitting import Fit
+from livebode.core import Block, Channel, ClockKind, Event, Responses, SignalError, Stateful, nearest_name
 from livebode.records import ColumnTable
 from livebode.runtime.baseline_comparison import BaselineComparison
 from livebode.runtime.documents import Document
-from livebode.runtime.readiness import Readiness
-from livebode.runtime.recorder import Recorder
 from livebode.runtime.run_counts import RunCounts
-from livebode.runtime.shedding import LoadShedding
-from livebode.sources.live import LiveSource
+
+if TYPE_CHECKING:
+    from livebode.core import MatrixResponses
+    from livebode.fitting import Fit
+    from livebode.runtime.feed import Feed, Source
+    from livebode.runtime.readiness import Readiness
+    from livebode.runtime.recorder import Recorder
+    from livebode.runtime.shedding import LoadShedding
+    from livebode.sources.live import LiveSource
 
 SEEN_AGAIN_BYTES = 256 << 20
 """Previous results for a picture of a continued run, in addition to new ones."""
-
-
-class Source(Protocol):
-    """Source of the samples of a run: a recording or a simulated machine."""
-
-    @property
-    def channels(self) -> tuple[Channel, ...]: ...
-
-    @property
-    def samples(self) -> int | None: ...
-
-    @property
-    def blocks(self) -> Callable[..., Iterator[Block]]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,29 +42,33 @@ class RunContext:
 
     Attributes
     ----------
-    source
-        Of the samples.
+    feed
+        Its samples.
     about
         Entries of run.json that do not depend on the estimate.
     counts
         Counts of the run.
     recorder
         Its record.
-    shedding
-        What it has time for; None of a recording.
     events
         Receives events of the samples that are processed; they are published after the results.
-    begins
-        Whether no other run is before it.
     """
 
-    source: Source
+    feed: Feed
     about: dict[str, Any]
     counts: RunCounts
     recorder: Recorder
-    shedding: LoadShedding | None
     events: list[Event]
-    begins: bool
+
+    @property
+    def source(self) -> Source:
+        """Source of the samples."""
+        return self.feed.source
+
+    @property
+    def shedding(self) -> LoadShedding | None:
+        """What it has time for; None of a recording."""
+        return self.feed.shedding
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis import plain_fit
+from livebode.analysis import loop_report, plain_fit
 from livebode.configuration import FitSection, chosen_model, fitter_of
-from livebode.core import Event, Loop, Parameters, PlantKinds, Responses, Stage, decode, encode
+from livebode.core import Event, Loop, Parameters, PlantKinds, Responses, Stage, decode, encode, moment
 from livebode.fitting import Fit, Fitter, best_of, fit_of
 from livebode.margins import OpenLoop, against_lines, margins
 
@@ -117,6 +117,14 @@ class Fits:
         if self._newest_response is None:
             return fit_of(self._fitter, self._newest)
         return best_of(self._fitter, self._newest, self._newest_response)
+
+    def entries(self, newest: Fit | None, responses: Responses) -> dict[str, Any]:
+        """Entries of run.json: results of the fits, and the margins of a known loop with the newest one."""
+        found = {"fit": self.summary(newest)}
+        if newest is not None and self.loop is not None:
+            words = f"newest fit, at {moment(newest.parameters.time_s[0], 2)}"
+            found["loop"] = loop_report(newest, words, responses, self.loop).plain()
+        return found
 
     def summary(self, newest: Fit | None) -> dict[str, Any]:
         """For run.json: the model, the number of fits of each status, and the newest valid fit."""

@@ -19,6 +19,7 @@ from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition, stream_position
 from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import Estimate, Outcome
+from livebode.runtime.live_feed import LiveFeed
 from livebode.runtime.provenance import provenance
 from livebode.runtime.recorded_run import source_of
 from livebode.runtime.run_control import RunControl
@@ -129,10 +130,8 @@ class _Succession:
             **provenance(axis),
             "found": {"format": self._source.format, "rate_from": "the sender", "clock": "relative"},
         }
-        return RunLoop(
-            self._source, estimate, to, about=about, segments=axis.record or RecordSection(), again=False,
-            control=self._control, position=self._position, previous=previous, relation=self._relation,
-        )  # fmt: skip
+        feed = LiveFeed(self._source, self._control, self._position, previous, self._relation)
+        return RunLoop(feed, estimate, to, about=about, segments=axis.record or RecordSection())
 
     def _hand_over(self, loop: RunLoop, estimate: Estimate, following: Estimate, directory: Path) -> PreviousRun:
         """End a run; the next one continues with as much of its state as possible."""

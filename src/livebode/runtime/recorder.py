@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from livebode.configuration import RecordSection
 from livebode.core import Block, Event
-from livebode.records import RunRecord
 from livebode.runtime.documents import Document
+
+if TYPE_CHECKING:
+    from livebode.records import RunRecord
 
 
 class Recorder(Protocol):

@@ -14,10 +14,9 @@ from livebode.language import Message
 from livebode.locations import Location, local_copy
 from livebode.preparation import AlignedLog, ChannelCheck, check_same, configured_part, make_settings, realisations
 from livebode.records import content_sha256
-from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import ExaminedRecording
 from livebode.runtime.provenance import RecordedSpan, recorded
-from livebode.runtime.recording import Examined, examined, examined_recording
+from livebode.runtime.recording import Examined, examined
 from livebode.runtime.single_response import SingleResponse
 from livebode.sources import Log, located
 
@@ -69,10 +68,8 @@ class SuccessiveRecordings:
                 begins = False
 
 
-def examined_recordings(axis: Axis, to: Destination) -> ExaminedRecording:
-    """Open a recording or several, and examine each as a whole; several are tracked one after the other."""
-    if len(axis.source.logs) == 1:
-        return examined_recording(axis, to)
+def examined_recordings(axis: Axis) -> ExaminedRecording:
+    """Open several recordings, and examine each as a whole; they are tracked one after the other."""
     axis, parts = _prepared(axis)
     sources, settings = [part.of.source for part in parts], parts[0].tracker.settings
     starts, differ = [part.first for part in parts], realisations(sources, settings)

@@ -209,8 +209,8 @@ class ResponseMatrix(Estimate):
         )
 
     def summary(self, sample: int, time_s: float) -> tuple[dict[str, Any], list[Event]]:  # noqa: ARG002
-        source, lines = self.run.source, self.settings.lines
-        done = self.describe(self.run.about, source.channels) | summary.of_source(source)
+        feed, lines = self.run.feed, self.settings.lines
+        done = self.describe(self.run.about, feed.source.channels) | summary.of_source(feed.live)
         done |= summary.done(self.counts, lines.rate_hz, self.run.counts) | self.monitored()
         return done | self.columns.summary(lines.frequency_hz), []
 

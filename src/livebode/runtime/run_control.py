@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from livebode.configuration import RecordSection
 from livebode.core import Event
-from livebode.sources.live import Health, LiveSource
+
+if TYPE_CHECKING:
+    from livebode.sources.live import Health, LiveSource
 
 EVENTS_MAX = 64
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Stage, decode, encode, restore_parts
 from livebode.preparation import ChannelCheck
-from livebode.runtime.continuing import PreviousRun
 from livebode.runtime.event_groups import EventGroups
+
+if TYPE_CHECKING:
+    from livebode.runtime.continuing import PreviousRun
 
 _STAGE = Stage("run-counts", 1)
 

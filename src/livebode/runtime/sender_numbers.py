@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from livebode.sources.live import LiveBlock
+if TYPE_CHECKING:
+    from livebode.sources.live import LiveBlock
 
 _PIECES_MAX = 1000
 

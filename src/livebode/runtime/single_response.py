@@ -6,23 +6,21 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode import preparation
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
-from livebode.core import Block, Channel, Event, LivebodeError, Parameters, Responses, Stateful
+from livebode.core import Block, Channel, Event, LivebodeError, Responses, Stateful
 from livebode.estimation import Follower, Settings, plant_kinds, response_unit
-from livebode.fitting import DriftTest, Fit, RecordingsMean
-from livebode.preparation import check_excitation, check_some_valid, live_follower
+from livebode.preparation import check_excitation, check_some_valid
 from livebode.records import RESPONSE_TABLES
 from livebode.runtime import summary
-from livebode.runtime.between_event import between_events
 from livebode.runtime.change_detection import ChangeDetection, change_detection
 from livebode.runtime.documents import Document, FitResults
-from livebode.runtime.drift_event import drift_events
 from livebode.runtime.estimate import (
     SEEN_AGAIN_BYTES,
     Estimate,
@@ -30,10 +28,15 @@ from livebode.runtime.estimate import (
     RunContext,
     check_channels,
 )
-from livebode.runtime.fits import Fits
-from livebode.runtime.live_checks import LiveChecks
-from livebode.runtime.readiness import Readiness
-from livebode.sources.live import LiveSource
+from livebode.runtime.recording_findings import between_events, drift_events, of_drift, of_recordings
+
+if TYPE_CHECKING:
+    from livebode.core import Parameters
+    from livebode.fitting import DriftTest, Fit, RecordingsMean
+    from livebode.runtime.fits import Fits
+    from livebode.runtime.live_checks import LiveChecks
+    from livebode.runtime.readiness import Readiness
+    from livebode.sources.live import LiveSource
 
 
 @dataclass(eq=False)
@@ -74,14 +77,18 @@ class SingleResponse(Estimate):
     def of(cls, axis: Axis, follower: Follower, channels: Sequence[Channel], *, samples: bool = True) -> Self:
         """The configured stages after the follower, with or without `samples`; LivebodeError if one is not possible."""
         settings = follower.settings
-        fits = Fits.of(axis.fit, settings.loop, plant_kinds(channels, settings)) if axis.fit else None
+        fits = None
+        if axis.fit:
+            from livebode.runtime.fits import Fits  # loads every model
+
+            fits = Fits.of(axis.fit, settings.loop, plant_kinds(channels, settings))
         detection = change_detection(axis, settings, samples=samples)
         return cls(follower, fits, detection, axis, readiness=_readiness(axis, settings))
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> Self:
         """For a live source, whose channels and rate are known; LivebodeError if they do not fit."""
-        follower = live_follower(axis, source.rate_hz, source.spectra)
+        follower = preparation.live_follower(axis, source.rate_hz, source.spectra)
         estimate = cls.of(axis, follower, source.channels, samples=source.spectra is None)
         check_channels(estimate.channels, source)
         return estimate
@@ -167,7 +174,7 @@ class SingleResponse(Estimate):
 
     def begin(self, run: RunContext) -> None:
         super().begin(run)
-        if isinstance(run.source, LiveSource):
+        if run.feed.live is not None:
             self.overview = Overview(LIVE_VALUES_MAX)
 
     def resume(self) -> Iterator[Document]:
@@ -182,11 +189,13 @@ class SingleResponse(Estimate):
         self._checks = self._live_checks()
 
     def _live_checks(self) -> LiveChecks | None:
-        axis, source, counts = self.axis, self.run.source, self.run.counts
-        if not isinstance(source, LiveSource) or source.spectra is not None or axis is None:
+        axis, source, counts = self.axis, self.run.feed.live, self.run.counts
+        if source is None or source.spectra is not None or axis is None:
             return None
+        from livebode.runtime.live_checks import LiveChecks
+
         # After a valid response, the excitation has already begun.
-        begins = self.run.begins and not (counts.judged or counts.valid_lines)
+        begins = self.run.feed.previous is None and not (counts.judged or counts.valid_lines)
         transient = begins and not (axis.tracking.all_periods or axis.motion)
         return LiveChecks(
             self.settings,
@@ -262,18 +271,19 @@ class SingleResponse(Estimate):
         return ()
 
     def summary(self, sample: int, time_s: float) -> tuple[dict[str, Any], list[Event]]:
-        source, lines = self.run.source, self.settings.lines
+        feed, lines = self.run.feed, self.settings.lines
         events = [] if self.detection is None else self.detection.finish()
-        done = self._described(self.run.about, source.channels)
+        done = self._described(self.run.about, feed.source.channels)
         done |= summary.done(self.counts, lines.rate_hz, self.run.counts)
         self.fit = None if self.fits is None else self.fits.newest()
         seen = self.overview.responses()
-        done |= summary.of_source(source) | summary.fitted(self.fits, self.fit, seen[seen.ready]) | self.monitored()
+        fitted = {} if self.fits is None else self.fits.entries(self.fit, seen[seen.ready])
+        done |= summary.of_source(feed.live) | fitted | self.monitored()
         if self.drift is not None:
-            done["drift"] = summary.of_drift(self.drift.result(), lines)
+            done["drift"] = of_drift(self.drift.result(), lines)
             events += drift_events(done["drift"], sample, time_s)
         if self.recordings is not None:
-            done["between"] = summary.of_recordings(self.recordings)
+            done["between"] = of_recordings(self.recordings)
             events += between_events(done["between"], sample, time_s)
         return done, events
 
@@ -286,5 +296,7 @@ def _readiness(axis: Axis, settings: Settings) -> Readiness | None:
     condition = axis.ready
     if condition is None:
         return None
+    from livebode.runtime.readiness import Readiness
+
     chunk_s = 0.0 if axis.motion is None else axis.motion.chunk_s
     return Readiness(condition, settings.span, round(chunk_s * settings.lines.rate_hz))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from livebode.core import Event
 from livebode.runtime.documents import Document, Subscriber
 from livebode.runtime.event_groups import EventGroups
-from livebode.runtime.recorder import Recorder
 from livebode.sources.live import KINDS
+
+if TYPE_CHECKING:
+    from livebode.runtime.recorder import Recorder
 
 _URGENT = {"change", "backlog", "doubtful", "roles-doubtful", "window-doubtful", "baseline-unknown", "not-monitored"}
 _LOGGED_ELSEWHERE = {*KINDS, "configuration-applied", "configuration-refused"}

@@ -21,11 +21,12 @@ from livebode.preparation import (
 from livebode.runtime.estimate import ExaminedRecording
 from livebode.runtime.provenance import RecordedSpan, recorded
 from livebode.runtime.single_response import SingleResponse
-from livebode.sources import UnevenLog
+from livebode.sources import Log, UnevenLog
 
 
-def examined_uneven(axis: Axis, log: UnevenLog) -> ExaminedRecording:
+def examined_uneven(axis: Axis, log: Log) -> ExaminedRecording:
     """Examine the recording, interpolated on a common grid; the spectra are fitted at its own times."""
+    assert isinstance(log, UnevenLog)
     check_uneven(axis)
     grid, lines = uneven_grid(axis, log)
     settings = uneven_settings(axis, lines)

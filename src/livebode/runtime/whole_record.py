@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from livebode.configuration import RecordSection
 from livebode.core import Block, Event
-from livebode.records import ColumnTable, RunDirectory, RunRecord
+from livebode.records import ColumnTable, RunDirectory
 from livebode.runtime.documents import Document, FitResults
+
+if TYPE_CHECKING:
+    from livebode.records import RunRecord
 
 
 class RecordInOnePiece:

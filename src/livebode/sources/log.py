@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, ClockKind, QuantityKind, RecordingError, UsageError
+from livebode.core import Block, Channel, ClockKind, LivebodeError, QuantityKind, RecordingError, UsageError
 from livebode.locations import Location
 from livebode.sources.computed import computed_blocks
 from livebode.sources.expressions import Expression
@@ -37,6 +38,9 @@ class Log:
     >>> log.format, log.rate_hz, log.channels[1]
     ('csv', 1000.0, Channel(name='iq', unit='A', kind='current'))
     """
+
+    even: ClassVar[bool] = True
+    """Whether all channels have the one clock, whose steps are equal."""
 
     def __init__(
         self,
@@ -271,6 +275,15 @@ class Log:
         chosen = copy(self)
         chosen._named = self._labels(self._found([name for name in names if name not in known]))
         return chosen
+
+    def check_clocks(self, names: Sequence[str]) -> None:
+        """RecordingError if a channel has another clock; other errors are left to the reading."""
+        for name in names:
+            try:
+                self._found([name])
+            except LivebodeError as error:
+                if error.code == "recording.clocks-differ":
+                    raise
 
     def _found(self, names: Sequence[str]) -> dict[str, Column | Expression]:
         with located(self.path), explained(self._recording.skipped):

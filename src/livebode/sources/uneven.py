@@ -28,8 +28,6 @@ from livebode.sources.timing import Clock, find_time, rate_in_file
 from livebode.sources.units import split_unit
 
 _ROWS = 1 << 14
-UNEVEN = "recording.clocks-differ", "recording.time-jitter", "recording.time-irregular"
-"""Codes of the errors of `open_log` on a recording that `open_uneven` reads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +51,8 @@ class UnevenLog(Log):
     grid that begins with the first sample of the reference: the samples of `blocks` are interpolated, good enough to
     examine the recording, but not to measure with it.
     """
+
+    even = False
 
     def __init__(
         self,

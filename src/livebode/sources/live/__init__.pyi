@@ -2,6 +2,7 @@ from livebode.sources.live._secret import existing as existing
 from livebode.sources.live._secret import password as password
 from livebode.sources.live._secret import secret as secret
 from livebode.sources.live.address import Address as Address
+from livebode.sources.live.address import checked_address as checked_address
 from livebode.sources.live.address import parse_address as parse_address
 from livebode.sources.live.batch import CHANNELS_MAX as CHANNELS_MAX
 from livebode.sources.live.batch import SAMPLE_MAX as SAMPLE_MAX
@@ -30,7 +31,6 @@ from livebode.sources.live.ndjson import LINE_BYTES_MAX as LINE_BYTES_MAX
 from livebode.sources.live.ndjson import LineDecoder as LineDecoder
 from livebode.sources.live.ndjson import encode_line as encode_line
 from livebode.sources.live.next_spectrum import NextSpectrum as NextSpectrum
-from livebode.sources.live.opening import checked_address as checked_address
 from livebode.sources.live.opening import make_source as make_source
 from livebode.sources.live.opening import open_source as open_source
 from livebode.sources.live.pauses import Pauses as Pauses

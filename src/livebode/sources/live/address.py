@@ -7,6 +7,7 @@ from urllib.parse import unquote, urlsplit
 
 from livebode.core import ConfigError
 from livebode.plugins import named
+from livebode.sources.live.settings import SourceKeys, check_keys
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,13 @@ def parse_address(url: str) -> Address:
     if path and not kinds[parts.scheme].has_path:
         raise _url_error(f"has a path, but {parts.scheme} has none", "remove what is after the port")
     return Address(parts.scheme, host, port, path)
+
+
+def checked_address(url: str, settings: SourceKeys) -> Address:
+    """The address in the url of these settings; ConfigError if it or a related key is invalid."""
+    address = parse_address(url)
+    check_keys(settings, address.scheme)
+    return address
 
 
 def _device(scheme: str, path: str) -> Address:

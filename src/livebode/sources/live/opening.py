@@ -5,7 +5,7 @@ from __future__ import annotations
 from livebode.core import ConfigError, LocationError
 from livebode.locations import Url
 from livebode.plugins import loaded, named
-from livebode.sources.live.address import Address, parse_address
+from livebode.sources.live.address import Address, checked_address
 from livebode.sources.live.follow import FollowSource
 from livebode.sources.live.settings import SourceSettings, check_keys
 from livebode.sources.live.source import LiveSource
@@ -50,10 +50,3 @@ def make_source(settings: SourceSettings) -> LiveSource:
     address = checked_address(settings.url, settings)
     kind: type[LiveSource] = loaded(named("sources")[address.scheme].source)
     return kind(settings, address)
-
-
-def checked_address(url: str, settings: SourceSettings) -> Address:
-    """The address in the url of these settings; ConfigError if it or a related key is invalid."""
-    address = parse_address(url)
-    check_keys(settings, address.scheme)
-    return address

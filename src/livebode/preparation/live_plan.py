@@ -1,9 +1,35 @@
-"""Compare a configuration with the spectra of its drive: settings that differ, or need samples, are rejected."""
+"""The follower of a live source, whose configuration must fit its samples, or the spectra of its drive."""
 
 from __future__ import annotations
 
 from livebode.configuration import Axis
 from livebode.core import ConfigError, Lines, SpectraLayout
+from livebode.estimation import Follower, SpectraTracker, nearest_hop
+from livebode.preparation.plan import follower_of, settings_of
+
+LIVE_RESPONSES_PER_S = 20.0
+"""Default for a live source: sufficient for display, with a tenth of the work of a hop of a twentieth of the window."""
+
+
+def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = None) -> Follower:
+    """A follower of samples, whose lines and window must be given, or of spectra of a layout.
+
+    LivebodeError if they do not fit.
+    """
+    if layout is not None:
+        lines = check_spectra(axis, layout, rate_hz)
+        return SpectraTracker(settings_of(axis, rate_hz, lines, layout.hop), layout)
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    if frequencies == "auto" or window == "auto":
+        raise ConfigError(
+            "auto-needs-recording",
+            "lines or window are 'auto', which needs a recording",
+            "set lines.frequencies and lines.window for a live source",
+            key="lines",
+        )
+    lines = Lines.parse(frequencies, rate_hz, window, rounded=not axis.tracking.periodic)
+    hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
+    return follower_of(axis, settings_of(axis, rate_hz, lines, hop))
 
 
 def check_spectra(axis: Axis, layout: SpectraLayout, rate_hz: float) -> Lines:
