@@ -12,7 +12,7 @@ from playwright.sync_api import Browser
 
 from livebode.core import Event
 from livebode.dashboard import Dashboard, Serving
-from livebode.report import to_html
+from livebode.pictures import to_html
 from livebode.reporting.report_data import read
 from livebode.reporting.run_report import report_of
 from tests.support.axe import SIZES, violations, with_axe

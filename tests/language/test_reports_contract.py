@@ -11,7 +11,7 @@ import pytest
 from livebode.core import Event, moment
 from livebode.language import Message, in_language
 from livebode.monitoring.sentences import WHAT
-from livebode.report import to_html
+from livebode.pictures import to_html
 from livebode.reporting import Comparison
 from livebode.reporting.run_report import run_report
 from tests.support.languages import pseudo, untranslated

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from pypdf import PdfReader
 
 from livebode.core import Document, Event, Finding, Listing, Paragraph, Picture, PrintedTable, Section, install_command
-from livebode.report import pictures_svg, save_pdf, to_html
+from livebode.pictures import pictures_svg, save_pdf, to_html
 from livebode.reporting.run_report import run_report
 from livebode.reporting.wording import to_toml
 from tests.support.command import livebode
@@ -208,8 +208,8 @@ def test_without_typst_the_page_is_written_and_the_missing_pdf_is_reported(
 ) -> None:
     run = write_run(tmp_path / "run", measured(20, 1))
     monkeypatch.setitem(sys.modules, "typst", None)
-    monkeypatch.delitem(sys.modules, "livebode.report.pdf", raising=False)
-    monkeypatch.delattr("livebode.report.save_pdf", raising=False)
+    monkeypatch.delitem(sys.modules, "livebode.pictures.pdf", raising=False)
+    monkeypatch.delattr("livebode.pictures.save_pdf", raising=False)
     done = livebode("report", run)
     assert done.code == 0, done.err
     assert f"Typst is not installed; run {install_command('pdf')}" in done.out

@@ -19,9 +19,9 @@ from pypdf.generic import DictionaryObject
 
 from livebode.core import Document, Picture, PrintedTable
 from livebode.fitting import mean_response
+from livebode.pictures import pictures_svg
+from livebode.pictures.figures import drawn
 from livebode.records import RunRecord
-from livebode.report import pictures_svg
-from livebode.report.figures import drawn
 from livebode.reporting import Comparison
 from livebode.reporting.run_report import run_report
 from livebode.reporting.wording import polar_phrase

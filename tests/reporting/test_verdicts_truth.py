@@ -16,7 +16,7 @@ import pytest
 from livebode.analysis import Difference
 from livebode.core import Event, date_and_time
 from livebode.fitting import mean_response
-from livebode.report import to_html
+from livebode.pictures import to_html
 from livebode.reporting import Comparison
 from livebode.reporting.run_report import run_report
 from tests.support.reports import measured, write_run

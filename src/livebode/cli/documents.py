@@ -18,7 +18,7 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
         If a file exists and must not be replaced, or cannot be written.
     """
     from livebode.export import save
-    from livebode.report import pictures_svg, to_html
+    from livebode.pictures import pictures_svg, to_html
 
     base = out.with_suffix("") if out.suffix.lower() in (".html", ".pdf") else out
     page, paper = (base.with_name(base.name + ending) for ending in (".html", ".pdf"))
@@ -32,7 +32,7 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
     drawn = pictures_svg(document)
     save(page, lambda partial: partial.write_text(to_html(document, drawn), encoding="utf-8"), force=force)
     try:
-        from livebode.report import save_pdf
+        from livebode.pictures import save_pdf
     except ImportError:
         return [page], _NO_PDF.format(install_command("pdf"))
     try:

@@ -158,8 +158,8 @@ class RunsPages:
 
     def _compared(self, before: Path, after: Path, code: str) -> str:
         from livebode.configuration import recorded_report
+        from livebode.pictures import to_html
         from livebode.records import read_summary
-        from livebode.report import to_html
         from livebode.reporting import comparison_of, trusted
 
         key = code, *((path.name, (path / "run.json").stat().st_mtime_ns) for path in (before, after))

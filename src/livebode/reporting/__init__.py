@@ -1,4 +1,4 @@
-"""The contents of the reports of one or two runs, as plain data; `livebode.report` lays them out."""
+"""The contents of the reports of one or two runs, as plain data; `livebode.pictures` lays them out."""
 
 from livebode.on_first_use import on_first_use
 

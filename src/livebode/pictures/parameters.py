@@ -9,9 +9,9 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.language import tr, worded
-from livebode.report import words
-from livebode.report._style import Style, drawing, new_figure, plain, shortened, style
-from livebode.report.tracking import with_holes
+from livebode.pictures import words
+from livebode.pictures._style import Style, drawing, new_figure, plain, shortened, style
+from livebode.pictures.tracking import with_holes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ import numpy as np
 from livebode.core import MatrixResponses, Response, Responses, moment, moment_of_start
 from livebode.drawing import frequency_label
 from livebode.language import Message, numerals, tr, trn, worded
-from livebode.report._style import shortened
+from livebode.pictures._style import shortened
 
 _SYMBOL: dict[str, str] = {
     Message("plant"): "G",

@@ -11,8 +11,8 @@ from livebode.arrays import Floats
 from livebode.core import Responses
 from livebode.drawing import decibels, quantiles, ticks
 from livebode.language import tr
-from livebode.report import words
-from livebode.report._style import Style, plain
+from livebode.pictures import words
+from livebode.pictures._style import Style, plain
 
 if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh

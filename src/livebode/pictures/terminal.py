@@ -10,9 +10,9 @@ import numpy as np
 from livebode.arrays import Floats
 from livebode.core import Responses, counted
 from livebode.drawing import ticks
-from livebode.report import words
-from livebode.report.canvas import Canvas, Scale, written
-from livebode.report.summary import Summary, summarised
+from livebode.pictures import words
+from livebode.pictures.canvas import Canvas, Scale, written
+from livebode.pictures.summary import Summary, summarised
 
 _WIDTH_MIN, _HEIGHT_MIN = 40, 16
 

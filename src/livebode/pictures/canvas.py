@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rich.style import Style
 
 from livebode.arrays import Floats
-from livebode.report._style import shortened
+from livebode.pictures._style import shortened
 
 _BRAILLE = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 _CURVE, _CIRCLE = Style(color="cyan"), Style(color="bright_yellow")

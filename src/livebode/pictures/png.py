@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.core import Model, Responses, whole_file
-from livebode.report._style import Style, drawing, quiet_about_letters, style
+from livebode.pictures._style import Style, drawing, quiet_about_letters, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,8 +37,8 @@ def save_pictures(
     OSError
         If a file cannot be written.
     """
-    from livebode.report.bode import bode_figure
-    from livebode.report.tracking import tracking_figure
+    from livebode.pictures.bode import bode_figure
+    from livebode.pictures.tracking import tracking_figure
 
     assessed = responses[responses.ready] if responses.ready.any() else responses
     look = style(dark)

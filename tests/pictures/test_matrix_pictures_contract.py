@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from livebode.core import MatrixResponses
 from livebode.mimo import example_matrix_responses
-from livebode.report import matrix_figure, save_matrix_pictures, singular_values_figure
+from livebode.pictures import matrix_figure, save_matrix_pictures, singular_values_figure
 
 NEWEST = example_matrix_responses()[-1:]
 

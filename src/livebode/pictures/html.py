@@ -7,8 +7,8 @@ from html import escape
 
 from livebode.core import Document, Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
 from livebode.language import current_language, worded
-from livebode.report.page_style import STYLE_SHEET
-from livebode.report.svg import pictures_svg, themed_svg
+from livebode.pictures.page_style import STYLE_SHEET
+from livebode.pictures.svg import pictures_svg, themed_svg
 
 
 def to_html(document: Document, drawn: tuple[str, ...] | None = None) -> str:

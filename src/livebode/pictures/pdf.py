@@ -16,11 +16,11 @@ import typst
 
 from livebode.core import Document, Finding, Listing, OutputError, Paragraph, Part, Picture, PrintedTable, Section
 from livebode.language import current_language, worded
-from livebode.report._style import LIGHT, columns
-from livebode.report.html import readable
-from livebode.report.page_style import TONE_COLOURS
-from livebode.report.pdf_fonts import Letters, letters_of
-from livebode.report.svg import pictures_svg
+from livebode.pictures._style import LIGHT, columns
+from livebode.pictures.html import readable
+from livebode.pictures.page_style import TONE_COLOURS
+from livebode.pictures.pdf_fonts import Letters, letters_of
+from livebode.pictures.svg import pictures_svg
 
 STANDARDS = ("a-2a", "ua-1")
 _SHORT, _LETTERS_MAX = 24, 60  # letters of a column, when the widths of a table's columns are shared out
@@ -51,7 +51,7 @@ def save_pdf(document: Document, path: Path, drawn: tuple[str, ...] | None = Non
     # Paths of the machine do not appear in the file: all names are relative to the folder.
     contents = {f"{i}.svg": letters.known(svg).encode() for i, svg in enumerate(svgs)} | {
         "document.json": letters.known(written).encode(),
-        "main.typ": (files("livebode.report") / "report.typ").read_bytes(),
+        "main.typ": (files("livebode.pictures") / "report.typ").read_bytes(),
     }
     if document.logo is not None:
         contents[f"logo.{document.logo.kind}"] = document.logo.data

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TextIO
 
 from livebode.core import needing
-from livebode.report._style import wide_letters
+from livebode.pictures._style import wide_letters
 
 with needing("Matplotlib", "plots", "a picture"):
     from matplotlib.backends.backend_mixed import MixedModeRenderer

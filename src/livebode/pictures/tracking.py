@@ -11,10 +11,10 @@ from livebode.arrays import Floats
 from livebode.core import Responses
 from livebode.drawing import decibels, ticks
 from livebode.language import numerals, tr
-from livebode.report import words
-from livebode.report._style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
-from livebode.report.map import draw_maps
-from livebode.report.summary import BOUND_C, PROBABILITY, usable
+from livebode.pictures import words
+from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
+from livebode.pictures.map import draw_maps
+from livebode.pictures.summary import BOUND_C, PROBABILITY, usable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,8 +13,8 @@ from livebode.core import Responses
 from livebode.fitting import Fit
 from livebode.language import number, tr, worded
 from livebode.margins import Margins, OpenLoop
-from livebode.report._style import Style, drawing, heading, new_figure, plain, style
-from livebode.report.pictures import save
+from livebode.pictures._style import Style, drawing, heading, new_figure, plain, style
+from livebode.pictures.png import save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,10 +11,10 @@ import pytest
 from livebode.cli.pictures import tracked_amount
 from livebode.core import Lines, Responses
 from livebode.drawing import quantiles, unwrapped
+from livebode.pictures import bode_figure, spread, terminal_bode, tracking_figure, with_holes
+from livebode.pictures.summary import BOUND_C, PROBABILITY
+from livebode.pictures.tracking import is_falling
 from livebode.preparation import ChannelCheck
-from livebode.report import bode_figure, spread, terminal_bode, tracking_figure, with_holes
-from livebode.report.summary import BOUND_C, PROBABILITY
-from livebode.report.tracking import is_falling
 from livebode.runtime.run_counts import RunCounts
 
 LINES = Lines.parse("20:140:20", rate_hz=4000, window=400)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.core import Picture
 from livebode.language import Message, worded
+from livebode.pictures.local_ticks import localise_ticks
 from livebode.plugins import loaded
-from livebode.report.local_ticks import localise_ticks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,15 +18,15 @@ WIDTH_IN = 9.0
 
 
 _FIGURES: Mapping[str, tuple[str, str, bool]] = {
-    "bode": ("livebode.report.bode:bode_figure", Message("Average response"), False),
-    "tracking": ("livebode.report.tracking:tracking_figure", Message("Magnitude over time"), True),
-    "parameters": ("livebode.report.parameters:parameters_figure", "", False),
-    "loop": ("livebode.report.loop:loop_figure", Message("Open loop"), True),
-    "validation": ("livebode.report.validation:validation_figure", Message("Measured and simulated"), False),
-    "matrix": ("livebode.report.matrix:matrix_figure", Message("Matrix of responses"), True),
-    "singular values": ("livebode.report.matrix:singular_values_figure", Message("Singular values"), False),
-    "comparison": ("livebode.report.comparison:comparison_figure", "", False),
-    "places": ("livebode.report.comparison:places_figure", "", False),
+    "bode": ("livebode.pictures.bode:bode_figure", Message("Average response"), False),
+    "tracking": ("livebode.pictures.tracking:tracking_figure", Message("Magnitude over time"), True),
+    "parameters": ("livebode.pictures.parameters:parameters_figure", "", False),
+    "loop": ("livebode.pictures.loop:loop_figure", Message("Open loop"), True),
+    "validation": ("livebode.pictures.validation:validation_figure", Message("Measured and simulated"), False),
+    "matrix": ("livebode.pictures.matrix:matrix_figure", Message("Matrix of responses"), True),
+    "singular values": ("livebode.pictures.matrix:singular_values_figure", Message("Singular values"), False),
+    "comparison": ("livebode.pictures.comparison:comparison_figure", "", False),
+    "places": ("livebode.pictures.comparison:places_figure", "", False),
 }
 """What draws each kind, its title, and whether it needs the width of the page."""
 

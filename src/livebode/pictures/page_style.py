@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from livebode.core import Tone
-from livebode.report._style import DARK, LIGHT
-from livebode.report.svg import variables
+from livebode.pictures._style import DARK, LIGHT
+from livebode.pictures.svg import variables
 
 _GREEN, _AMBER, _RED, _GREY = (
     ("#00734d", "#4cc79b"),

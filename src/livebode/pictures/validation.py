@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.language import tr, worded
-from livebode.report._style import Style, drawing, heading, new_figure, plain, shortened, style
-from livebode.report.pictures import save
+from livebode.pictures._style import Style, drawing, heading, new_figure, plain, shortened, style
+from livebode.pictures.png import save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,10 +12,10 @@ from livebode.core import Response
 from livebode.drawing import FEW_LINES, bound_db, bound_deg, decibels, unwrapped
 from livebode.drawing import bound as draw_bound
 from livebode.language import tr, trn
-from livebode.report import words
-from livebode.report._style import Style, drawing, heading, new_figure, plain, style
-from livebode.report.map import frequency_edges
-from livebode.report.summary import MEAN_C
+from livebode.pictures import words
+from livebode.pictures._style import Style, drawing, heading, new_figure, plain, style
+from livebode.pictures.map import frequency_edges
+from livebode.pictures.summary import MEAN_C
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from livebode.core import Lines, Responses
-from livebode.report import bode_figure, save_pictures, terminal_bode, tracking_figure
+from livebode.pictures import bode_figure, save_pictures, terminal_bode, tracking_figure
 
 
 def some(lines: int = 7, rows: int = 30, schedule: bool = True, seed: int = 0) -> Responses:
@@ -121,14 +121,14 @@ def test_the_callers_matplotlib_keeps_its_settings_and_does_not_change_ours(tmp_
 
 
 def test_importing_the_report_loads_no_plotting_library() -> None:
-    look = "import sys, livebode.report; print('matplotlib' in sys.modules)"
+    look = "import sys, livebode.pictures; print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
 
 def test_drawing_never_imports_pyplot(tmp_path) -> None:
     look = (
-        "import sys; from test_pictures_contract import some; from livebode.report import save_pictures;"
+        "import sys; from test_pictures_contract import some; from livebode.pictures import save_pictures;"
         f"save_pictures(some(), {str(tmp_path)!r}); print('matplotlib.pyplot' in sys.modules)"
     )
     here = __file__.rsplit("/", 1)[0]

@@ -10,9 +10,9 @@ from livebode.arrays import Floats
 from livebode.core import Model, Response, Responses, moment
 from livebode.drawing import FEW_LINES, alone, band, bound, bound_db, bound_deg, decibels, ticks
 from livebode.language import tr, trn
-from livebode.report import words
-from livebode.report._style import Style, drawing, empty_note, heading, new_figure, plain, style
-from livebode.report.summary import MEAN_PROBABILITY, PROBABILITY, Summary, summarised
+from livebode.pictures import words
+from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, style
+from livebode.pictures.summary import MEAN_PROBABILITY, PROBABILITY, Summary, summarised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,10 +14,10 @@ from livebode.arrays import Floats
 from livebode.core import REASONS, MatrixResponses, moment
 from livebode.drawing import FEW_LINES, alone, bound, bound_db, decibels
 from livebode.language import tr, worded
-from livebode.report._style import Style, drawing, heading, new_figure, plain, shortened, style
-from livebode.report.pictures import save
-from livebode.report.summary import BOUND_C, PROBABILITY
-from livebode.report.words import lines_phrase
+from livebode.pictures._style import Style, drawing, heading, new_figure, plain, shortened, style
+from livebode.pictures.png import save
+from livebode.pictures.summary import BOUND_C, PROBABILITY
+from livebode.pictures.words import lines_phrase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

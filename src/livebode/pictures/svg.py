@@ -7,8 +7,8 @@ import re
 from typing import TYPE_CHECKING
 
 from livebode.core import Document
-from livebode.report._style import DARK, LIGHT, Style, drawing, quiet_about_letters
-from livebode.report.figures import drawn
+from livebode.pictures._style import DARK, LIGHT, Style, drawing, quiet_about_letters
+from livebode.pictures.figures import drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,7 +47,7 @@ def _svg(figure: Figure, salt: str) -> str:
 
     text = io.StringIO()
     with drawing(LIGHT), matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": salt}), quiet_about_letters():
-        from livebode.report.svg_renderer import draw_svg
+        from livebode.pictures.svg_renderer import draw_svg
 
         draw_svg(figure, text)
     svg = _METADATA.sub("", _PROLOGUE.sub("", text.getvalue(), count=1), count=1)
