@@ -54,6 +54,12 @@ def facts(responses: Responses, valid_rows: int, names: tuple[str, str] | None =
     return f"{what} · {lines_phrase(responses)} · {valid}"
 
 
+def labelled(name: str, unit: str) -> str:
+    """A quantity with its unit."""
+    text = worded(name.replace("_", " "))
+    return tr("{name} in {unit}", name=text, unit=worded(unit)) if unit else text
+
+
 def clock(time_s: np.ndarray) -> tuple[float, str]:
     """Origin to subtract from times, with the label: seconds since 1970 are unreadable as ticks."""
     finite = time_s[np.isfinite(time_s)]
