@@ -11,10 +11,10 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from livebode.report import drawing, heading, new_figure, plain
-from livebode.report._style import DARK, LIGHT
-from livebode.report.svg import themed_svg, variables
-from livebode.report.svg_renderer import draw_svg
+from livebode.pictures import drawing, heading, new_figure, plain
+from livebode.pictures._style import DARK, LIGHT
+from livebode_reports.svg import themed_svg, variables
+from livebode_reports.svg_renderer import draw_svg
 
 HEAD_IN = 0.95
 AGE_TICKS_S = {"minute": 60.0, "hour": 3600.0, "day": 86400.0, "month": 30 * 86400.0, "year": 365 * 86400.0}

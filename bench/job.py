@@ -105,7 +105,7 @@ def bound(log: Path, run: Path, out: Path) -> None:
 
 def pictures(run: Path) -> None:
     """Draw the pictures of a run; print the seconds of the first time, which loads Matplotlib, and of the best."""
-    import livebode.report
+    import livebode.pictures
     from livebode.analysis import Overview
     from livebode.cli.start import OBJECTS_NEW
     from livebode.records import RunRecord
@@ -118,7 +118,7 @@ def pictures(run: Path) -> None:
     times = []
     for _ in range(4):
         begun = time.process_time()
-        livebode.report.save_pictures(found, run, title="log.parquet: y", names=("u", "y"))
+        livebode.pictures.save_pictures(found, run, title="log.parquet: y", names=("u", "y"))
         times.append(time.process_time() - begun)
     print(times[0], min(times))
 

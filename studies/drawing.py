@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.report import drawing, heading, new_figure, plain
-from livebode.report._style import LIGHT
+from livebode.pictures import drawing, heading, new_figure, plain
+from livebode.pictures._style import LIGHT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,7 +14,8 @@ import numpy as np
 from pypdf import PdfReader
 
 from livebode.core import Document, Finding, Lines, Paragraph, Picture, Responses, Section
-from livebode.report import pdf, pictures_svg
+from livebode_reports import pdf
+from livebode_reports.svg import pictures_svg
 
 RUNS = 3
 WORDS = ("frequency in Hz", "phase in degrees", "u to ω", "Keff", "力矩")

@@ -17,9 +17,9 @@ import numpy as np
 
 from bench.decisions.former import code_lines, module, source
 from livebode.core import Lines, Responses
-from livebode.report import terminal_bode
+from livebode.pictures import terminal_bode
 
-PATH = "src/livebode/report/terminal.py"
+PATH = "src/livebode/pictures/terminal.py"
 PLOTS, WIDTH, HEIGHT = 200, 100, 30
 
 

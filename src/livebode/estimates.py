@@ -21,8 +21,6 @@ ESTIMATES: Mapping[str, Mapping[str, str]] = {
         "draw": "livebode.cli.pictures:drawing_of",
         "show": "livebode.cli.pictures:show",
         "page": "livebode.dashboard.matrix_view:views_of_response",
-        "report": "livebode.reporting.run_report:accepted_report",
-        "compare": "livebode.reporting.compare_report:Comparison",
         "export": "livebode.cli.export_command:responses",
     },
     "matrix": {
@@ -31,8 +29,6 @@ ESTIMATES: Mapping[str, Mapping[str, str]] = {
         "draw": "livebode.cli.matrix:drawing_matrix",
         "show": "livebode.cli.matrix:show_matrix",
         "page": "livebode.dashboard.matrix_view:views_of_matrix",
-        "report": "livebode.reporting.matrix_report:matrix_report",
-        "compare": "livebode.reporting.matrix_comparison:MatrixComparison",
         "export": "livebode.cli.export_command:matrices",
     },
 }

@@ -28,6 +28,7 @@ GROUPS: Mapping[str, type[Mapping[str, Any]] | type[Sequence[Any]]] = {
     "models": Mapping,
     "analyses": Mapping,
     "estimates": Mapping,
+    "documents": Mapping,
     "examples": Mapping,
 }
 """The groups, and the type of their tables; a mapping has the name of each part."""

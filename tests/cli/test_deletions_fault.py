@@ -129,9 +129,9 @@ def _outbox(path: Path) -> None:
 
 
 def test_nothing_of_somebody_else_is_touched(tmp_path: Path, made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("livebode.report.pictures_svg", lambda _: {})  # most of the time of a report
-    monkeypatch.setattr("livebode.report.to_html", lambda *_: "")
-    monkeypatch.setattr("livebode.report.save_pdf", lambda _, path, __: path.write_bytes(b""))
+    monkeypatch.setattr("livebode_reports.svg.pictures_svg", lambda _: {})  # most of the time of a report
+    monkeypatch.setattr("livebode_reports.html.to_html", lambda *_: "")
+    monkeypatch.setattr("livebode_reports.pdf.save_pdf", lambda _, path, __: path.write_bytes(b""))
     rng, done, refused = np.random.default_rng(34), Counter[str](), Counter[str]()
     for number in range(DIRECTORIES):
         folder = tmp_path / "each"

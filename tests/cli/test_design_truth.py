@@ -16,8 +16,8 @@ from livebode.core import LivebodeError
 from livebode.excitation import multisine
 from livebode.experiment_design import Waveform, choose, write
 from livebode.experiments import Experiment
+from livebode.pictures import save_excitation_picture
 from livebode.records import RunRecord
-from livebode.report import save_excitation_picture
 from livebode.simulation import SimulatedAxis
 from tests.support.command import livebode, write_parquet
 from tests.support.schemas import validator

@@ -215,7 +215,7 @@ def test_a_run_that_is_ended_leaves_nothing(tmp_path: Path, number: signal.Signa
     log = write_parquet(tmp_path / "log.parquet", signals())
     before = sorted(tmp_path.rglob("*"))
     code = (
-        "import os, signal, sys; import livebode.report as r; from livebode.cli import main\n"
+        "import os, signal, sys; import livebode.pictures as r; from livebode.cli import main\n"
         # What starts the tests in the background may have told them to ignore it.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         f"r.save_pictures = lambda *a, **k: os.kill(os.getpid(), {int(number)})\n"

@@ -12,9 +12,9 @@ from playwright.sync_api import Browser
 
 from livebode.core import Event
 from livebode.dashboard import Dashboard, Serving
-from livebode.report import to_html
-from livebode.reporting.report_data import read
-from livebode.reporting.run_report import report_of
+from livebode_reports.html import to_html
+from livebode_reports.report_data import read
+from livebode_reports.run_report import report_of
 from tests.support.axe import SIZES, violations, with_axe
 from tests.support.baselines import compared
 from tests.support.browser import DESK, Tab

@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, Page
 from livebode.dashboard import Dashboard, Serving
 from livebode.language import in_language
 from livebode.records import read_notes
-from livebode.reporting import Comparison
+from livebode_reports.compare_report import Comparison
 from tests.support.browser import Tab
 from tests.support.languages import pseudo, untranslated
 from tests.support.many_runs import BEGUN, SOFTER, source_run, weeks

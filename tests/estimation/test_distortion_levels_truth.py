@@ -13,7 +13,7 @@ from livebode.core import Block, Event, Lines, PrintedTable
 from livebode.estimation import Settings, SuccessiveTrackers, Tracker
 from livebode.estimation.levels import Level, detection_bins
 from livebode.excitation import multisine, odd_lines
-from livebode.reporting.run_report import run_report
+from livebode_reports.run_report import run_report
 from tests.support.command import livebode, write_parquet
 
 RATE_HZ, WINDOW, PERIODS = 1000.0, 500, 16

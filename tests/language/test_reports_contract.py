@@ -11,9 +11,9 @@ import pytest
 from livebode.core import Event, moment
 from livebode.language import Message, in_language
 from livebode.monitoring.sentences import WHAT
-from livebode.report import to_html
-from livebode.reporting import Comparison
-from livebode.reporting.run_report import run_report
+from livebode_reports.compare_report import Comparison
+from livebode_reports.html import to_html
+from livebode_reports.run_report import run_report
 from tests.support.languages import pseudo, untranslated
 from tests.support.reports import measured, strokes, write_run
 

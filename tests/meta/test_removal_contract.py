@@ -23,13 +23,13 @@ WINGS = [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("wings/*
 _BESIDE, _NEW, _TEMPORARY = "a file beside its place", "a file in a new directory", "a file in a temporary directory"
 WRITING_MODULES = {
     _BESIDE: (
-        "cli/documents", "cli/schema_command",
+        "cli/schema_command",
         "experiment_design/files/arrays", "experiment_design/files/c_header", "experiment_design/files/delimited",
         "experiment_design/files/structured_text", "experiments/matrix_files",
         "export/delimited", "export/lpv", "export/matrix_delimited", "export/parameters", "export/universal",
         "livebode_control/strokes/angle_table", "livebode_drives/plc_command",
         "livebode_plant/cli/archive/trend_command", "livebode_plant/lake/lake",
-        "report/pdf", "tables/parquet_writer",
+        "livebode_reports/files", "livebode_reports/pdf", "tables/parquet_writer",
     ),
     _NEW: (
         "experiments/designing", "experiments/matrix_designing", "interface/example_recordings",

@@ -22,10 +22,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from livebode.core import DamageWarning, LivebodeError, RecordError
+from livebode.pictures import save, style
 from livebode.records import RunDirectory, RunRecord, query, read_bytes
 from livebode.records.segments.json_lines import to_line
 from livebode.records.summary_file import to_document
-from livebode.report import save, style
 from livebode.runtime.segmented import make_way
 from tests.support.command import livebode
 from tests.support.damaged import StopError, commands, make_runs, record_run

@@ -21,12 +21,12 @@ from livebode.core import Block, Channel, ConfigError, Event, Lines, SpectraLayo
 from livebode.monitoring import ALARMS
 from livebode.preparation.live_plan import check_spectra
 from livebode.records import RunRecord
-from livebode.reporting.report_data import read
-from livebode.reporting.verdict import verdict
 from livebode.runtime import ENDED, SUPPRESSED, Destination, TrackerResults, run
 from livebode.runtime.readiness import Readiness
 from livebode.simulation import TensionLoss
 from livebode.sources.live import Batch, encode_layout, encode_samples
+from livebode_reports.report_data import read
+from livebode_reports.verdict import verdict
 from tests.support.adjusted import (
     CHANNELS,
     OFF_S,

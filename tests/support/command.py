@@ -31,8 +31,8 @@ class Result:
 def no_pictures() -> Iterator[None]:
     """Runs end without their pictures, which take four fifths of a short one and are drawn alike for any."""
     with (
-        mock.patch("livebode.report.save_pictures", return_value=[]),
-        mock.patch("livebode.report.save_matrix_pictures", return_value=[]),
+        mock.patch("livebode.pictures.save_pictures", return_value=[]),
+        mock.patch("livebode.pictures.save_matrix_pictures", return_value=[]),
     ):
         yield
 

@@ -21,8 +21,8 @@ from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 from livebode.estimation import Tracker
 from livebode.records import RunRecord, query
-from livebode.reporting.run_report import run_report
 from livebode.runtime import Document, Fits, TrackerResults
+from livebode_reports.run_report import run_report
 from tests.support.command import livebode
 from tests.support.file_damage import damage as damage_file
 from tests.support.recorded import SETTINGS, machine

@@ -22,8 +22,8 @@ from typing import BinaryIO, Self
 from tests.support.command import no_pictures
 
 _IMPORTED = [
-    "livebode.cli.app", "livebode.cli.run_command", "livebode.cli.serving", "livebode.report.bode",
-    "livebode.report.tracking", "livebode.runtime._run", "livebode.runtime._demo", "livebode.sources.live.lines",
+    "livebode.cli.app", "livebode.cli.run_command", "livebode.cli.serving", "livebode.pictures.bode",
+    "livebode.pictures.tracking", "livebode.runtime._run", "livebode.runtime._demo", "livebode.sources.live.lines",
     "matplotlib.backends.backend_agg", "matplotlib.figure", "pyarrow.parquet", "scipy.optimize", "scipy.signal",
     "tests.support.forked", "tests.support.killed", "tests.support.killed_live",
 ]  # fmt: skip

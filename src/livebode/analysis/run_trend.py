@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis.parameter_track import MARGINS
 from livebode.arrays import Floats
 from livebode.core import OK, Event
 from livebode.records import RunRecord
 from livebode.tables import Table
 
+MARGINS = "margins"
+"""Model of the rows of a record that are margins."""
 ALARMS = ("change", "change-corrected", "baseline-unknown")
 """Kinds of the events that are alarms of the monitoring."""
 _BOUND_95 = 1.959964

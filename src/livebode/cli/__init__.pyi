@@ -1,5 +1,4 @@
 from livebode.cli.commands import Command as Command
-from livebode.cli.documents import write_documents as write_documents
 from livebode.cli.learned_baseline import baseline_text as baseline_text
 from livebode.cli.learned_baseline import check_replaceable as check_replaceable
 from livebode.cli.learned_baseline import write_baseline as write_baseline
@@ -11,6 +10,7 @@ from livebode.cli.options import Json as Json
 from livebode.cli.options import Output as Output
 from livebode.cli.options import Port as Port
 from livebode.cli.options import Rate as Rate
+from livebode.cli.options import ReportLanguage as ReportLanguage
 from livebode.cli.options import ServeFile as ServeFile
 from livebode.cli.options import Time as Time
 from livebode.cli.options import To as To
@@ -22,7 +22,6 @@ from livebode.cli.query_result import RowsMax as RowsMax
 from livebode.cli.query_result import check_form as check_form
 from livebode.cli.query_result import print_result as print_result
 from livebode.cli.remote import results_directory as results_directory
-from livebode.cli.report_options import ReportLanguage as ReportLanguage
 from livebode.cli.serving import dashboard_of as dashboard_of
 from livebode.cli.serving import print_line as print_line
 from livebode.cli.serving import wait_for_the_end as wait_for_the_end

@@ -88,14 +88,6 @@ COMMANDS: Mapping[str, Command] = {
         "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",
         "livebode.cli.learn_command:learn_command",
     ),
-    "report": Command(
-        "Write the measurement and its results as report.html and report.pdf, with the verdict on page 1.",
-        "livebode.cli.report_command:report_command",
-    ),
-    "compare": Command(
-        "Find the lines, parameters and margins that differ between two runs, with amounts and bounds.",
-        "livebode.cli.compare_command:compare_command",
-    ),
     "view": Command(
         "Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still recording.",
         "livebode.cli.view_command:view_command",

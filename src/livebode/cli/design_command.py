@@ -101,7 +101,7 @@ def working() -> AbstractContextManager[object]:
 
 
 def _draw(design: Design, path: Path) -> None:
-    from livebode.report import save_excitation_picture
+    from livebode.pictures import save_excitation_picture
 
     save_excitation_picture(design, path)
 

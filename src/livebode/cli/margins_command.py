@@ -38,8 +38,8 @@ def margins_command(
     from livebode.analysis import loop_of_run
     from livebode.cli.picture_support import can_draw, tell_how_to_draw
     from livebode.configuration import Axis, FitSection
+    from livebode.pictures import save_loop_picture
     from livebode.records import to_json
-    from livebode.report import save_loop_picture
 
     given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
     section = FitSection.model_validate(given) if given else None

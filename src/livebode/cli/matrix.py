@@ -23,7 +23,7 @@ def drawing_matrix(axis: Axis) -> Draw:
         responses = estimate.drawn or estimate.newest
         if responses is None or not can_draw():
             return
-        from livebode.report import save_matrix_pictures
+        from livebode.pictures import save_matrix_pictures
 
         with one_drawing_at_a_time():
             save_matrix_pictures(responses, into, title=axis.source.title)

@@ -44,7 +44,7 @@ def design_several(
 
 
 def _draw(design: MatrixDesign, path: Path) -> None:
-    from livebode.report import save_matrix_excitation_picture
+    from livebode.pictures import save_matrix_excitation_picture
 
     save_matrix_excitation_picture(design, path)
 

@@ -106,6 +106,6 @@ def _stopping() -> Iterator[tuple[StopRequest, list[int]]]:
 
 
 def _draw(design: Design, path: Path) -> None:
-    from livebode.report import save_excitation_picture
+    from livebode.pictures import save_excitation_picture
 
     save_excitation_picture(design, path)

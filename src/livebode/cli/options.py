@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from livebode.core import UsageError
+from livebode.language import available
 
 Excitation = Annotated[
     str | None, typer.Option(metavar="CHANNEL", help="Channel of the excitation w, or an expression.")
@@ -72,8 +73,6 @@ Serve = Annotated[bool, typer.Option("--serve", help="Show the run in a browser 
 
 def known_language(code: str | None) -> str | None:
     """The code of a language; UsageError for another one."""
-    from livebode.language import available
-
     if code is not None and code not in available():
         raise UsageError(
             "not-one-of",
@@ -84,3 +83,13 @@ def known_language(code: str | None) -> str | None:
             allowed=list(available()),
         )
     return code
+
+
+ReportLanguage = Annotated[
+    str | None,
+    typer.Option(
+        "--language", metavar="CODE", callback=known_language,
+        help=f"Language of the document: {', '.join(available())}. Terminal and JSON output are English. "
+        "\\[default: that of the \\[report], or en]",
+    ),
+]  # fmt: skip

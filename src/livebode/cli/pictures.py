@@ -38,7 +38,7 @@ def drawing(title: str, names: tuple[str, str]) -> Draw:
         responses = estimate.overview.responses()
         if not len(responses) or not can_draw():
             return
-        from livebode.report import save_pictures  # with Matplotlib half a second to import
+        from livebode.pictures import save_pictures  # with Matplotlib half a second to import
 
         schedule, fitted = estimate.schedule_label, estimate.fit
         with _ONE_AT_A_TIME:
@@ -66,7 +66,7 @@ def _load_matplotlib() -> None:
 
 def show(outcome: Outcome) -> None:
     """Print the Bode plot and the results of a run."""
-    from livebode.report import terminal_bode
+    from livebode.pictures import terminal_bode
 
     size = get_terminal_size((100, 30))
     print_drawn(

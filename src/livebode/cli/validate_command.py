@@ -113,7 +113,7 @@ def _picture(found: list[Validation], directory: Path, on: Path) -> Path | None:
 
     if not can_draw():
         return None
-    from livebode.report import save_validation_picture
+    from livebode.pictures import save_validation_picture
 
     into = results_directory(directory)
     with writing(into, RecordError):

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal
 
+from livebode.core.errors.extra import ExtraError
 from livebode.language import Message
+from livebode.plugins import loaded, named
 
 Paper = Literal["a4", "letter"]
 
@@ -153,3 +155,25 @@ class Document:
         first = (self.picture,) if self.picture is not None else ()
         sections = (*self.sections, *self.appendix)
         return (*first, *(p for section in sections for p in section.parts if isinstance(p, Picture)))
+
+
+def document_function(name: str) -> Any:
+    """What a plug-in makes of documents: the part of this name in its table.
+
+    `files` writes a Document as HTML and PDF: (document, path, *, force) → files and a remark. `comparison` makes a
+    page of two runs: (before, after, language) → HTML.
+
+    Raises
+    ------
+    ExtraError
+        If no installed plug-in has it.
+    """
+    reference = named("documents").get(name)
+    if reference is None:
+        raise ExtraError(
+            "not-installed",
+            "documents are made by the wing reports of livebode, which is not installed",
+            "install the wing reports of livebode",
+            package="livebode_reports",
+        )
+    return loaded(reference)

@@ -10,7 +10,6 @@ from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +20,14 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from livebode.core import LivebodeError, ServerError, UsageError
+from livebode.core import LivebodeError, ServerError, UsageError, document_function
 from livebode.dashboard.access import Access, Role, error_answer
 from livebode.dashboard.board import Board
 from livebode.dashboard.guard import body
 from livebode.dashboard.matrix_view import views_of
 from livebode.dashboard.queries import json_object
 from livebode.dashboard.run_catalogue import RunCatalogue, details
-from livebode.language import Message, in_language, negotiated
+from livebode.language import Message, negotiated
 from livebode.records import Notes, delete, to_json, write_notes
 
 NAME_LETTERS_MAX = 255
@@ -308,17 +307,9 @@ class RunsPages:
             await page(scope, receive, send)
 
     def _compared(self, before: Path, after: Path, code: str) -> str:
-        from livebode.configuration import recorded_report
-        from livebode.records import read_summary
-        from livebode.report import to_html
-        from livebode.reporting import comparison_of, trusted
-
         key = code, *((path.name, (path / "run.json").stat().st_mtime_ns) for path in (before, after))
         if key not in self._comparisons:
-            with in_language(code):
-                found = comparison_of(before, after).of(before, after)
-                header = trusted(recorded_report(read_summary(after)[0]), after)
-                self._comparisons[key] = to_html(found.document(datetime.now(UTC), header=header))
+            self._comparisons[key] = document_function("comparison")(before, after, code)
             while len(self._comparisons) > _COMPARISONS_MAX:
                 self._comparisons.popitem(last=False)
         return self._comparisons[key]

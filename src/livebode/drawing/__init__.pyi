@@ -17,4 +17,5 @@ from livebode.drawing.plane import draw_nichols as draw_nichols
 from livebode.drawing.plane import draw_nyquist as draw_nyquist
 from livebode.drawing.scales import frequency_axis as frequency_axis
 from livebode.drawing.ticks import frequency_label as frequency_label
+from livebode.drawing.ticks import line_ticks as line_ticks
 from livebode.drawing.ticks import linear_ticks as linear_ticks

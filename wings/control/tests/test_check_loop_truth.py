@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from livebode.reporting.report_data import read
 from livebode_control.loop_check.run_loop_check import check_loop_of_run
+from livebode_reports.report_data import read
 from tests.support.command import livebode
 from tests.support.loop_runs import AXIS, record
 

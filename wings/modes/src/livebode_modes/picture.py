@@ -11,7 +11,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.language import numerals, tr, trn
-from livebode.report import (
+from livebode.pictures import (
     Style,
     clock,
     drawing,

@@ -17,7 +17,7 @@ from livebode.configuration import Axis
 from livebode.core import counted
 from livebode.drawing import linear_ticks
 from livebode.locations import original
-from livebode.report import Canvas, Scale, clock, written
+from livebode.pictures import Canvas, Scale, clock, written
 from livebode.runtime import Draw, Outcome
 from livebode_modes.curves import ModeCurve, mode_curves
 

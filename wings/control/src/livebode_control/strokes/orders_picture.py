@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from livebode.report import drawing, heading, new_figure, save, style
+from livebode.pictures import drawing, heading, new_figure, save, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

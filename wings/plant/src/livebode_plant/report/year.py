@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.language import tr
-from livebode.report import Style, drawing, heading, new_figure, plain, shortened, style
+from livebode.pictures import Style, drawing, heading, new_figure, plain, shortened, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

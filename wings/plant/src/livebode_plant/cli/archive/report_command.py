@@ -31,7 +31,7 @@ def report_command(
     It contains alarms of recordings that were compared with a baseline, significant changes in words, pictures of the
     worst machines, machines without data, and what was not assessed and why. The PDF needs the extra `pdf`.
     """
-    from livebode.cli import write_documents
+    from livebode.core import document_function
     from livebode.language import in_language
     from livebode.records import to_json
     from livebode_plant.archive.contents import alarms_of, path_of, quarantine
@@ -46,7 +46,7 @@ def report_command(
     title = name or of.below or Path(lake.url).name
     hall = Hall(title, assess(histories(lake, of), limit), bad, limit, *alarms_of(lake, of))
     with in_language(language or "en"):
-        files, remark = write_documents(hall.document(datetime.now(UTC)), out, force=force)
+        files, remark = document_function("files")(hall.document(datetime.now(UTC)), out, force=force)
     if as_json:
         print(to_json({"files": list(map(str, files))} | hall.plain()))
         return

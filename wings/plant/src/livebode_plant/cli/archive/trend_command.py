@@ -161,8 +161,8 @@ def _write(of: Assessment, out: Path, *, dark: bool, force: bool) -> None:
     if out.suffix.lower() == ".csv":
         save(out, lambda partial: _write_csv(of, partial), force=force)
         return
-    from livebode.report import save as write_picture
-    from livebode.report import style
+    from livebode.pictures import save as write_picture
+    from livebode.pictures import style
     from livebode_plant.report.trend_words import year_of
     from livebode_plant.report.year import year_figure
 

@@ -1,0 +1,114 @@
+"""A Bode plot in characters, for the terminal at the end of a run: lines of Braille dots, a circle at each line.
+
+docs/decisions/0003-terminal-plot.md has the reasons for drawing it here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from livebode.arrays import Floats
+from livebode.core import Responses, counted
+from livebode.drawing import ticks
+from livebode.pictures import words
+from livebode.pictures.canvas import Canvas, Scale, written
+from livebode.pictures.summary import Summary, summarised
+
+_WIDTH_MIN, _HEIGHT_MIN = 40, 16
+
+
+def terminal_bode(
+    responses: Responses, width: int = 80, height: int = 24, colour: bool = True, unicode: bool = True
+) -> str:
+    """Magnitude in dB above phase in degrees over logarithmic frequency: the medians over the run, as text.
+
+    Parameters
+    ----------
+    width, height
+        Columns and lines of the terminal; the text is never wider or higher. Below 40 × 16, and if no response is
+        valid or all are 0, one sentence replaces the plot.
+    colour
+        Whether to use ANSI colours.
+    unicode
+        False uses only ASCII, for terminals whose encoding is not UTF-8.
+    """
+    summary = summarised(responses)
+    middle = f"{words.quantity(responses)}: median of {counted(summary.count, 'response')} with a valid line"
+    if not summary.count:
+        middle = f"{words.quantity(responses)}: no valid response"
+    caption = written(f"{middle}, {words.lines_phrase(responses)}", width, unicode)
+    drawn = summary.count and all(np.isfinite(of[1]).any() for of in (summary.magnitude_db, summary.phase_deg))
+    if width < _WIDTH_MIN or height < _HEIGHT_MIN or not drawn:  # a response of 0 has neither dB nor degrees
+        return caption
+    picture = _picture(summary, width, height - 1, colour, unicode)
+    if not unicode:
+        picture = written(picture)
+    return f"{caption}\n{picture}"
+
+
+def _picture(summary: Summary, width: int, height: int, colour: bool, unicode: bool) -> str:
+    magnitude_db, phase_deg = summary.magnitude_db[1], summary.phase_deg[1]
+    upper = -(-(height - 1) * 5 // 9)  # the lower panel has one more line, the label of the frequency
+    most = max((upper - 2) // 2, 2)
+    ranges = [_range(magnitude_db, 1.0), _range(phase_deg, 5.0)]
+    ticks_at = [ticks.linear_ticks(*ranges[0], most=most), ticks.phase_ticks(*ranges[1], most=max(most - 1, 2))]
+    labels = [[f"{t:g}" for t in at] for at in ticks_at]
+    margin = max(len(label) for panel in labels for label in panel)
+    columns = width - margin - 2
+    frequency = _frequency_scale(summary, columns)
+    unit = words.magnitude_label(summary.responses, columns)
+    lines: list[str] = []
+    for values, title, rows, limits, at in (
+        (magnitude_db, unit, upper - 3, ranges[0], dict(zip(ticks_at[0], labels[0]))),
+        (phase_deg, "phase in degrees", height - upper - 4, ranges[1], dict(zip(ticks_at[1], labels[1]))),
+    ):
+        canvas = Canvas.blank(rows, columns)
+        level = Scale(limits[1], limits[0], rows)
+        _curve(canvas, frequency, level, summary.responses.lines.frequency_hz, values)
+        marked = {level.cell(tick): label for tick, label in at.items()}
+        lines.append(written(title, width, unicode).center(width).rstrip())
+        for row in range(rows):
+            side = f"{marked.get(row, ''):>{margin}}{'┤' if row in marked else '│'}"
+            lines.append(f"{side}{canvas.row(row, colour, unicode)}│")
+        lines += _frequency_axis(summary, frequency, margin)
+    return "\n".join([*lines, "frequency in Hz".center(width).rstrip()])
+
+
+def _frequency_scale(summary: Summary, columns: int) -> Scale:
+    low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
+    return Scale(float(np.log10(low_hz)), float(np.log10(high_hz)), columns)
+
+
+def _frequency_axis(summary: Summary, scale: Scale, margin: int) -> list[str]:
+    """The lower edge of a panel with ticks at round frequencies, and their numbers as far as there is room."""
+    edge, numbers = ["─"] * scale.cells, ""
+    low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
+    most = max(3, min(10, scale.cells // 9))
+    for tick_hz in ticks.line_ticks(summary.responses.lines.frequency_hz, low_hz, high_hz, most=most):
+        at, label = scale.cell(float(np.log10(tick_hz))), ticks.frequency_label(tick_hz)
+        edge[at] = "┬"
+        begin = min(at - (len(label) - 1) // 2, scale.cells - len(label))
+        if begin > len(numbers) or not numbers:
+            numbers = numbers.ljust(begin) + label
+    return [" " * margin + f"└{''.join(edge)}┘", " " * (margin + 1) + numbers]
+
+
+def _curve(canvas: Canvas, frequency: Scale, level: Scale, frequency_hz: Floats, values: Floats) -> None:
+    """Draw the curve, interrupted at lines without a value, and a circle at each line if they are few."""
+    known = np.isfinite(values)
+    across = frequency.dot(np.log10(frequency_hz), 2)
+    down = level.dot(np.where(known, values, level.begin), 4)
+    canvas.dots[down[known], across[known]] = True
+    for i in np.flatnonzero(known[1:] & known[:-1]):
+        ends = np.array([down[i : i + 2], across[i : i + 2]])
+        share = np.linspace(0, 1, int(np.abs(np.diff(ends)).max()) + 1)
+        canvas.dots[tuple(np.rint(ends[:, :1] + np.diff(ends) * share).astype(int))] = True
+    if np.count_nonzero(known) <= frequency.cells // 4:
+        canvas.circles[down[known] // 4, across[known] // 2] = True
+
+
+def _range(values: Floats, least: float) -> tuple[float, float]:
+    known = values[np.isfinite(values)]
+    low, high = float(known.min()), float(known.max())
+    margin = max(0.06 * (high - low), least)
+    return low - margin, high + margin

@@ -1,0 +1,1 @@
+"""Reports of one run and comparisons of two, as HTML and PDF."""

@@ -1,0 +1,45 @@
+"""The documents of `livebode report` and `livebode compare`: one HTML file, and a PDF if Typst is installed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from livebode.core import Document, OutputError, install_command
+
+_NO_PDF = "no PDF: Typst is not installed; run {}, or print the page from a browser"
+
+
+def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list[Path], str]:
+    """Write `out` with .html and, if possible, .pdf, each completely or not at all; return the files and a remark.
+
+    Raises
+    ------
+    OutputError
+        If a file exists and must not be replaced, or cannot be written.
+    """
+    from livebode.export import save
+    from livebode_reports.html import to_html
+    from livebode_reports.svg import pictures_svg
+
+    base = out.with_suffix("") if out.suffix.lower() in (".html", ".pdf") else out
+    page, paper = (base.with_name(base.name + ending) for ending in (".html", ".pdf"))
+    if not force and paper.exists():
+        raise OutputError(
+            "exists",
+            f"{str(paper)!r} exists already",
+            "choose another --out, or replace it with --force",
+            path=str(paper),
+        )
+    drawn = pictures_svg(document)
+    save(page, lambda partial: partial.write_text(to_html(document, drawn), encoding="utf-8"), force=force)
+    try:
+        from livebode_reports.pdf import save_pdf
+    except ImportError:
+        return [page], _NO_PDF.format(install_command("pdf"))
+    try:
+        save(paper, lambda partial: save_pdf(document, partial, drawn), force=force)
+    except OutputError as error:
+        if error.code == "output.no-font":
+            return [page], f"no PDF: {error}"
+        raise
+    return [page, paper], ""

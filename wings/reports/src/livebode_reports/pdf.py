@@ -1,0 +1,150 @@
+"""A document as PDF/A-2a and PDF/UA-1: an archive can keep it, and a screen reader reads it (extra `pdf`: Typst).
+
+Typst refuses to write a file that does not conform. The layout is report.typ, which gets the document as JSON: text
+from data is never read as markup.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import typst
+
+from livebode.core import Document, Finding, Listing, OutputError, Paragraph, Part, Picture, PrintedTable, Section
+from livebode.language import current_language, worded
+from livebode.pictures import LIGHT, columns
+from livebode_reports.html import readable
+from livebode_reports.page_style import TONE_COLOURS
+from livebode_reports.pdf_fonts import Letters, letters_of
+from livebode_reports.svg import pictures_svg
+
+STANDARDS = ("a-2a", "ua-1")
+_SHORT, _LETTERS_MAX = 24, 60  # letters of a column, when the widths of a table's columns are shared out
+
+
+def save_pdf(document: Document, path: Path, drawn: tuple[str, ...] | None = None) -> None:
+    """Write the document; the same document gives the same bytes.
+
+    Parameters
+    ----------
+    document
+        The report.
+    path
+        The file.
+    drawn
+        The pictures, as from `pictures_svg`, if they are drawn already.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    OutputError
+        If no font of this computer has the letters of the language, or the content cannot be archived.
+    """
+    svgs = pictures_svg(document) if drawn is None else drawn
+    written = json.dumps(_Data(document).plain(), ensure_ascii=False)
+    letters = letters_of(written + "".join(svgs))
+    # Paths of the machine do not appear in the file: all names are relative to the folder.
+    contents = {f"{i}.svg": letters.known(svg).encode() for i, svg in enumerate(svgs)} | {
+        "document.json": letters.known(written).encode(),
+        "main.typ": (files("livebode_reports") / "report.typ").read_bytes(),
+    }
+    if document.logo is not None:
+        contents[f"logo.{document.logo.kind}"] = document.logo.data
+    path.write_bytes(_compiled(contents, letters, int(document.made.timestamp())))
+
+
+def _compiled(contents: dict[str, bytes], letters: Letters, made_s: int) -> bytes:
+    """The PDF of main.typ in these files."""
+    compile_pdf: Any = typst.compile
+    fonts = {"fonts": json.dumps(letters.fonts), "fixed_fonts": json.dumps(letters.fixed_fonts)}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, data in contents.items():
+            (folder / file).write_bytes(data)
+        try:
+            found = compile_pdf(
+                folder / "main.typ", root=folder, font_paths=list(letters.folders), ignore_system_fonts=True,
+                sys_inputs=fonts, pdf_standards=list(STANDARDS), timestamp=made_s,
+            )  # fmt: skip
+        except typst.TypstError as error:
+            raise _not_archivable(error) from None
+    return bytes(found)
+
+
+def _not_archivable(error: typst.TypstError) -> OutputError:
+    return OutputError(
+        "not-archivable",
+        f"the report cannot be written as PDF/A: {error.message}",
+        "print the page from a browser, and report this",
+        hints=list(error.hints),
+    )
+
+
+class _Data:
+    """The document as plain data for report.typ."""
+
+    def __init__(self, document: Document) -> None:
+        self._of = document
+        self._files = {id(picture): f"{i}.svg" for i, picture in enumerate(document.pictures)}
+
+    def plain(self) -> dict[str, Any]:
+        of, text = self._of, readable
+        lang, _, region = current_language().code.partition("-")
+        logo = None if of.logo is None else {"file": f"logo.{of.logo.kind}", "text": text(of.logo.text)}
+        return {
+            "name": text(f"{of.title}: {of.kind}"), "author": "livebode", "paper": _PAPERS[of.paper], "lang": lang,
+            "region": region or None,
+            "colours": {"ink": LIGHT.ink, "muted": LIGHT.muted, "grid": LIGHT.grid},
+            "tone_colours": TONE_COLOURS, "subject": text(of.kind), "title": _heading(of.title), "foot": text(of.foot),
+            "heading": _heading(of.heading), "facts": [list(map(text, pair)) for pair in of.facts], "logo": logo,
+            "verdict": [self._finding(f) for f in of.verdict], "result": [self._finding(f) for f in of.result],
+            "picture": None if of.picture is None else self._part(of.picture),
+            "signatures": list(map(text, of.signatures)),
+            "sections": [self._section(section) for section in of.sections],
+            "appendix": [self._section(section) for section in of.appendix],
+        }  # fmt: skip
+
+    def _finding(self, finding: Finding) -> dict[str, str]:
+        word = readable(worded(self._of.tones[finding.tone]))
+        return {"tone": finding.tone, "word": word, "text": readable(finding.text)}
+
+    def _section(self, section: Section) -> dict[str, Any]:
+        return {"title": _heading(section.title), "parts": [self._part(part) for part in section.parts]}
+
+    def _part(self, part: Part) -> dict[str, Any]:
+        text = readable
+        if isinstance(part, Paragraph):
+            return {"kind": "paragraph", "text": text(part.text)}
+        if isinstance(part, Listing):
+            return {"kind": "listing", "text": text(part.text)}
+        if isinstance(part, Picture):
+            caption = text(part.caption)
+            return {"kind": "picture", "file": self._files[id(part)], "caption": caption}
+        headings = list(map(text, part.headings)) if any(part.headings) else []
+        rows = [list(map(text, row)) for row in part.rows]
+        return {
+            "kind": "table", "headings": headings, "rows": rows, "numbers": list(part.numbers),
+            "note": text(part.note), "widths": _widths(part),
+        }  # fmt: skip
+
+
+def _heading(text: str) -> str:
+    """PDF/UA permits no empty heading."""
+    return readable(text).strip() or "—"
+
+
+_PAPERS = {"a4": "a4", "letter": "us-letter"}
+
+
+def _widths(table: PrintedTable) -> list[int]:
+    """Shares of the page for the columns; 0 for a column that is as wide as its text, beside one with long texts."""
+    every = [table.headings, *table.rows]
+    letters = [max(columns(texts[i]) for texts in every) for i in range(len(table.headings))]
+    if max(letters, default=0) > _SHORT:
+        return [0 if n <= _SHORT else min(n, _LETTERS_MAX) for n in letters]
+    return [max(n + 2, 6) for n in letters]

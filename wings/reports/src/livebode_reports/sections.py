@@ -1,0 +1,317 @@
+"""The sections of a run's report, one function each."""
+
+from __future__ import annotations
+
+from math import isfinite, isinf, isnan
+from typing import Any
+
+import numpy as np
+
+from livebode.analysis import MARGINS, LoopReport
+from livebode.core import Listing, Paragraph, Part, Picture, PrintedTable, Section, moment, with_bound
+from livebode.fitting import Fit
+from livebode.language import Message, listed, number, tr, worded
+from livebode.margins import WORDS
+from livebode_reports.alarms import alarms
+from livebode_reports.parameter_track import Track
+from livebode_reports.report_data import ReportData, RunData, by_schedule
+from livebode_reports.wording import (
+    BOUND_95,
+    line_table,
+    lines_of,
+    pairs,
+    polar_rows,
+    share,
+    to_toml,
+)
+
+_PANELS, _CURVES = 8, 700  # parameters that are drawn, and responses per curve
+_TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and responses per trace
+
+
+def average(of: ReportData) -> Picture:
+    """The mean with its bounds and the fitted model: the picture of the first page."""
+    one = of.of.response
+    names = (of.channels["input"], of.channels["output"]) if {"input", "output"} <= of.channels.keys() else None
+    caption = tr(
+        "Bars: {what}, with 95 % bounds. Light: range of 5–95 % of the single responses{thinned}.",
+        what=worded(of.of.words), thinned=_drawn(of, len(of.of.overview)),
+    )  # fmt: skip
+    if of.fit:
+        caption += tr(" Dashed: the {model} model fitted to it.", model=worded(of.fit.model.name))
+    return Picture("bode", {"responses": of.of.overview, "mean": one, "names": names, "fitted": of.fit}, caption)
+
+
+def response(of: ReportData) -> Section:
+    """The mean at each line, with its bounds."""
+    one = of.of.response
+    frequency = one.lines.frequency_hz
+    rows = [
+        (number(f, "g"), *polar, number(c, ".4f") if isfinite(c) else "—", share(n, of.of.count))
+        for f, polar, c, n in zip(frequency, polar_rows(one, BOUND_95), one.coherence, of.of.valid)
+    ]
+    headings = ("Hz", f"dB{_re(of)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid"))
+    return Section(tr("Frequency response"), (line_table(headings, rows),))
+
+
+def tracking(of: ReportData) -> Section:
+    """Magnitude of the lines over time and over the schedule, if there is one."""
+    shown = of.of.overview
+    if len(shown.lines) <= _TRACES_MAX:
+        shown = shown[:: -(-len(shown) // _TRACED)]
+    thinned = _drawn(of, len(shown))
+    caption = tr("Magnitude at each line over time, with 99.7 % bounds{thinned}.", thinned=thinned)
+    if by_schedule(of.of):
+        schedule = of.channels.get("schedule", tr("the schedule"))
+        caption = tr(
+            "Magnitude at each line over time and over {schedule}, with 99.7 % bounds{thinned}.",
+            schedule=schedule, thinned=thinned,
+        )  # fmt: skip
+    data = {"responses": shown, "schedule_name": of.channels.get("schedule", "")}
+    return Section(tr("Tracking"), (Picture("tracking", data, caption),))
+
+
+def parameters(of: ReportData) -> Section | str:
+    """Fitted parameters: of the mean, newest, and over time."""
+    tracks = [t for t in of.tracks.values() if t.model != MARGINS]
+    if of.fit is None and not tracks:
+        return of.fit_words
+    parts: list[Part] = []
+    newest = tracks[0].newest if tracks else {}
+    units = {name: unit for name, _, _, unit in of.fit.rows()} if of.fit else {}
+    fitted = {name: (value, bound) for name, value, bound, _ in of.fit.rows()} if of.fit else {}
+    rows = []
+    for name in dict.fromkeys([*fitted, *newest]):
+        now = newest.get(name)
+        mean = with_bound(*fitted[name]) if name in fitted else (tr("fixed") if now and not now.sigma else "—", "")
+        late = with_bound(now.value, 1.96 * now.sigma) if now else ("—", "")
+        rows.append(
+            (worded(name.replace("_", " ")), *mean, *late, worded(units.get(name) or (now.unit if now else "")))
+        )
+    note = tr("± covers 95 % if the model is complete.")
+    if of.fit:
+        note = tr("Of the mean: {bounds}.", bounds=worded(of.fit.about_bounds))
+    at = next((n.time_s for n in newest.values()), float("nan"))
+    late_at = tr("newest, at {time}", time=moment(at, 2)) if newest else tr("newest")
+    headings = ("", tr("of the mean"), "±", late_at, "±", tr("unit"))
+    parts.append(Paragraph(of.fit_words if of.fit is None else _fitted(of.fit, of.fit_words)))
+    parts.append(PrintedTable(headings, tuple(rows), (1, 2, 3, 4), note))
+    parts.extend(_over_time(of, track, tr("Parameters")) for track in tracks if _moving(track))
+    return Section(tr("Parameters"), tuple(parts))
+
+
+def _fitted(fit: Fit, what: str) -> str:
+    low, high = fit.band_hz
+    values = {
+        "model": worded(fit.model.name), "what": worded(what), "lines": lines_of(fit.lines), "low": low,
+        "high": high, "percent": 100 * fit.epsilon, "chi2": fit.chi2,
+    }  # fmt: skip
+    if isfinite(fit.chi2):
+        return tr(
+            "The {model} model, fitted to {what}, at {lines} from {low:g} to {high:g} Hz. Model error ε = "
+            "{percent:.2g} % of |G|; reduced χ² {chi2:.3g} from sigma alone.",
+            **values,
+        )
+    return tr(
+        "The {model} model, fitted to {what}, at {lines} from {low:g} to {high:g} Hz. Model error ε = "
+        "{percent:.2g} % of |G|.",
+        **values,
+    )
+
+
+def motion(of: ReportData) -> Section | None:
+    """The model of the axis in motion; None if the run was not corrected for motion."""
+    model = of.run.found.get("motion", {}).get("model")
+    if model is None:
+        return None
+    words = tr(
+        "The newest chunk's model: Js {inertia:.5g} kg m², mL {load:.5g} kg; by position:",
+        inertia=model["inertia_kg_m2"], load=model["load_kg"],
+    )  # fmt: skip
+    columns = zip(model["position_m"], model["stiffness_n_per_m"], model["damping_n_s_per_m"])
+    rows = tuple((number(x, ".4g"), number(k, ".5g"), number(b, ".4g")) for x, k, b in columns)
+    table = PrintedTable((tr("position in m"), tr("Keff in N/m"), tr("bs in N s/m")), rows, (0, 1, 2))
+    return Section(tr("Motion"), (Paragraph(words), table))
+
+
+def margins(of: ReportData) -> Section | str:
+    """The margins of the loop, with bounds and frequencies."""
+    if of.loop is None:
+        return of.loop_words
+    if of.loop.message:
+        return tr("No margins: {why}.", why=worded(of.loop.message))
+    found = of.loop.margins
+    bound = found.bound()[0]
+    rows = []
+    for i, (name, unit) in enumerate(zip(found.names, found.units)):
+        value, at = found.value[0, i], found.frequency_hz[0, i]
+        if isnan(at):
+            size = tr("any amount") if isinf(value) else tr("none")
+            rows.append((worded(WORDS[name]), size, "", worded(unit), "", tr("no crossing")))
+            continue
+        between = found.place[0, i] == "interpolated"
+        mark = tr("between the lines") if between else tr("EXTRAPOLATED: no line checks it")
+        rows.append((worded(WORDS[name]), *with_bound(value, bound[i]), worded(unit), number(at, ".4g"), mark))
+    headings = (tr("margin"), tr("value"), "±", tr("unit"), tr("at Hz"), tr("range"))
+    table = PrintedTable(headings, tuple(rows), (1, 2, 4), _about_margins(of.loop, of.fit))
+    caption = tr(
+        "Open loop L of the fit with its 95 % band, and the measured lines. Right: near −1, with the circle of Ms."
+    )
+    parts: list[Part] = [table, Picture("loop", {"found": of.loop}, caption)]
+    if MARGINS in of.tracks and _moving(of.tracks[MARGINS]):
+        parts.append(_over_time(of, of.tracks[MARGINS], tr("Margins")))
+    return Section(tr("Margins of the loop"), tuple(parts))
+
+
+def _about_margins(loop: LoopReport, fit: Fit | None) -> str:
+    size, around, at_hz = loop.at_lines
+    about = "" if fit is None else tr("Of the fit: {bounds}. ", bounds=worded(fit.about_bounds))
+    return about + tr(
+        "From the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} (at {at:g} Hz). Tuning "
+        "{verdict}: {sentence}",
+        size=size, around=around, at=at_hz, verdict=worded(loop.tuning.verdict),
+        sentence=worded(loop.tuning.sentence),
+    ) + " " + _about_description(loop)  # fmt: skip
+
+
+def _about_description(loop: LoopReport) -> str:
+    """Whether the margins are of a loop whose description was checked."""
+    if loop.checked.verdict == "not checked":
+        return tr("The description of the controllers was not compared with the signals (livebode check-loop).")
+    if loop.checked.verdict == "as described":
+        return tr("The description of the controllers was compared with the signals: the loop is as described.")
+    return tr(
+        "The description of the controllers was compared with the signals and does not fit, so the margins are wrong: "
+        "{what}.",
+        what=loop.checked.sentence,
+    )
+
+
+def events(of: RunData) -> Section:
+    """Alarms and other events."""
+    monitoring = of.run.summary.get("monitoring", {})
+    words = alarms(of.run, of.event_summary)[0].text
+    if name := monitoring.get("baseline"):
+        version = monitoring.get("baseline_id")
+        named = f"{name} ({version})" if version else str(name)
+        words += " " + tr(
+            "Baseline {baseline}, judged by {judge}; mean time between false alarms: {days} days of motion or more.",
+            baseline=named, judge=worded(str(monitoring.get("judged_by", "—"))),
+            days=monitoring.get("false_alarm_interval_days", "—"),
+        )  # fmt: skip
+        if covariates := monitoring.get("covariates"):
+            words += " " + tr("Covariates: {names}.", names=listed(covariates))
+    return Section(tr("Alarms and events"), (Paragraph(words), *of.event_summary.parts()))
+
+
+def quality(of: RunData) -> Section:
+    """Gaps, bad samples and invalid responses."""
+    counts, extent = of.run.summary.get("counts", {}), of.extent
+    rows = [
+        (tr("samples"), number(of.samples, ",")),
+        *((worded(words), number(counts[key], ",")) for key, words in _COUNTS.items() if counts.get(key) is not None),
+        (tr("responses"), number(extent.count, ",")),
+        (tr("with an invalid line"), f"{number(extent.incomplete, ',')} ({share(extent.incomplete, extent.count)})"),
+    ]
+    table = pairs(rows)
+    parts: list[Part] = [table]
+    if "counts" not in of.run.summary:
+        parts.append(Paragraph(tr("The counts of samples are written at the end of the run.")))
+    return Section(tr("Data quality"), tuple(parts))
+
+
+def source_state(of: RunData) -> Section | None:
+    """The state of the source at the end, and the speed; None if neither was recorded."""
+    parts: list[Part] = []
+    if source := of.run.summary.get("source"):
+        parts.append(pairs([(worded(_SOURCE.get(key, key)), _plain(value)) for key, value in source.items()]))
+    if (speed := of.run.summary.get("speed")) is not None:
+        words = tr(
+            "{recorded:.4g} s of signals were tracked in {run:.3g} s ({times:.3g} times real time).",
+            recorded=speed["recorded_s"], run=speed["run_s"], times=speed["times_real_time"],
+        )  # fmt: skip
+        parts.append(Paragraph(words))
+    return Section(tr("Source"), tuple(parts)) if parts else None
+
+
+_COUNTS = {
+    "gaps": Message("gaps"), "missing": Message("missing samples"),
+    "non-finite": Message("samples that are not finite"),
+    "implausible": Message("implausibly large samples"), "spike": Message("spikes"),
+}  # fmt: skip
+_SOURCE = {
+    "connected": Message("connected at the end"), "lost": Message("lost samples"), "silent_s": Message("silent, s"),
+    "measured_hz": Message("rate of arrival, Hz"), "clock_offset_s": Message("sender's clock at sample 0"),
+    "latency_s": Message("latency, s"), "waiting_bytes": Message("bytes waiting"), "waiting_s": Message("backlog, s"),
+    "first_sample": Message("first sample"), "counts": Message("events"),
+}  # fmt: skip
+
+
+def validation(of: ReportData) -> Section | str:
+    """Validation of the model on independent data, or why there is none."""
+    if of.judged is None:
+        return tr("No validation: the model was not tested on independent data. Use `livebode report RUN --on LOG`.")
+    parts: list[Part] = [Paragraph(f"{worded(v.sentence)}.") for v in of.judged.found]
+    rows = tuple(
+        (
+            worded(v.model), c.name, f"{number(100 * c.share, '.0f')} %", number(c.largest, ".3g"),
+            number(c.p, ".2g"), tr("yes") if c.name in v.judged_by else tr("no"),
+        )
+        for v in of.judged.found
+        for c in v.correlations
+    )  # fmt: skip
+    headings = (tr("model"), tr("ε with"), tr("lags inside"), tr("largest"), tr("joint p"), tr("counts"))
+    parts.append(PrintedTable(headings, rows, (2, 3, 4), " ".join(f"{worded(n)}." for n in of.judged.notes)))
+    caption = tr(
+        "On {recording}: measured and simulated output, and the residual's correlations with their limits.",
+        recording=of.judged.on,
+    )
+    parts.append(Picture("validation", {"found": of.judged.found, "folded": True}, caption))
+    return Section(tr("Validation"), tuple(parts))
+
+
+def settings(of: RunData) -> Section:
+    """The complete configuration as TOML, with all defaults."""
+    return Section(tr("Settings"), (Listing(to_toml(of.configuration) or "# none"),))
+
+
+def versions(of: RunData) -> Section:
+    """Versions of the software."""
+    rows = [(name.replace("_", " "), str(value)) for name, value in of.run.summary.get("versions", {}).items()]
+    return Section(tr("Versions"), (pairs(rows),))
+
+
+def _over_time(of: ReportData, track: Track, what: str) -> Picture:
+    names = [name for name in track.values if np.isfinite(track.values[name]).any() and track.newest[name].sigma > 0]
+    shown = [name for name in names if not name.endswith("_frequency")][:_PANELS]
+    every = slice(None, None, -(-len(track.time_s) // _CURVES))
+    time_s = track.time_s[every]
+    data = {
+        "time_s": time_s,
+        "curves": [(n, track.newest[n].unit, track.values[n][every], 1.96 * track.sigmas[n][every]) for n in shown],
+    }
+    thinned = _drawn(of, len(time_s))
+    caption = tr("{what} over time, with 95 % bounds{thinned}.", what=what, thinned=thinned)
+    return Picture("parameters", data, caption)
+
+
+def _moving(track: Track) -> bool:
+    return any(np.count_nonzero(np.isfinite(v)) > 1 and track.newest[n].sigma > 0 for n, v in track.values.items())
+
+
+def _drawn(of: ReportData, kept: int) -> str:
+    return tr(" (thinned: {kept:,} of {all:,} responses)", kept=kept, all=of.of.count) if kept < of.of.count else ""
+
+
+def _re(of: ReportData) -> str:
+    return tr(" re 1 {unit}", unit=of.run.found["unit"]) if of.run.found["unit"] else ""
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, dict):
+        return listed(f"{worded(name)} {_plain(count)}" for name, count in value.items() if count) or tr("none")
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return tr("yes") if value else tr("no")
+    return number(value, ".6g") if isinstance(value, float) else str(value)

@@ -1,0 +1,191 @@
+"""The findings of the first page: alarms, what to check, what is not assessed, and what is OK."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import isfinite
+
+from livebode.analysis import MARGINS
+from livebode.core import Finding, Tone
+from livebode.language import listed, number, tr, trn, worded
+from livebode.margins import worst
+from livebode.records import RunRecord
+from livebode_reports.alarms import alarms
+from livebode_reports.parameter_track import failed
+from livebode_reports.report_data import ReportData, RunData
+from livebode_reports.wording import lines_of, share
+
+_URGENT: dict[Tone, int] = {"alarm": 0, "differs": 0, "check": 1, "open": 2, "ok": 3}
+_INVALID_MANY = 0.05
+_EPSILON_LARGE = 0.1
+# Usual limits in motion control; a loop beyond them rings.
+_PHASE_MIN_DEG, _MS_MAX = 30.0, 2.0
+_TRUSTED: dict[str, Tone] = {"passes": "ok", "small error": "ok", "fails": "check", "cannot be judged": "open"}
+
+
+def verdict(of: ReportData) -> tuple[Finding, ...]:
+    """The findings, the most urgent first."""
+    return by_urgency([*about_record(of), *_valid(of), *_fits(of), *_margins(of), *_validated(of)])
+
+
+def by_urgency(found: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The findings, the most urgent first."""
+    return tuple(sorted(found, key=lambda f: _URGENT[f.tone]))
+
+
+def about_record(of: RunData) -> list[Finding]:
+    """The findings about alarms, the record and its signals."""
+    return [*alarms(of.run, of.event_summary), *_record(of), *_ready(of), *_signals(of)]
+
+
+def _record(of: RunData) -> list[Finding]:
+    found = []
+    if not of.run.finished:
+        found.append(
+            Finding(
+                "check",
+                tr(
+                    "The run is not finished: it is still recording, or it was stopped. The report covers the data so "
+                    "far."
+                ),
+            )
+        )
+    found += [
+        Finding("check", tr("The signals are doubtful: {why}.", why=worded(event.words)))
+        for event in of.event_summary.in_full
+        if event.kind == "doubtful"
+    ]
+    lost = of.event_summary.count("record-paused")
+    if lost:
+        text = trn(
+            "The record paused {n} time because the disk was full or failed.",
+            "The record paused {n} times because the disk was full or failed.",
+            lost,
+        )
+        found.append(Finding("check", text))
+    return found
+
+
+def _ready(of: RunData) -> list[Finding]:
+    """How long the machine was not ready; with a baseline, the summary of the monitoring contains it."""
+    suppressed_s = of.run.summary.get("readiness", {}).get("suppressed_s")
+    if not suppressed_s or of.run.summary.get("monitoring", {}).get("baseline") is not None:
+        return []
+    return [Finding("open", tr("Not assessed for {time:.1f} s: the machine was not ready.", time=suppressed_s))]
+
+
+def _signals(of: RunData) -> list[Finding]:
+    counts = of.run.summary.get("counts", {})
+    found = []
+    if counts.get("gaps"):
+        found.append(Finding("check", _gaps(counts["gaps"], counts.get("missing", 0))))
+    for key, words in (
+        ("non-finite", tr("Not finite")), ("implausible", tr("Implausibly large")), ("spike", tr("Spikes")),
+    ):  # fmt: skip
+        if counts.get(key):
+            text = trn(
+                "{what}: {n:,} sample of {all:,}.", "{what}: {n:,} samples of {all:,}.", counts[key],
+                what=words, all=of.samples,
+            )  # fmt: skip
+            found.append(Finding("check", text))
+    if counts and not found:
+        found.append(Finding("ok", tr("The signals have no gap, no sample that is not finite, and no spike.")))
+    return found
+
+
+def _gaps(gaps: int, missing: int) -> str:
+    if not missing:
+        return trn("The signals have {n:,} gap.", "The signals have {n:,} gaps.", gaps)
+    samples = trn("{n:,} sample", "{n:,} samples", missing)
+    return trn(
+        "The signals have {n:,} gap, with {samples} missing.", "The signals have {n:,} gaps, with {samples} missing.",
+        gaps, samples=samples,
+    )  # fmt: skip
+
+
+def _valid(of: ReportData) -> list[Finding]:
+    bad, every = of.of.incomplete, of.of.count
+    text = trn(
+        "{n:,} response at {lines}; {bad:,} of them ({share}) have an invalid line (the first window after a start or "
+        "a gap is always invalid).",
+        "{n:,} responses at {lines}; {bad:,} of them ({share}) have an invalid line (the first window after a start "
+        "or a gap is always invalid).",
+        every, lines=lines_of(len(of.run.lines)), bad=bad, share=share(bad, every),
+    )  # fmt: skip
+    unexpected = bad - _after_starts(of.run)
+    found = [Finding("check" if unexpected > _INVALID_MANY * every else "ok", text)]
+    if never := [f"{number(f, 'g')} Hz" for f, n in zip(of.run.lines.frequency_hz, of.of.valid) if not n]:
+        lines = listed(never[:8]) + " …" * (len(never) > 8)
+        found.append(Finding("check", tr("Never valid: {lines}.", lines=lines)))
+    return found
+
+
+def _after_starts(run: RunRecord) -> int:
+    """Responses whose window contains the start or a gap."""
+    hop = run.found.get("hop", run.lines.window)
+    return int((1 + run.summary.get("counts", {}).get("gaps", 0)) * (-(-run.lines.window // hop) - 1))
+
+
+def _fits(of: ReportData) -> list[Finding]:
+    if of.fit is None:
+        return [Finding("check", of.fit_words)] if "fit" in of.configuration else []
+    rough = of.fit.epsilon > _EPSILON_LARGE
+    values = {"model": worded(of.fit.model.name), "percent": 100 * of.fit.epsilon}
+    text = tr("The {model} model, fitted to the run's mean: model error ε = {percent:.2g} % of |G|.", **values)
+    if rough and of.of.moved:
+        text = tr(
+            "The {model} model, fitted to the run's mean: model error ε = {percent:.2g} % of |G|; the axis moved, so "
+            "one model of the mean is not valid: see the fits over the run.",
+            **values,
+        )
+    found = [Finding("check" if rough else "ok", text)]
+    for track in of.tracks.values():
+        if track.model != MARGINS and (why := failed(track)):
+            every, not_ok = sum(track.statuses.values()), sum(why.values())
+            reasons = listed(f"{number(count, ',')} {worded(word)}" for word, count in why.items())
+            tone: Tone = "check" if not_ok > _INVALID_MANY * every else "ok"
+            text = trn(
+                "Of {n:,} fit over the run, {rejected:,} were rejected: {reasons}.",
+                "Of {n:,} fits over the run, {rejected:,} were rejected: {reasons}.",
+                every, rejected=not_ok, reasons=reasons,
+            )  # fmt: skip
+            found.append(Finding(tone, text))
+    return found
+
+
+def _margins(of: ReportData) -> list[Finding]:
+    if of.loop is None:
+        return [Finding("open", of.loop_words)] if of.described else []
+    least = worst(of.loop.places)
+    if not least:
+        return [Finding("check", tr("No margins: {why}.", why=worded(str(of.loop.margins.status[0]))))]
+    small = least["phase_margin"] < _PHASE_MIN_DEG or least["peak_sensitivity"] > _MS_MAX
+    sizes = listed(
+        f"{words} {number(least[name], '.3g')}{unit}"
+        if isfinite(least[name])
+        else tr("{margin} without limit", margin=words)
+        for words, name, unit in (
+            (tr("gain"), "gain_margin", " dB"),
+            (tr("phase"), "phase_margin", "°"),
+            (tr("delay"), "delay_margin", " ms"),
+            ("Ms", "peak_sensitivity", ""),
+        )
+    )
+    fits = len(of.loop.places)
+    over = trn(
+        "Worst margins of {n:,} fit over the run: {sizes}.", "Worst margins of {n:,} fits over the run: {sizes}.",
+        fits, sizes=sizes,
+    )  # fmt: skip
+    text = over if fits > 1 else tr("Worst margins of the fit: {sizes}.", sizes=sizes)
+    return [Finding("check" if small else "ok", text)]
+
+
+def _validated(of: ReportData) -> list[Finding]:
+    if of.judged is None:
+        text = tr("The model was not validated on independent data.")
+        return [Finding("open", text)] if of.fit is not None else []
+    on = of.judged.on
+    return [
+        Finding(_TRUSTED[v.verdict], tr("On {recording}: {sentence}.", recording=on, sentence=worded(v.sentence)))
+        for v in of.judged.found
+    ]
