@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from livebode.core import Lines
-from livebode.excitation import chirp, chirp_lines, multisine, prbs
-from livebode.experiment_design import Waveform, belt_machine, peaks, worst
+from livebode.excitation import Waveform, chirp, chirp_lines, multisine, prbs
+from livebode.experiment_design import belt_machine, peaks, worst
 from livebode.simulation import (
     BeltAxis,
     Drive,

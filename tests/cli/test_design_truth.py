@@ -13,8 +13,8 @@ from scipy.io import loadmat
 
 from livebode import Lines, open_log
 from livebode.core import LivebodeError
-from livebode.excitation import multisine
-from livebode.experiment_design import Waveform, choose, write
+from livebode.excitation import Waveform, multisine
+from livebode.experiment_design import choose, write
 from livebode.experiments import Experiment
 from livebode.records import RunRecord
 from livebode.report import save_excitation_picture

@@ -10,11 +10,10 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import DesignError, GridError, Lines, LivebodeError, UsageError
-from livebode.excitation import chirp, low_crest_phases, multisine, odd_lines, prbs, quantised, stepped_sine
+from livebode.excitation import Waveform, chirp, low_crest_phases, multisine, odd_lines, prbs, quantised, stepped_sine
 from livebode.experiment_design import (
     ExperimentSpec,
     MachineLimits,
-    Waveform,
     belt_machine,
     choose,
     identifier,

@@ -5,11 +5,10 @@ import pytest
 
 from livebode.core import Lines
 from livebode.estimation import Settings, Tracker
-from livebode.excitation import multisine
+from livebode.excitation import Waveform, multisine
 from livebode.experiment_design import (
     ExperimentSpec,
     MachineLimits,
-    Waveform,
     accuracy_of,
     belt_machine,
     choose,

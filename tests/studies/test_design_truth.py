@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from livebode.experiment_design import Waveform, belt_machine, peaks, worst
+from livebode.excitation import Waveform
+from livebode.experiment_design import belt_machine, peaks, worst
 from livebode.simulation import extremes
 from studies.design import MOVING, STANDSTILL
 

@@ -34,3 +34,4 @@ from livebode.excitation.stepped import stepped_lines as stepped_lines
 from livebode.excitation.stepped import stepped_sine as stepped_sine
 from livebode.excitation.transient import leading as leading
 from livebode.excitation.transient import unlike as unlike
+from livebode.excitation.waveform import Waveform as Waveform

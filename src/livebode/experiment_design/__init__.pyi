@@ -5,7 +5,6 @@ from livebode.experiment_design._peaks import worst as worst
 from livebode.experiment_design.accuracy import LineAccuracy as LineAccuracy
 from livebode.experiment_design.accuracy import accuracy_of as accuracy_of
 from livebode.experiment_design.axis_file import axis_text as axis_text
-from livebode.experiment_design.axis_file import lines_text as lines_text
 from livebode.experiment_design.belt import belt_machine as belt_machine
 from livebode.experiment_design.design import Choice as Choice
 from livebode.experiment_design.design import Design as Design
@@ -25,4 +24,3 @@ from livebode.experiment_design.measured import Output as Output
 from livebode.experiment_design.measured import measured_machine as measured_machine
 from livebode.experiment_design.spec import ExperimentSpec as ExperimentSpec
 from livebode.experiment_design.spec_checks import KIND_OF_KEY as KIND_OF_KEY
-from livebode.experiment_design.waveform import Waveform as Waveform

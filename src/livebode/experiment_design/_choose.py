@@ -9,6 +9,7 @@ import numpy as np
 
 from livebode.core import DesignError, rounded_down
 from livebode.estimation import default_hop
+from livebode.excitation import Waveform
 from livebode.experiment_design._peaks import Peak, peaks
 from livebode.experiment_design.accuracy import accuracy_of
 from livebode.experiment_design.design import Design
@@ -18,7 +19,6 @@ from livebode.experiment_design.limits import MachineLimits, beyond, check_known
 from livebode.experiment_design.machine import Machine
 from livebode.experiment_design.make import REACHED, unit_waveform
 from livebode.experiment_design.spec import ExperimentSpec
-from livebode.experiment_design.waveform import Waveform
 
 # Of the room that the limits leave: reserve for errors of the prediction.
 _RESERVE = 0.1

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.excitation import Waveform
 from livebode.experiment_design.machine import QUANTITIES, Machine, OperatingPoint, Quantity, within
-from livebode.experiment_design.waveform import Waveform
 
 _POWERLESS = 1e-12  # of the largest bin: rounding
 

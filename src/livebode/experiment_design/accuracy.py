@@ -9,8 +9,8 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import UsageError
+from livebode.excitation import Waveform
 from livebode.experiment_design.machine import Machine
-from livebode.experiment_design.waveform import Waveform
 
 HOLDING_95 = sqrt(log(20))
 """Sigmas of a bound that covers 95 % of complex errors: 1 − exp(−c²) = 0.95."""

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from livebode.arrays import Floats
+from livebode.excitation import Waveform
 from livebode.experiment_design._peaks import Peak, worst
 from livebode.experiment_design.accuracy import LineAccuracy
 from livebode.experiment_design.encoder import encoder_counts
 from livebode.experiment_design.limits import MachineLimits
 from livebode.experiment_design.machine import UNITS, Machine
 from livebode.experiment_design.spec import ExperimentSpec
-from livebode.experiment_design.waveform import Waveform
 
 
 @dataclass(frozen=True)

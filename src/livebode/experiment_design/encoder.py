@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.excitation import Waveform
 from livebode.experiment_design.machine import Machine
-from livebode.experiment_design.waveform import Waveform
 
 COUNTS_MIN = 0.5
 """Amplitude below which a line alone does not move an encoder at standstill from one count to the next."""

@@ -8,11 +8,10 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import DesignError, Lines, UsageError
-from livebode.excitation import Phases, chirp, equal_snr, multisine, prbs, stepped_sine
+from livebode.excitation import Phases, Waveform, chirp, equal_snr, multisine, prbs, stepped_sine
 from livebode.experiment_design.grid import LineChoice
 from livebode.experiment_design.machine import Machine
 from livebode.experiment_design.spec import ExperimentSpec
-from livebode.experiment_design.waveform import Waveform
 
 REACHED = 1e-9
 

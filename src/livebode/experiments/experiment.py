@@ -13,10 +13,9 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from livebode.configuration import LoopSection, nearest, read_table, shortened
 from livebode.core import ConfigError, nearest_name
 from livebode.experiment_design import ExperimentSpec, Machine, MachineLimits, belt_machine
-from livebode.experiments.measure_section import MeasureSection
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
-from livebode.sources.live import SourceSettings
+from livebode.sources.live import MeasureSection, SourceSettings
 
 T = TypeVar("T")
 

@@ -11,7 +11,6 @@ import tomli_w
 
 from livebode.configuration import axis_schema
 from livebode.core import UsageError, whole_directory, writing
-from livebode.experiment_design import lines_text
 from livebode.experiments.design_directory import AXIS, MARK, SCHEMA, check_free, check_names, remove_design
 from livebode.experiments.matrix_experiment import MatrixExperiment
 from livebode.experiments.matrix_files import MATRIX_FORMATS
@@ -90,7 +89,7 @@ def matrix_axis_text(design: MatrixDesign, log: str, loop: Mapping[str, Any]) ->
             "input": list(design.inputs),
             "excitation": list(design.excitations),
         },
-        "lines": {"frequencies": lines_text(used.lines), "window": used.lines.window},
+        "lines": {"frequencies": used.lines.text, "window": used.lines.window},
         "tracking": {"estimator": "joint", "average": True, "hop": used.lines.window},
         "experiments": {
             "number": len(used.spectra),

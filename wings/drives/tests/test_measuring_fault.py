@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from livebode.core import ConfigError, MeasurementError
 from livebode.experiments import Experiment, prepare
-from livebode.experiments.measuring.player import make_player
+from livebode.experiments.measuring.measuring import make_player
 from livebode.sources.live import SourceSettings
 from tests.support.command import livebode
 from tests.support.errors import refused

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from livebode.core import needing
+from livebode.excitation import Waveform
 from livebode.experiment_design.files.c_names import identifier
 from livebode.experiment_design.files.facts import facts
-from livebode.experiment_design.waveform import Waveform
 
 _TEXT_BYTES = 116  # header text of a v5 file, free except for its first four bytes
 

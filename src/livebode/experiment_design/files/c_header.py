@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from livebode.excitation import Waveform
 from livebode.experiment_design.files.c_names import identifier
 from livebode.experiment_design.files.facts import as_lines, facts
-from livebode.experiment_design.waveform import Waveform
 
 _PER_ROW = 4
 

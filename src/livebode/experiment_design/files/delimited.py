@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from livebode.core import DesignError
+from livebode.excitation import Waveform
 from livebode.experiment_design.files.facts import as_lines, facts
-from livebode.experiment_design.waveform import Waveform
 
 
 def write_csv(path: Path, waveform: Waveform, name: str) -> None:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from livebode.experiment_design.waveform import Waveform
+from livebode.excitation import Waveform
 from livebode.version import __version__
 
 

@@ -7,11 +7,11 @@ from os import PathLike
 from pathlib import Path
 
 from livebode.core import UsageError, whole_file
+from livebode.excitation import Waveform
 from livebode.experiment_design.files.arrays import write_mat, write_npz
 from livebode.experiment_design.files.c_header import write_c_header
 from livebode.experiment_design.files.delimited import write_csv
 from livebode.experiment_design.files.structured_text import write_st
-from livebode.experiment_design.waveform import Waveform
 
 FORMATS: Mapping[str, Callable[[Path, Waveform, str], None]] = {
     ".csv": write_csv,

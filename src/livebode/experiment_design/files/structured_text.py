@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from livebode.excitation import Waveform
 from livebode.experiment_design.files.facts import as_lines, facts
-from livebode.experiment_design.waveform import Waveform
 from livebode.structured_text import check_name, multisine
 
 

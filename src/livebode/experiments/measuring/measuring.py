@@ -8,13 +8,13 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from livebode.core import ConfigError, write_whole, writing
+from livebode.core import ConfigError, MeasurementError, write_whole, writing
 from livebode.experiment_design import Design, choose
 from livebode.experiments.designing import Picture, design_experiment
 from livebode.experiments.experiment import Experiment
-from livebode.experiments.measure_section import MeasureSection
 from livebode.experiments.measuring.playback import Playback, StopRequest
-from livebode.experiments.measuring.player import Player, make_player
+from livebode.plugins import loaded, named
+from livebode.sources.live import MeasureSection, Player, SourceSettings, make_source
 
 LOG = "log.csv"
 
@@ -128,6 +128,31 @@ def prepare(experiment: Experiment) -> Prepared:
         ranges.setdefault(signals["input"], (-limits.torque_n_m_max, limits.torque_n_m_max))
     connection = player.check(design.waveform)
     return Prepared(design, player, connection, signals["excitation"], ranges, experiment.measure)
+
+
+def make_player(settings: SourceSettings, section: MeasureSection, excitation: str) -> Player:
+    """The player for this source; MeasurementError if there is none."""
+    if settings.url is None:
+        raise ConfigError(
+            "key-missing",
+            "a measurement needs a live source, whose controller plays the excitation",
+            "set source.url, such as hal:sampler.0",
+            key="source",
+            keys=["url"],
+        )
+    source = make_source(settings)
+    kind = source.address.scheme
+    players = {name: one.player for name, one in named("sources").items() if one.player}
+    if kind not in players:
+        raise MeasurementError(
+            "not-playable",
+            f"livebode cannot play an excitation on a controller with {kind}",
+            f"play the files of `livebode design` there and record; livebode can play on: {', '.join(players)}",
+            kind=kind,
+            allowed=list(players),
+        )
+    player: type[Player] = loaded(players[kind])
+    return player(source, section, excitation)
 
 
 def measure(

@@ -15,9 +15,8 @@ from livebode.core import LivebodeError, MeasurementError
 from livebode.experiment_design import Design
 from livebode.experiments.measuring.limit_watch import LimitWatch
 from livebode.experiments.measuring.log_table import LogTable
-from livebode.experiments.measuring.player import Player
 from livebode.experiments.measuring.steady_part import steady_part
-from livebode.sources.live import LiveBlock
+from livebode.sources.live import LiveBlock, Player
 
 REST_S = 0.25
 """Recorded and watched before anything is played."""

@@ -8,9 +8,8 @@ import time
 from dataclasses import dataclass
 
 from livebode.core import MeasurementError
-from livebode.experiment_design import Waveform
-from livebode.experiments import MeasureSection, Player
-from livebode.sources.live import LiveSource
+from livebode.excitation import Waveform
+from livebode.sources.live import LiveSource, MeasureSection, Player
 from livebode_drives.live.hal import HalSource
 from livebode_drives.live.hal_wiring import STREAMER_KEY, fifo, halcmd, links, pin_value, program
 from livebode_drives.players.programme import Programme

@@ -10,7 +10,7 @@ import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import DesignError, Lines, UsageError
-from livebode.excitation import quantised
+from livebode.excitation._quantised import quantised
 
 _CHANGED_MAX = 0.5  # of a line's amplitude: beyond it, rounding dominates the line
 
