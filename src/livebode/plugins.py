@@ -29,6 +29,7 @@ GROUPS: Mapping[str, type[Mapping[str, Any]] | type[Sequence[Any]]] = {
     "analyses": Mapping,
     "estimates": Mapping,
     "examples": Mapping,
+    "files": Mapping,
 }
 """The groups, and the type of their tables; a mapping has the name of each part."""
 _OWN = "livebode"

@@ -12,7 +12,7 @@ import pytest
 
 from livebode import Lines, multisine
 from livebode.excitation import Waveform
-from livebode.experiment_design import write
+from livebode_design import write
 from tools.firmware import KERNEL, ROOT, run
 
 FOLDER = ROOT / "examples" / "drive"

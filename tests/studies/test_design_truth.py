@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from livebode.excitation import Waveform
-from livebode.experiment_design import belt_machine, peaks, worst
 from livebode.simulation import extremes
+from livebode_design import belt_machine, peaks, worst
 from studies.design import MOVING, STANDSTILL
 
 

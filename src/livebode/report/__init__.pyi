@@ -9,8 +9,6 @@ from livebode.report.bode import bode_figure as bode_figure
 from livebode.report.canvas import Canvas as Canvas
 from livebode.report.canvas import Scale as Scale
 from livebode.report.canvas import written as written
-from livebode.report.excitation import excitation_figure as excitation_figure
-from livebode.report.excitation import save_excitation_picture as save_excitation_picture
 from livebode.report.html import to_html as to_html
 from livebode.report.loop import loop_figure as loop_figure
 from livebode.report.loop import round_numbers as round_numbers
@@ -18,8 +16,6 @@ from livebode.report.loop import save_loop_picture as save_loop_picture
 from livebode.report.matrix import matrix_figure as matrix_figure
 from livebode.report.matrix import save_matrix_pictures as save_matrix_pictures
 from livebode.report.matrix import singular_values_figure as singular_values_figure
-from livebode.report.matrix_excitation import matrix_excitation_figure as matrix_excitation_figure
-from livebode.report.matrix_excitation import save_matrix_excitation_picture as save_matrix_excitation_picture
 from livebode.report.parameters import labelled as labelled
 from livebode.report.pdf import save_pdf as save_pdf
 from livebode.report.pictures import save as save

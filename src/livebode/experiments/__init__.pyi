@@ -1,9 +1,0 @@
-from livebode.experiments.designing import design_experiment as design_experiment
-from livebode.experiments.experiment import Experiment as Experiment
-from livebode.experiments.matrix_designing import design_matrix as design_matrix
-from livebode.experiments.matrix_experiment import MatrixExperiment as MatrixExperiment
-from livebode.experiments.matrix_experiment import describes_several_motors as describes_several_motors
-from livebode.experiments.measuring.measuring import Prepared as Prepared
-from livebode.experiments.measuring.measuring import StopRequest as StopRequest
-from livebode.experiments.measuring.measuring import measure as measure
-from livebode.experiments.measuring.measuring import prepare as prepare
