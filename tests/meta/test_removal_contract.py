@@ -25,14 +25,13 @@ WRITING_MODULES = {
     _BESIDE: (
         "cli/documents", "cli/schema_command",
         "export/delimited", "export/lpv", "export/matrix_delimited", "export/parameters", "export/universal",
-        "livebode_control/strokes/angle_table",
-        "livebode_design/files/arrays", "livebode_design/files/c_header", "livebode_design/files/delimited",
-        "livebode_design/files/structured_text", "livebode_design/matrix/matrix_files", "livebode_drives/plc_command",
+        "livebode_control/strokes/angle_table", "livebode_design/files", "livebode_design/matrix/matrix_files",
+        "livebode_drives/plc_command",
         "livebode_plant/cli/archive/trend_command", "livebode_plant/lake/lake",
         "report/pdf", "tables/parquet_writer",
     ),
     _NEW: (
-        "interface/example_recordings", "livebode_design/designing", "livebode_design/matrix/matrix_designing",
+        "interface/example_recordings", "livebode_design/designing",
         "livebode_plant/fleet/credentials", "records/run_directory", "records/table_file",
     ),
     _TEMPORARY: ("livebode_plant/archive/alone", "livebode_plant/fleet/server", "livebode_plant/fleet/simulated"),

@@ -22,7 +22,7 @@ from livebode_design import (
     measured_machine,
     write,
 )
-from livebode_design.files.c_names import KEYWORDS
+from livebode_design.files import KEYWORDS
 from tests.support.command import livebode
 from tests.support.errors import refused
 

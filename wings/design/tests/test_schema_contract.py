@@ -9,10 +9,13 @@ from typing import Any
 
 import pytest
 
+from livebode.configuration import kind_of_file
 from livebode.core import ConfigError, LivebodeError
 from livebode_design import Experiment, MachineLimits
+from livebode_design.commands import FILES
 from livebode_design.experiment import BELT, made_of
 from livebode_design.experiment_schema import experiment_schema
+from livebode_design.matrix.matrix_experiment import TABLES as MACHINES
 from tests.support.schemas import tables, validator, values_of, with_value
 
 ROOT = Path(__file__).parents[2]
@@ -109,3 +112,10 @@ def test_a_belt_has_one_motion() -> None:
 
 def test_the_example_is_valid() -> None:
     VALID.validate(tomllib.loads((ROOT / "examples" / "experiment.toml").read_text("utf-8")))
+
+
+def test_a_file_is_recognised_by_the_table_of_its_machine() -> None:
+    assert FILES["matrix-experiment"].tables == set(MACHINES)
+    assert all(kind_of_file({"excitation": {}, name: {}}) == FILES["matrix-experiment"] for name in MACHINES)
+    assert kind_of_file({"excitation": {}, "belt": {}}) == FILES["experiment"]
+    assert kind_of_file({"source": {}, "signals": {}}) is None

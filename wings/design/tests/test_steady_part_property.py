@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode_design.measuring.steady_part import steady_part
+from livebode_design.playback import steady_part
 
 
 @given(

@@ -8,8 +8,7 @@ from typing import Any
 from livebode.arrays import Floats
 from livebode.excitation import Waveform
 from livebode_design._peaks import Peak, worst
-from livebode_design.accuracy import LineAccuracy
-from livebode_design.encoder import encoder_counts
+from livebode_design.accuracy import LineAccuracy, encoder_counts
 from livebode_design.limits import MachineLimits
 from livebode_design.machine import UNITS, Machine
 from livebode_design.spec import ExperimentSpec

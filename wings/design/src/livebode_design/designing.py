@@ -7,24 +7,65 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
-from livebode.configuration import axis_schema
+from livebode.configuration import axis_schema, kind_of_file, read_table
 from livebode.core import ConfigError, UsageError, install_command, whole_directory, writing
+from livebode.plugins import loaded, named
 from livebode.records import to_json
-from livebode.structured_text import PERIOD_MAX
-from livebode_design._choose import choose
-from livebode_design.axis_file import axis_text
-from livebode_design.design import Design
 from livebode_design.design_directory import AXIS, MARK, SCHEMA, check_free, check_names, remove_design
-from livebode_design.experiment import Experiment
-from livebode_design.files import FORMATS, write
 
-Picture = Callable[[Design, Path], None]
+
+class AnyDesign(Protocol):
+    """What a design is for its directory."""
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        ...
+
+
+D = TypeVar("D", bound=AnyDesign)
+
+
+class DescribedExperiment(Protocol[D]):
+    """An experiment as a file describes it: `Experiment`, `MatrixExperiment`; its kind has a row in `FILES`.
+
+    Attributes
+    ----------
+    log
+        Name of the recording.
+    formats
+        Suffixes of the files of an excitation.
+    terminal, picture
+        "module:name" of what prints a design, and of what draws it to a file.
+    """
+
+    formats: Sequence[str]
+    terminal: str
+    picture: str
+
+    @property
+    def log(self) -> str: ...
+
+    def design(self) -> D:
+        """The experiment within the limits of the machine."""
+        ...
+
+    def axis_text(self, design: D) -> str:
+        """The axis.toml with which a recording is tracked."""
+        ...
+
+    def write(self, path: Path, design: D, name: str) -> None:
+        """Write the excitation in the format of the suffix."""
+        ...
+
+    def left_out(self, design: D) -> dict[str, str]:
+        """The formats that are not possible for a design, with the reason."""
+        ...
 
 
 @dataclass(frozen=True)
-class Designed:
+class Designed(Generic[D]):
     """Result of a design.
 
     Attributes
@@ -37,21 +78,21 @@ class Designed:
         Sentences on the formats that were not written by default, one a line; empty if there are none.
     """
 
-    design: Design
+    design: D
     directory: Path
     files: tuple[str, ...]
     left_out: str = ""
 
 
 def design_experiment(
-    experiment: Experiment,
+    experiment: DescribedExperiment[D],
     directory: Path,
     *,
     name: str = "excitation",
     suffixes: Sequence[str] | None = None,
     force: bool = False,
-    draw: Picture | None = None,
-) -> Designed:
+    draw: Callable[[D, Path], object] | None = None,
+) -> Designed[D]:
     """Design the experiment, and write its files to a new directory, which appears when it is complete.
 
     Raises
@@ -67,32 +108,23 @@ def design_experiment(
     """
     kinds = None if suffixes is None else tuple(f".{s.lstrip('.').lower()}" for s in suffixes)
     for kind in kinds or ():
-        if kind not in FORMATS:
+        if kind not in experiment.formats:
             raise UsageError(
                 "not-one-of",
                 f"the format {kind!r} is not supported",
-                f"choose {', '.join(FORMATS)}",
+                f"choose {', '.join(experiment.formats)}",
                 argument="suffixes",
                 value=kind,
-                allowed=list(FORMATS),
+                allowed=list(experiment.formats),
             )
     check_names(name, experiment.log)
     check_free(directory, force)
-    design = choose(experiment.spec(), experiment.machine(), experiment.machine_limits())
-    lines = design.waveform.lines
-    left_out = {} if kinds else _without(lines.window)
+    design = experiment.design()
+    left_out = {} if kinds else _without_scipy() | experiment.left_out(design)
     with writing(directory), whole_directory(directory, remove_design) as partial:
-        for kind in kinds or (kind for kind in FORMATS if kind not in left_out):
-            write(partial / f"{name}{kind}", design.waveform, name)
-        configuration = axis_text(
-            design,
-            signals=experiment.signal_names(),
-            log=experiment.log,
-            loop=experiment.loop_tables(),
-            motion=experiment.motion_table(lines.window / lines.rate_hz),
-            tracking=experiment.tracking(),
-        )
-        (partial / AXIS).write_text(f"#:schema ./{SCHEMA}\n{configuration}", encoding="utf-8")
+        for kind in kinds or (kind for kind in experiment.formats if kind not in left_out):
+            experiment.write(partial / f"{name}{kind}", design, name)
+        (partial / AXIS).write_text(f"#:schema ./{SCHEMA}\n{experiment.axis_text(design)}", encoding="utf-8")
         (partial / SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
         if draw is not None:
             draw(design, partial / f"{name}.png")
@@ -103,33 +135,30 @@ def design_experiment(
     return Designed(design, directory, files, "\n".join(left_out.values()))
 
 
-def _without(window: int) -> dict[str, str]:
-    """The formats that are not possible here, with the reason."""
-    reasons = {}
-    if find_spec("scipy") is None:
-        reasons[".mat"] = f"no .mat, because SciPy is not installed; run {install_command('analysis')}"
-    if window > PERIOD_MAX:
-        reasons[".st"] = f"no .st: its {window} samples are more than the {PERIOD_MAX} of a PLC's table"
-    return reasons
+def _without_scipy() -> dict[str, str]:
+    if find_spec("scipy") is not None:
+        return {}
+    return {".mat": f"no .mat, because SciPy is not installed; run {install_command('analysis')}"}
+
+
+def described(experiment: str | PathLike[str] | Mapping[str, Any], over: Mapping[str, Any]) -> DescribedExperiment[Any]:
+    """The experiment in a TOML file, or in the same as a mapping; `over` replaces keys of its [excitation]."""
+    table = experiment if isinstance(experiment, Mapping) else read_table(Path(experiment))
+    model: Any = loaded((kind_of_file(table) or named("files")["experiment"]).model)
+    found: DescribedExperiment[Any]
+    if not isinstance(experiment, Mapping):
+        found = model.read(Path(experiment), over)
+        return found
+    required = experiment.get("excitation")
+    if not isinstance(required, Mapping):
+        raise ConfigError("key-missing", "'excitation' is missing", "add it, with the band", key="excitation")
+    found = model.of({**experiment, "excitation": {**required, **over}}, "the description")
+    return found
 
 
 def design_described(
     experiment: str | PathLike[str] | Mapping[str, Any], directory: Path | None, over: Mapping[str, Any]
-) -> Design:
-    """The design of a TOML file or of the same as a mapping; `over` replaces keys of its [excitation].
-
-    Its files are written to `directory`, in every format; None writes nothing.
-    """
-    described = _described(experiment, over)
-    if directory is None:
-        return choose(described.spec(), described.machine(), described.machine_limits())
-    return design_experiment(described, directory).design
-
-
-def _described(experiment: str | PathLike[str] | Mapping[str, Any], over: Mapping[str, Any]) -> Experiment:
-    if not isinstance(experiment, Mapping):
-        return Experiment.read(Path(experiment), over)
-    required = experiment.get("excitation")
-    if not isinstance(required, Mapping):
-        raise ConfigError("key-missing", "'excitation' is missing", "add it, with the band", key="excitation")
-    return Experiment.of({**experiment, "excitation": {**required, **over}}, "the description")
+) -> AnyDesign:
+    """The design of what is `described`; its files are written to `directory`, in every format; None: nothing is."""
+    found = described(experiment, over)
+    return found.design() if directory is None else design_experiment(found, directory).design

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, ClassVar, TypeVar, get_type_hints
 
+import tomli_w
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from livebode.configuration import LoopSection, nearest, read_table, shortened
 from livebode.core import ConfigError, nearest_name
+from livebode.estimation import DETECTION_LINES_MIN
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
 from livebode.sources.live import MeasureSection, SourceSettings
+from livebode.structured_text import PERIOD_MAX
+from livebode_design._choose import choose
 from livebode_design.belt import belt_machine
+from livebode_design.design import Design
+from livebode_design.files import FORMATS, write
 from livebode_design.limits import MachineLimits
 from livebode_design.machine import Machine
 from livebode_design.measured_axis import MeasuredAxis, MeasuredSection
@@ -62,6 +68,9 @@ class Experiment(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+    formats: ClassVar[Sequence[str]] = tuple(FORMATS)
+    terminal: ClassVar[str] = "livebode_design.design_terminal:show_design"
+    picture: ClassVar[str] = "livebode_design.excitation_picture:save_excitation_picture"
 
     excitation: dict[str, Any]
     belt: dict[str, dict[str, Any]] | None = None
@@ -101,7 +110,7 @@ class Experiment(BaseModel):
         try:
             found = cls.model_validate(data)
         except ValidationError as error:
-            raise _first_of(error).at(origin) from None
+            raise first_of(error, {"": Experiment, "measured": MeasuredSection}).at(origin) from None
         if found.belt is not None and found.loop is not None:
             raise ConfigError(
                 "key-conflict", "a [belt] axis has its loop in [belt.drive]", "remove [loop]", key="loop"
@@ -181,6 +190,40 @@ class Experiment(BaseModel):
         self.machine_limits()
         self.signal_names()
 
+    def design(self) -> Design:
+        """Lines, window, amplitude and hop; DesignError if there is no solution (see `choose`)."""
+        return choose(self.spec(), self.machine(), self.machine_limits())
+
+    def axis_text(self, design: Design) -> str:
+        """The axis.toml with which `livebode run` tracks a recording of the design."""
+        lines, moves = design.waveform.lines, design.machine.stroke_s is not None
+        motion = self.motion_table(lines.window / lines.rate_hz)
+        tracked: dict[str, Any] = {"estimator": "joint", "hop": design.hop} | self.tracking()
+        if design.windows > 1 and not moves:
+            tracked |= {"average": True, "forgetting": 1.0}
+        if moves and len(lines.quiet) >= DETECTION_LINES_MIN and not motion:
+            tracked |= {"noise": "quiet"}
+        tables: dict[str, Any] = {
+            "source": {"log": self.log},
+            "signals": self.signal_names(),
+            "lines": {"frequencies": lines.text, "window": lines.window},
+            "tracking": tracked,
+        }
+        tables |= {name: table for name, table in (("motion", motion), ("loop", self.loop_tables())) if table}
+        head = f"# Written by `livebode design`; record {design.recording_s:.4g} s or more.\n\n"
+        return head + tomli_w.dumps(tables)
+
+    def write(self, path: Path, design: Design, name: str) -> None:
+        """Write the excitation in the format of the suffix."""
+        write(path, design.waveform, name)
+
+    def left_out(self, design: Design) -> dict[str, str]:
+        """The formats that are not possible for a design, with the reason."""
+        window = design.waveform.lines.window
+        if window <= PERIOD_MAX:
+            return {}
+        return {".st": f"no .st: its {window} samples are more than the {PERIOD_MAX} of a PLC's table"}
+
     def loop_tables(self) -> dict[str, Any]:
         """[loop] of the axis.toml, as in docs/reference/configuration.md."""
         axis = self.axis()
@@ -241,16 +284,24 @@ class Experiment(BaseModel):
         return {} if self.belt is not None else self._measured_axis.tracking()
 
 
-def _first_of(error: ValidationError) -> ConfigError:
-    """The first error, with its key and value."""
+def first_of(error: ValidationError, models: Mapping[str, type[BaseModel]]) -> ConfigError:
+    """The first error, with its key and value.
+
+    Parameters
+    ----------
+    error
+        All errors.
+    models
+        The models of the tables, and under "" that of the file, whose keys are compared with one that does not exist.
+    """
     first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")  # a typo also causes a missing key
     place = ".".join(map(str, first["loc"]))
     if first["type"] == "extra_forbidden":
-        if first["loc"][0] == "loop":
+        table = str(first["loc"][0])
+        if table == "loop":
             meant = nearest(first["loc"])
         else:
-            known = MeasuredSection if first["loc"][0] == "measured" else Experiment
-            meant = nearest_name(place.split(".")[-1], known.model_fields, "Settings")
+            meant = nearest_name(place.split(".")[-1], models.get(table, models[""]).model_fields, "Settings")
         return ConfigError("key-unknown", f"there is no {place!r}", meant, key=place)
     if first["type"] == "missing" and all(isinstance(part, str) for part in first["loc"]):
         return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)

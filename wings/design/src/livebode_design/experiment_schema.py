@@ -13,8 +13,7 @@ from livebode.mimo import MatrixLimits, MatrixSpec
 from livebode_design.experiment import BELT, SIGNALS, Experiment
 from livebode_design.limits import MachineLimits
 from livebode_design.matrix.matrix_experiment import MACHINES, Drives, MatrixExperiment
-from livebode_design.spec import ExperimentSpec
-from livebode_design.spec_checks import KIND_OF_KEY
+from livebode_design.spec import KIND_OF_KEY, ExperimentSpec
 
 _CONFIG = ConfigDict(extra="forbid")
 

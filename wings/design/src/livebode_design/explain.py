@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from livebode.core import counted
+from livebode.core import Lines, counted, meets_mains
 from livebode_design._peaks import Peak, worst
+from livebode_design.accuracy import encoder_words
 from livebode_design.design import Choice, Design
-from livebode_design.encoder import encoder_words
 from livebode_design.grid import LineChoice
 from livebode_design.limits import MachineLimits
 from livebode_design.machine import UNITS, Machine, Quantity
-from livebode_design.mains import mains_words
 
 _LISTED_MAX = 4  # amplitudes
 _LONG_S = 3600.0
@@ -32,7 +31,7 @@ def explained(design: Design, found: LineChoice, amplitude_why: str, recording_w
     weakest = int(np.argmax(bound))
     rows = [
         Choice("lines", f"{len(f)}, {f[0]:g} … {f[-1]:g} Hz, {spacing}", found.lines_why),
-        Choice("mains", _listed_hz(design.spec.mains_hz), mains_words(lines, design.spec.mains_hz, found.mains)),
+        Choice("mains", _listed_hz(design.spec.mains_hz), _mains_words(lines, design.spec.mains_hz, found.mains)),
         Choice("window", f"{lines.window} samples, {1000 * window_s:.4g} ms", found.window_why),
         Choice("amplitude", _amplitude(design), amplitude_why),
         Choice(
@@ -107,3 +106,14 @@ def _limit_row(peak: Peak, limits: MachineLimits) -> Choice:
 
 def _size(quantity: Quantity, low: float, high: float) -> str:
     return f"{low:.4g} … {high:.4g}" if quantity == "travel" else f"{max(high, -low):.3g}"
+
+
+def _mains_words(lines: Lines, mains_hz: Sequence[float], avoided: Sequence[int]) -> str:
+    """Effect of the mains on the lines, for the table of a design; a warning where a line meets a harmonic."""
+    left_out = ", ".join(f"{k * lines.resolution_hz:g}" for k in avoided)
+    words = f"no line at {left_out} Hz" if avoided else ""
+    met = lines.frequency_hz[meets_mains(lines.bins, lines.resolution_hz, mains_hz)]
+    if met.size:
+        shown = ", ".join(f"{f:g}" for f in met[:6]) + (" …" if met.size > 6 else "")
+        return "; ".join(filter(None, (words, f"WARNING: hum adds to the lines at {shown} Hz; move them, or refine")))
+    return words or "no line within half a bin of a harmonic"

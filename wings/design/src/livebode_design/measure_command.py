@@ -14,10 +14,9 @@ import typer
 from livebode.cli import Json, can_draw, console
 
 if TYPE_CHECKING:
-    from livebode_design.design import Design
     from livebode_design.experiment import Experiment
-    from livebode_design.measuring.measuring import Prepared
-    from livebode_design.measuring.playback import StopRequest
+    from livebode_design.measuring import Prepared
+    from livebode_design.playback import StopRequest
 
 
 def measure_command(
@@ -37,9 +36,10 @@ def measure_command(
     A limit, a second without samples, SIGTERM and a closed terminal ramp it down, too. What was recorded remains.
     """
     from livebode.records import to_json
-    from livebode_design.design_command import show_design, working
+    from livebode_design.design_command import working
+    from livebode_design.design_terminal import show_design
     from livebode_design.experiment import Experiment
-    from livebode_design.measuring.measuring import prepare
+    from livebode_design.measuring import prepare
 
     asked = Experiment.read(experiment)
     with working():
@@ -56,11 +56,9 @@ def measure_command(
 
 
 def _show_playing(prepared: Prepared) -> None:
-    from rich.table import Table
+    from livebode_design.design_terminal import plain_table
 
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for head in ("measurement", "value"):
-        table.add_column(head, overflow="fold")
+    table = plain_table("measurement", "value")
     for row in prepared.rows():
         table.add_row(*row)
     console(markup=False).print(table)
@@ -69,13 +67,14 @@ def _show_playing(prepared: Prepared) -> None:
 def _measure(asked: Experiment, prepared: Prepared, out: Path, as_json: bool) -> None:
     from livebode.cli import run_targets
     from livebode.locations import location
-    from livebode_design.measuring.measuring import measure
+    from livebode.plugins import loaded
+    from livebode_design.measuring import measure
 
     def say(sentence: str) -> None:
         print(f"livebode: {sentence}", flush=True, file=sys.stderr if as_json else sys.stdout)
 
     with _stopping() as (request, signals):
-        made = measure(asked, prepared, out, request, say=say, draw=_draw if can_draw() else None)
+        made = measure(asked, prepared, out, request, say=say, draw=loaded(asked.picture) if can_draw() else None)
     say(f"{made.samples} samples in {out / made.log}, {made.lost} of them lost")
     if signals:
         say("the measurement was stopped, and not tracked")
@@ -89,7 +88,7 @@ def _measure(asked: Experiment, prepared: Prepared, out: Path, as_json: bool) ->
 @contextmanager
 def _stopping() -> Iterator[tuple[StopRequest, list[int]]]:
     """Signals that ramp down, in place of those that end the process."""
-    from livebode_design.measuring.playback import StopRequest
+    from livebode_design.playback import StopRequest
 
     request, came = StopRequest(), list[int]()
 
@@ -104,9 +103,3 @@ def _stopping() -> Iterator[tuple[StopRequest, list[int]]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _draw(design: Design, path: Path) -> None:
-    from livebode_design.excitation_picture import save_excitation_picture
-
-    save_excitation_picture(design, path)

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
+import tomli_w
 from annotated_types import Gt
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from livebode.configuration import read_table
-from livebode.core import ConfigError, nearest_name
-from livebode.mimo import MatrixLimits, MatrixMachine, MatrixSpec, MechanismMachine
+from livebode.core import ConfigError
+from livebode.mimo import MatrixDesign, MatrixLimits, MatrixMachine, MatrixSpec, MechanismMachine, choose_matrix
 from livebode.simulation import CoreXY, CoreXYLoop, Gantry, GantryLoop, ModalLoop, ModalMachine, MotorLoop
-from livebode_design.experiment import made_of
+from livebode_design.experiment import first_of, made_of
+from livebode_design.matrix.matrix_files import MATRIX_FORMATS
 from livebode_design.matrix.measured_matrix import MeasuredMatrixSection, loop_of, measured_machine
 
 T = TypeVar("T")
@@ -80,6 +82,9 @@ class MatrixExperiment(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+    formats: ClassVar[Sequence[str]] = tuple(MATRIX_FORMATS)
+    terminal: ClassVar[str] = "livebode_design.matrix.matrix_terminal:show_matrix_design"
+    picture: ClassVar[str] = "livebode_design.matrix.matrix_picture:save_matrix_excitation_picture"
 
     excitation: dict[str, Any]
     drives: dict[str, Any] | None = None
@@ -114,7 +119,7 @@ class MatrixExperiment(BaseModel):
         try:
             found = cls.model_validate(data)
         except ValidationError as error:
-            raise _first_of(error).at(origin) from None
+            raise first_of(error, {"": MatrixExperiment}).at(origin) from None
         described = [name for name in TABLES if getattr(found, name) is not None]
         if len(described) != 1:
             raise ConfigError(
@@ -164,6 +169,44 @@ class MatrixExperiment(BaseModel):
         self.spec()
         self.machine_limits()
 
+    def design(self) -> MatrixDesign:
+        """The experiments; DesignError if there is no solution (see `choose_matrix`)."""
+        return choose_matrix(self.spec(), self.machine(), self.machine_limits())
+
+    def axis_text(self, design: MatrixDesign) -> str:
+        """The axis.toml with which `livebode run` tracks a recording that begins with the first experiment."""
+        used = design.excitation
+        tables: dict[str, Any] = {
+            "source": {"log": self.log},
+            "signals": {
+                "output": list(design.outputs),
+                "input": list(design.inputs),
+                "excitation": list(design.excitations),
+            },
+            "lines": {"frequencies": used.lines.text, "window": used.lines.window},
+            "tracking": {"estimator": "joint", "average": True, "hop": used.lines.window},
+            "experiments": {
+                "number": len(used.spectra),
+                "dwell_periods": used.dwell,
+                "settle_periods": used.settle,
+                "memory": design.repetitions,
+            },
+            "loop": self.loop_tables(design.machine),
+        }
+        head = (
+            f"# Written by `livebode design`; play the experiments {design.repetitions} times, "
+            f"{design.time_s:.4g} s, and record from the first sample on.\n\n"
+        )
+        return head + tomli_w.dumps(tables)
+
+    def write(self, path: Path, design: MatrixDesign, name: str) -> None:
+        """Write the excitations in the format of the suffix."""
+        MATRIX_FORMATS[path.suffix](path, design, name)
+
+    def left_out(self, design: MatrixDesign) -> dict[str, str]:  # noqa: ARG002
+        """The formats that are not possible for a design: none."""
+        return {}
+
     def loop_tables(self, machine: MatrixMachine) -> dict[str, Any]:
         """[loop] of the axis.toml."""
         if self.measured_matrix is not None:
@@ -180,25 +223,9 @@ class MatrixExperiment(BaseModel):
         return {"controllers": controllers}
 
 
-def describes_several_motors(path: Path) -> bool:
-    """Whether an experiment.toml describes a machine with several motors."""
-    return any(name in TABLES for name in read_table(path))
-
-
 def _made(kind: type[T], given: Mapping[str, Any], section: str, needed: tuple[str, ...]) -> T:
     if missing := [name for name in needed if name not in given]:
         raise ConfigError(
             "key-missing", f"'{section}.{missing[0]}' is missing", "add it", key=f"{section}.{missing[0]}"
         )
     return made_of(kind, given, section)
-
-
-def _first_of(error: ValidationError) -> ConfigError:
-    first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-    place = ".".join(map(str, first["loc"]))
-    if first["type"] == "extra_forbidden":
-        meant = nearest_name(place, MatrixExperiment.model_fields, "Settings")
-        return ConfigError("key-unknown", f"there is no {place!r}", meant, key=place)
-    if first["type"] == "missing":
-        return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
-    return ConfigError("value-invalid", f"{place} is not usable: {first['msg'].lower()}", "correct it", key=place)

@@ -12,10 +12,7 @@ import numpy as np
 from livebode.core import needing
 from livebode.mimo import MatrixDesign
 from livebode.version import __version__
-from livebode_design.files.c_names import identifier
-from livebode_design.files.facts import as_lines
-
-_PER_ROW = 4
+from livebode_design.files import as_lines, c_rows, identifier
 
 
 def facts(design: MatrixDesign) -> dict[str, Any]:
@@ -86,7 +83,7 @@ def write_c_header(path: Path, design: MatrixDesign, name: str) -> None:
     word = identifier(name)
     big, used = word.upper(), design.excitation
     comment = "\n".join(f" * {line}".replace("*/", "* /") for line in as_lines(facts(design)))
-    tables = ",\n".join("{\n" + _rows([value.hex() for value in row]) + "\n}" for row in used.samples.tolist())
+    tables = ",\n".join("{\n" + c_rows([value.hex() for value in row]) + "\n}" for row in used.samples.tolist())
     text = f"""/* Excitations of several motors over all experiments, N m; play them repeatedly.
 {comment}
  */
@@ -108,17 +105,12 @@ static const {big}_TYPE {word}[{big}_INPUTS][{big}_SAMPLES] = {{
 }};
 
 static const unsigned {word}_bins[{big}_LINES] = {{
-{_rows([f"{k}u" for k in used.lines.bins])}
+{c_rows([f"{k}u" for k in used.lines.bins])}
 }};
 
 #endif
 """
     path.write_text(text, encoding="ascii")
-
-
-def _rows(values: list[str]) -> str:
-    rows = (values[i : i + _PER_ROW] for i in range(0, len(values), _PER_ROW))
-    return ",\n".join("    " + ", ".join(row) for row in rows)
 
 
 MATRIX_FORMATS: Mapping[str, Callable[[Path, MatrixDesign, str], None]] = {

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import LivebodeError, MeasurementError
+from livebode.core import Block, ConfigError, LivebodeError, MeasurementError, nearest_name, writing
 from livebode.sources.live import LiveBlock, Player
 from livebode_design.design import Design
-from livebode_design.measuring.limit_watch import LimitWatch
-from livebode_design.measuring.log_table import LogTable
-from livebode_design.measuring.steady_part import steady_part
 
 REST_S = 0.25
 """Recorded and watched before anything is played."""
@@ -25,6 +24,8 @@ ZERO_S = 0.05
 LATE_S = 2.0
 _LOOK_S = 0.05
 _STEADY_SHARE = 0.9
+TOLERANCE = 0.01
+"""Largest difference from the design, as a share of its peak: rounding and the text of a controller are less."""
 Say = Callable[[str], None]
 
 
@@ -242,3 +243,129 @@ def _silent(seconds: float) -> MeasurementError:
         "check the controller",
         silent_s=seconds,
     )
+
+
+class LimitWatch:
+    """Finds the first sample beyond a limit.
+
+    Parameters
+    ----------
+    ranges
+        Lowest and highest permitted value of each limited channel.
+    channels
+        Names of the channels that are received.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such channel.
+    """
+
+    def __init__(self, ranges: Mapping[str, tuple[float, float]], channels: Sequence[str]) -> None:
+        for name in ranges:
+            if name not in channels:
+                raise ConfigError(
+                    "key-unknown",
+                    f"measure.limits.{name}: there is no channel {name!r}",
+                    nearest_name(name, list(channels)),
+                    key=f"measure.limits.{name}",
+                )
+        self._ranges = dict(ranges)
+
+    def check(self, block: Block) -> MeasurementError | None:
+        """The first violation in a Block; a value that is not finite is one."""
+        first: tuple[int, str] | None = None
+        for name, (low, high) in self._ranges.items():
+            with np.errstate(invalid="ignore"):
+                beyond = ~((block[name] >= low) & (block[name] <= high))
+            if beyond.any() and (first is None or int(beyond.argmax()) < first[0]):
+                first = int(beyond.argmax()), name
+        if first is None:
+            return None
+        at, name = first
+        value, (low, high) = float(block[name][at]), self._ranges[name]
+        unit = next(channel.unit for channel in block.channels if channel.name == name)
+        return MeasurementError(
+            "limit-exceeded",
+            f"{name} = {value:.6g} {unit} at {(block.start + at) / block.rate_hz:.4f} s is outside of its limits "
+            f"{low:g} … {high:g} {unit}",
+            "reduce the amplitude, or correct measure.limits",
+            channel=name,
+            value=value,
+            low=low,
+            high=high,
+            sample=block.start + at,
+        )
+
+
+class LogTable:
+    """Appends Blocks to a new CSV file with a time column.
+
+    Raises
+    ------
+    OutputError
+        If the disk reports an error.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with writing(path):
+            self._file = path.open("x", encoding="utf-8")
+        self._empty = True
+
+    def append(self, block: Block) -> None:
+        """Write the samples of a Block."""
+        text = io.StringIO()
+        if self._empty:
+            units = [f"{c.name} [{c.unit}]" if c.unit else c.name for c in block.channels]
+            text.write(",".join(["t [s]", *units]) + "\n")
+            self._empty = False
+        time_s = np.arange(block.start, block.start + len(block)) / block.rate_hz
+        np.savetxt(text, np.vstack([time_s, block.data]).T, fmt="%.12g", delimiter=",")
+        with writing(self._path):
+            self._file.write(text.getvalue())
+            self._file.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+
+def steady_part(played: NDArray[np.float64], period: NDArray[np.float64]) -> tuple[int, int]:
+    """First sample of the longest span in which `played` repeats `period`, and the sample after it.
+
+    Parameters
+    ----------
+    played
+        The recorded excitation, shape (samples,), at least three periods.
+    period
+        One period of the design.
+
+    Returns
+    -------
+    Both are 0 where the excitation was never played.
+
+    Examples
+    --------
+    >>> period = np.array([1.0, -1.0, 0.5, -0.5])
+    >>> steady_part(np.concatenate([[0.0, 0.1], np.tile(np.roll(period, 1), 5), [0.0]]), period)
+    (2, 22)
+    """
+    window, count = period.size, played.size // period.size
+    if count < 1:
+        return 0, 0
+    # The period in the middle is the one that is least likely to be in a ramp.
+    middle = played[count // 2 * window :][:window]
+    if middle.size < window:
+        middle = played[:window]
+    matched = np.fft.irfft(np.fft.rfft(middle) * np.conj(np.fft.rfft(period)), window)
+    expected = np.roll(period, int(np.argmax(matched)))[np.arange(played.size) % window]
+    same = np.abs(played - expected) <= TOLERANCE * np.max(np.abs(period))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]])))
+    spans = edges.reshape(-1, 2)
+    if not len(spans):
+        return 0, 0
+    first, last = spans[np.argmax(spans[:, 1] - spans[:, 0])]
+    return int(first), int(last)

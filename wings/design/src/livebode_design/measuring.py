@@ -11,15 +11,12 @@ from typing import Any
 from livebode.core import ConfigError, MeasurementError, write_whole, writing
 from livebode.plugins import loaded, named
 from livebode.sources.live import MeasureSection, Player, SourceSettings, make_source
-from livebode_design._choose import choose
 from livebode_design.design import Design
-from livebode_design.designing import Picture, design_experiment
+from livebode_design.designing import design_experiment
 from livebode_design.experiment import Experiment
-from livebode_design.measuring.playback import Playback, StopRequest
+from livebode_design.playback import Playback, StopRequest
 
 LOG = "log.csv"
-
-__all__ = ["Made", "Prepared", "StopRequest", "measure", "prepare"]
 
 
 @dataclass(frozen=True)
@@ -123,7 +120,7 @@ def prepare(experiment: Experiment) -> Prepared:
         )
     signals, limits = experiment.signal_names(), experiment.machine_limits()
     player = make_player(experiment.source, experiment.measure, signals["excitation"])
-    design = choose(experiment.spec(), experiment.machine(), limits)
+    design = experiment.design()
     ranges = experiment.measure.ranges()
     if "input" in signals and limits.torque_n_m_max < inf:
         ranges.setdefault(signals["input"], (-limits.torque_n_m_max, limits.torque_n_m_max))
@@ -163,7 +160,7 @@ def measure(
     request: StopRequest,
     *,
     say: Callable[[str], None],
-    draw: Picture | None = None,
+    draw: Callable[[Design, Path], object] | None = None,
 ) -> Made:
     """Write the design to a new directory, play it, and record it there as log.csv; axis.toml uses its steady part.
 
