@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from livebode.core import Lines
-from livebode.excitation import chirp, chirp_lines, multisine, prbs
-from livebode.experiment_design import Waveform, belt_machine, peaks, worst
+from livebode.excitation import Waveform, chirp, chirp_lines, multisine, prbs
 from livebode.simulation import (
     BeltAxis,
     Drive,
@@ -24,6 +23,7 @@ from livebode.simulation import (
     Strokes,
     extremes,
 )
+from livebode_design import belt_machine, peaks, worst
 
 LINES = Lines.parse("20:140:20", 4000, 400)
 FINE = Lines.parse("10:150:5", 4000, 1600)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from livebode.configuration import axis_schema
-from livebode.experiments.experiment_schema import experiment_schema, matrix_experiment_schema
+from livebode_design.experiment_schema import experiment_schema, matrix_experiment_schema
 from livebode_plant.archive.settings import archive_schema
 
 HEAD = """# Configuration
@@ -58,10 +58,10 @@ MORE = {
     "[publish]": "[Connections](../how-to/connect/index.md) has a page for each kind.",
     "belt": "See [the simulated axis](axis.md).",
     "measured": "A limit on a quantity whose extremes are not known is rejected.",
-    "drives": "See [several motors](../how-to/excitation.md#several-motors).",
+    "drives": "See [several motors](../../wings/design/docs/excitation.md#several-motors).",
     "cluster": "See [archives](../../wings/plant/docs/archive.md).",
-    "measure": "See [measuring](../how-to/measure.md).",
-    "excitation": "See [excitation design](../how-to/excitation.md).",
+    "measure": "See [measuring](../../wings/design/docs/measure.md).",
+    "excitation": "See [excitation design](../../wings/design/docs/excitation.md).",
 }
 """Text below the heading of a table."""
 LOOP = """As in axis.toml; by default the loop of the run. `[loop.velocity]` belongs to an output that is a velocity,

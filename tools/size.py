@@ -144,10 +144,11 @@ def figures(measured: dict[str, Size], trace: RunTrace) -> dict[str, str]:
 
 def main() -> None:
     """Print both tables, or the limits."""
-    measured, bound = sizes(), limits()
+    measured = sizes()
     if sys.argv[1:] == ["--limits"]:
         print(limits_text(measured), end="")
         return
+    bound = limits()
     print(f"{'package':32}{'lines':>16}{'files':>12}{'imports':>14}   (limit)")
     for name, size in sorted(measured.items(), key=lambda item: -item[1].lines):
         cells = [f"{value:,} ({bound.get(name, {}).get(key, 0):,})" for key, value in asdict(size).items()]

@@ -1,4 +1,4 @@
-"""`python -m bench.versions.equality --base REV`: what commands print and write, of the working tree and of another commit.
+"""`python -m bench.versions.equality --base REV`: what commands print and write, of this version and of another commit.
 
 Each version runs `COMMANDS` in a directory of the same name, so that paths in results are the same. The base runs them
 twice: what differs between its own two runs (times of day, durations, names of temporary files) is not compared. What

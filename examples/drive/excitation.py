@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 
 from livebode import Lines, multisine
-from livebode.experiment_design import Waveform, write
+from livebode.excitation import Waveform
+from livebode_design import write
 
 RATE_HZ, WINDOW, AMPLITUDE_N_M, RAMP_S = 4000, 400, 0.05, 0.5
 

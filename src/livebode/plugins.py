@@ -30,6 +30,7 @@ GROUPS: Mapping[str, type[Mapping[str, Any]] | type[Sequence[Any]]] = {
     "estimates": Mapping,
     "documents": Mapping,
     "examples": Mapping,
+    "files": Mapping,
 }
 """The groups, and the type of their tables; a mapping has the name of each part."""
 _OWN = "livebode"

@@ -344,7 +344,7 @@ NOT_HERE = {
     "doctor --bundle": "after results that are not exactly once, which no situation makes",
     "livebode that wrote them": "another version of the package",
     "livebode doctor": "needs a machine",
-    "livebode design": "needs a controller: tests/experiments",
+    "livebode design": "needs a controller: wings/drives/tests",
     "livebode and start it again": "a live run: tests/runtime",
     "livebode first": "a live run: tests/runtime",
     "livebode after it": "needs LinuxCNC",

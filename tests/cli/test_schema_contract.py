@@ -5,7 +5,7 @@ import json
 import pytest
 
 from livebode.configuration import axis_schema
-from livebode.experiments.experiment_schema import experiment_schema
+from livebode_design.experiment_schema import experiment_schema
 from tests.support.command import livebode
 
 

@@ -17,7 +17,7 @@ from livebode.configuration import MAY_BE_SECRET, Axis
 from livebode.core import OutputError
 from livebode.doctor import Check, Subject, bundle, write_bundle
 from livebode.doctor.secrets import REMOVED, Secrets
-from livebode.experiments import Experiment
+from livebode_design import Experiment
 from tests.support.command import livebode, signals
 from tests.support.runs import small_run
 from tests.support.small_axis import ONE_LINE

@@ -235,9 +235,16 @@ def test_an_invalid_configuration_fails_with_its_sentence(tmp_path: Path, text: 
     assert place in found["message"]
 
 
-def test_an_experiment_is_a_configuration_too() -> None:
-    code, checks = doctor(ROOT / "examples/experiment.toml")
-    assert "experiment" in checks["configuration"]["message"]
+@pytest.mark.parametrize(
+    ("file", "title"),
+    [
+        ("examples/experiment.toml", "an experiment"),
+        ("src/livebode/interface/example_files/several-motors.toml", "an experiment of several motors"),
+    ],
+)
+def test_an_experiment_is_a_configuration_too(file: str, title: str) -> None:
+    code, checks = doctor(ROOT / file)
+    assert checks["configuration"]["message"].endswith(f"is valid: {title}")
     assert checks["configuration"]["verdict"] == "ok"
     assert code == (2 if any(check["verdict"] == "failed" for check in checks.values()) else 0)
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from livebode import Lines, multisine
-from livebode.experiment_design import Waveform, write
+from livebode.excitation import Waveform
+from livebode_design import write
 from tools.firmware import KERNEL, ROOT, run
 
 FOLDER = ROOT / "examples" / "drive"

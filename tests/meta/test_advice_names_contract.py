@@ -16,8 +16,8 @@ import pytest
 
 from livebode.cli.app import app
 from livebode.configuration import axis_schema
-from livebode.experiments.experiment_schema import experiment_schema, matrix_experiment_schema
 from livebode.plugins import named
+from livebode_design.experiment_schema import experiment_schema, matrix_experiment_schema
 from livebode_plant.archive.settings import archive_schema
 from livebode_plant.fleet.settings import FleetSettings
 from tests.support.sentences import literals, made, templates, text_of

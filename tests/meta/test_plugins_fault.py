@@ -179,6 +179,21 @@ def test_without_the_wing_modes_its_section_is_refused_by_one_sentence(tmp_path:
     assert not (tmp_path / "run").exists()
 
 
+def test_without_the_wing_design_its_commands_and_its_function_name_the_wing(tmp_path: Path) -> None:
+    for name in ("design", "measure"):
+        done = without("design", name, tmp_path / "experiment.toml")
+        sentence = " ".join(done.stderr.replace("│", " ").split())
+        assert done.returncode == 2
+        assert f"No such command '{name}'. Its wing may be missing: install the wing design of livebode." in sentence
+    assert "choose axis or archive" in without("design", "schema", "experiment").stderr
+    code = "import sys; sys.modules['livebode_design'] = None; import livebode; livebode.design({})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr.splitlines()[-1] == (
+        "livebode.ExtraError: livebode.design belongs to the wing design of livebode, which was left out of the "
+        "installation; install the wing design too"
+    )
+
+
 def test_without_the_wing_of_many_machines_its_commands_and_examples_do_not_exist() -> None:
     commands = ("--help", "example", "fleet status", "schema archive", "schema axis")
     answers = {words: without("plant", *words.split()) for words in commands}

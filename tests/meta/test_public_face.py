@@ -28,6 +28,7 @@ PAGE = ROOT / "docs" / "reference" / "python.md"
 FACES = [
     "livebode",
     *(f"livebode.{path.parent.name}" for path in sorted(SOURCE.glob("*/__init__.pyi"))),
+    "livebode_design",
     "livebode_modes",
 ]
 SHARED = {"livebode.kernel._native", "livebode.simulation._axis"}
@@ -231,7 +232,7 @@ def _pins(lock: Path) -> dict[str, set[str]]:
     return pins
 
 
-@pytest.mark.parametrize("package", ["livebode", "livebode_modes", *FACES])
+@pytest.mark.parametrize("package", ["livebode", *FACES])
 def test_what_a_package_loads_when_it_is_used_has_the_name_of_no_module_of_it(package: str) -> None:
     """Else the module, once loaded, would be found in its place."""
     loaded = import_module(package)

@@ -24,15 +24,14 @@ _BESIDE, _NEW, _TEMPORARY = "a file beside its place", "a file in a new director
 WRITING_MODULES = {
     _BESIDE: (
         "cli/schema_command",
-        "experiment_design/files/arrays", "experiment_design/files/c_header", "experiment_design/files/delimited",
-        "experiment_design/files/structured_text", "experiments/matrix_files",
         "export/delimited", "export/lpv", "export/matrix_delimited", "export/parameters", "export/universal",
-        "livebode_control/strokes/angle_table", "livebode_drives/plc_command",
+        "livebode_control/strokes/angle_table", "livebode_design/files", "livebode_design/matrix/matrix_files",
+        "livebode_drives/plc_command",
         "livebode_plant/cli/archive/trend_command", "livebode_plant/lake/lake",
         "livebode_reports/files", "livebode_reports/pdf", "tables/parquet_writer",
     ),
     _NEW: (
-        "experiments/designing", "experiments/matrix_designing", "interface/example_recordings",
+        "interface/example_recordings", "livebode_design/designing",
         "livebode_plant/fleet/credentials", "records/run_directory", "records/table_file",
     ),
     _TEMPORARY: ("livebode_plant/archive/alone", "livebode_plant/fleet/server", "livebode_plant/fleet/demo"),

@@ -17,8 +17,8 @@ import typer
 from livebode.cli.app import app
 from livebode.configuration import Axis, tables_of
 from livebode.configuration.axes import merged
-from livebode.experiments import Experiment, MatrixExperiment
-from livebode.experiments.matrix_experiment import TABLES
+from livebode_design import Experiment, MatrixExperiment
+from livebode_design.matrix.matrix_experiment import TABLES
 from livebode_plant.archive.settings import ArchiveSettings
 from livebode_plant.fleet.settings import FleetSettings
 from tests.support.pages import PAGES, ROOT, steps_of

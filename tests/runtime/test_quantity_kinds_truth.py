@@ -17,12 +17,12 @@ from livebode.analysis.fits import fit_run
 from livebode.configuration import Axis, FitSection, LoopSection, PIDSection
 from livebode.core import Block, Channel, ConfigError, Event, PlantKinds, RecordingError, SourceError, SpectraLayout
 from livebode.estimation import Settings, Tracker
-from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.records import RUN, RunRecord
 from livebode.records.summary_file import to_document
 from livebode.runtime import Destination, run
 from livebode.sources import open_log
 from livebode.sources.live import SourceSettings, SpectraBatch, open_source
+from livebode_design.measured_axis import MeasuredAxis, MeasuredSection
 from tests.support.command import LINES, signals, write_csv, write_parquet
 from tests.support.errors import refused
 

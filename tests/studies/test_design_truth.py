@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from livebode.experiment_design import Waveform, belt_machine, peaks, worst
+from livebode.excitation import Waveform
 from livebode.simulation import extremes
+from livebode_design import belt_machine, peaks, worst
 from studies.design import MOVING, STANDSTILL
 
 

@@ -1,3 +1,4 @@
+from livebode.cli.band import parsed_band as parsed_band
 from livebode.cli.commands import Command as Command
 from livebode.cli.learned_baseline import baseline_text as baseline_text
 from livebode.cli.learned_baseline import check_replaceable as check_replaceable
@@ -22,6 +23,7 @@ from livebode.cli.query_result import RowsMax as RowsMax
 from livebode.cli.query_result import check_form as check_form
 from livebode.cli.query_result import print_result as print_result
 from livebode.cli.remote import results_directory as results_directory
+from livebode.cli.running import run_targets as run_targets
 from livebode.cli.serving import dashboard_of as dashboard_of
 from livebode.cli.serving import print_line as print_line
 from livebode.cli.serving import wait_for_the_end as wait_for_the_end

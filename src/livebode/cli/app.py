@@ -28,7 +28,7 @@ from livebode.cli.log_options import File, Level, LogOptions, logged
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
 from livebode.core import DamageWarning, LivebodeError, needing
-from livebode.plugins import PluginWarning, loaded, named
+from livebode.plugins import PluginWarning, loaded, named, wings_left_out
 from livebode.version import __version__
 
 _HELP = {"help_option_names": ["--help", "-h"]}
@@ -139,7 +139,13 @@ class _Group(_Light, TyperGroup):
         """The command that the arguments begin with, to be run or completed."""
         if f"--{args[0]}" in _OPTIONS and args[0] not in self._table:
             ctx.fail(f"No such command {args[0]!r}. Did you mean 'livebode --{args[0]}'?")
-        name, listed, rest = super().resolve_command(ctx, args)
+        try:
+            name, listed, rest = super().resolve_command(ctx, args)
+        except typer.TyperException as error:
+            if ctx.parent is None and (left_out := wings_left_out("commands")):
+                wings = " or ".join(f"the wing {name}" for name in left_out)
+                error.message += f" Its wing may be missing: install {wings} of livebode."
+            raise
         return name, listed and self.commands[listed.name or ""], rest
 
 

@@ -23,18 +23,17 @@ class Command(NamedTuple):
         group.
     commands
         The commands of a group by name.
+    python
+        "module:name" of the function that a name of the package `livebode` calls to do the same.
     extra
         Extra of livebode with PyArrow, which the modules of a group import.
-    schema
-        "module:name" of the function with the JSON Schema of the file NAME.toml that a command or a group reads, for
-        `livebode schema NAME`.
     """
 
     summary: str
     function: str = ""
     commands: Mapping[str, Command] = MappingProxyType({})
     extra: str = ""
-    schema: str = ""
+    python: str = ""
 
 
 COMMANDS: Mapping[str, Command] = {
@@ -62,14 +61,6 @@ COMMANDS: Mapping[str, Command] = {
         "Write the configuration of a recording: list its channels, propose their roles, ask, and "
         "find lines and window.",
         "livebode.cli.new_command:new_command",
-    ),
-    "design": Command(
-        "Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml.",
-        "livebode.cli.design_command:design_command",
-    ),
-    "measure": Command(
-        "Design an excitation, play it on the controller, record, and track the response; Ctrl-C ramps it down.",
-        "livebode.cli.measure_command:measure_command",
     ),
     "query": Command("Query the tables of a run with SQL (DuckDB).", "livebode.cli.query_command:query_command"),
     "export": Command(

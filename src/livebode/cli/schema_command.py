@@ -10,12 +10,6 @@ import typer
 from livebode.cli.options import Json
 from livebode.core import UsageError
 
-_FILES = {
-    "axis": "livebode.configuration.schema:axis_schema",
-    "experiment": "livebode.experiments.experiment_schema:experiment_schema",
-    "matrix-experiment": "livebode.experiments.experiment_schema:matrix_experiment_schema",
-}
-
 
 def schema_command(
     file: Annotated[
@@ -40,7 +34,7 @@ def schema_command(
     from livebode.plugins import loaded, named
     from livebode.records import to_json
 
-    files = _FILES | {name: command.schema for name, command in named("commands").items() if command.schema}
+    files = named("files")
     if file not in files:
         raise UsageError(
             "not-one-of",
@@ -50,7 +44,7 @@ def schema_command(
             value=file,
             allowed=list(files),
         )
-    text = to_json(loaded(files[file])(), indent=2)
+    text = to_json(loaded(files[file].schema)(), indent=2)
     if out is None:
         print(text)
         return

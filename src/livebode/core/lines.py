@@ -180,6 +180,22 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
         return np.asarray(self.bins) * self.rate_hz / self.window
 
     @property
+    def text(self) -> str:
+        """The lines as `parse` reads them: in Hz where that is short, else in bins.
+
+        >>> Lines((2, 4, 6, 9), window=400, rate_hz=4000.0).text
+        '20:60:20, 90'
+        >>> Lines((1, 2, 3), window=2047, rate_hz=4000.0).text
+        'k=1:3:1'
+        """
+        runs = _runs(list(self.bins))
+        in_hz = [[f"{k * self.rate_hz / self.window:.6g}" for k in run] for run in runs]
+        values = ((float(f), k * self.rate_hz / self.window) for fs, run in zip(in_hz, runs) for f, k in zip(fs, run))
+        if all(shown == exact for shown, exact in values):
+            return ", ".join(":".join(fs) for fs in in_hz)
+        return ", ".join(f"k={':'.join(map(str, run))}" for run in runs)
+
+    @property
     def z(self) -> NDArray[np.complex128]:
         """e^(jωTs) at each line, shape (lines,)."""
         return np.exp(2j * np.pi * np.asarray(self.bins) / self.window)
@@ -286,6 +302,24 @@ def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Frac
             limit=_LINES_MAX,
         )
     return [(start + i * step) * unit for i in range(count)]
+
+
+def _runs(bins: list[int]) -> list[list[int]]:
+    """Ranges of bins with a constant step, each as start, stop and step, or single bins."""
+    runs: list[list[int]] = []
+    start = 0
+    while start < len(bins):
+        step = bins[start + 1] - bins[start] if start + 1 < len(bins) else 0
+        end = start + 1
+        while end + 1 < len(bins) and bins[end + 1] - bins[end] == step:
+            end += 1
+        if end - start >= 2 and end < len(bins):
+            runs.append([bins[start], bins[end], step])
+            start = end + 1
+        else:
+            runs.append([bins[start]])
+            start += 1
+    return runs
 
 
 def _off_grid(line: Fraction, required: list[Fraction], rate_hz: float, window: int) -> GridError:

@@ -69,7 +69,7 @@ def _parts(subject: Subject, checks: Sequence[Check]) -> Iterator[tuple[str, str
     # First: what is removed here is removed from everything behind it.
     configuration = None
     if subject.table is not None:
-        configuration = secrets.configuration(subject.table, experiment=subject.experiment)
+        configuration = secrets.configuration(subject.table, subject.kind)
     run = None if subject.run is None else _summary(subject.run, secrets)
     yield "doctor.json", _json(secrets.plain({
         "written": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",

@@ -16,7 +16,7 @@ def check_configuration(subject: Subject) -> Check:
     if (error := subject.problems.get(NAME)) is not None:
         return Check.of_error(NAME, error)
     axes = "1 axis" if len(subject.axes) == 1 else f"{len(subject.axes)} axes"
-    what = "an experiment" if subject.experiment else axes
+    what = subject.kind.title if subject.kind is not None else axes
     facts = {"path": str(subject.configuration), "axes": list(subject.axes)}
     return Check(NAME, "ok", f"{subject.configuration} is valid: {what}", facts=facts)
 

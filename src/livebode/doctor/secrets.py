@@ -13,9 +13,9 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-from livebode.configuration import MAY_BE_SECRET, Axis
+from livebode.configuration import MAY_BE_SECRET, Axis, FileKind
 from livebode.core import LivebodeError
-from livebode.experiments import Experiment
+from livebode.plugins import loaded
 from livebode.sources.live import parse_address, secret
 
 REMOVED = "[removed]"
@@ -40,10 +40,10 @@ class Secrets:
         self._folder = folder
         self._found: set[str] = set()
 
-    def configuration(self, table: Mapping[str, Any], *, experiment: bool = False) -> dict[str, Any]:
+    def configuration(self, table: Mapping[str, Any], kind: FileKind | None = None) -> dict[str, Any]:
         """A configuration, valid or not, as plain data without secrets."""
-        if experiment:
-            return self._fields(table, Experiment)
+        if kind is not None:
+            return self._fields(table, loaded(kind.model))
         shared = {key: value for key, value in table.items() if key != "axes"}
         kept = self._fields(shared, Axis)
         if "axes" in table:

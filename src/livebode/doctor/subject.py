@@ -7,9 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from livebode.configuration import Axis, axes_of, parse_table, read_bytes, recorded_configuration
+from livebode.configuration import (
+    Axis,
+    FileKind,
+    axes_of,
+    kind_of_file,
+    parse_table,
+    read_bytes,
+    recorded_configuration,
+)
 from livebode.core import LivebodeError, UsageError
-from livebode.experiments import Experiment
+from livebode.plugins import loaded
 from livebode.preparation import live_follower
 from livebode.records import RunRecord
 
@@ -21,11 +29,11 @@ class Subject:
     Attributes
     ----------
     configuration
-        The file of axes or of an experiment; None where none was given.
+        The file of axes or of another kind; None where none was given.
     table
         What is in it, as plain data; None where it is not TOML.
-    experiment
-        Whether it describes an experiment.
+    kind
+        The kind of the file; None for axes.
     axes
         The axes in it, else that of the run; empty where they cannot be used.
     run
@@ -38,7 +46,7 @@ class Subject:
 
     configuration: Path | None = None
     table: Mapping[str, Any] | None = None
-    experiment: bool = False
+    kind: FileKind | None = None
     axes: Mapping[str, Axis] = field(default_factory=dict)
     run: RunRecord | None = None
     run_path: Path | None = None
@@ -72,7 +80,7 @@ def _read(configuration: Path | None, run_path: Path | None) -> Subject:
     table: Mapping[str, Any] | None = None
     axes: Mapping[str, Axis] = {}
     run: RunRecord | None = None
-    experiment = False
+    kind: FileKind | None = None
     if run_path is not None:
         try:
             run = RunRecord.open(run_path, on_damage=lambda _: None, matrix=True)
@@ -84,22 +92,15 @@ def _read(configuration: Path | None, run_path: Path | None) -> Subject:
         try:
             data = read_bytes(configuration)
             table = parse_table(data, str(configuration))
-            experiment = "excitation" in table
-            if experiment:
-                _check_experiment(configuration)
+            kind = kind_of_file(table)
+            if kind is not None:
+                loaded(kind.model).read(configuration).check()
             else:
                 axes = axes_of(data, configuration, {})
                 _check_axes(axes, configuration)
         except LivebodeError as error:
             problems["configuration"] = error
-    return Subject(configuration, table, experiment, axes, run, run_path, problems)
-
-
-def _check_experiment(path: Path) -> None:
-    found = Experiment.read(path)
-    found.spec()
-    found.machine_limits()
-    found.signal_names()
+    return Subject(configuration, table, kind, axes, run, run_path, problems)
 
 
 def _check_axes(axes: Mapping[str, Axis], path: Path) -> None:

@@ -26,7 +26,6 @@ from livebode.excitation.period import find_period as find_period
 from livebode.excitation.prepare import checked as checked
 from livebode.excitation.prepare import clipped as clipped
 from livebode.excitation.prepare import filled as filled
-from livebode.excitation.shaped import equal_snr as equal_snr
 from livebode.excitation.significance import find_lines as find_lines
 from livebode.excitation.slips import Slip as Slip
 from livebode.excitation.slips import find_slips as find_slips
@@ -34,3 +33,4 @@ from livebode.excitation.stepped import stepped_lines as stepped_lines
 from livebode.excitation.stepped import stepped_sine as stepped_sine
 from livebode.excitation.transient import leading as leading
 from livebode.excitation.transient import unlike as unlike
+from livebode.excitation.waveform import Waveform as Waveform

@@ -32,7 +32,7 @@ def low_crest_phases(
     Pintelon, Kollár (IEEE Trans. Instrum. Meas. 40(6), 1991). A descent ends in the local minimum of its start, so
     there are many starts: the first has Schroeder's phases, half are perturbations of these, half are random. A quarter
     continue to the highest p, and the lowest crest factor is selected. The same seed gives the same phases.
-    docs/how-to/excitation.md compares the results with other methods.
+    wings/design/docs/excitation.md compares the results with other methods.
 
     Parameters
     ----------

@@ -7,9 +7,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from livebode.core import ConfigError
-from livebode.experiment_design import Design, choose
-from livebode.experiments import Experiment, design_experiment
+from livebode.core import ExtraError
+from livebode.plugins import loaded, named
 
 
 def design(
@@ -21,14 +20,14 @@ def design(
     amplitude_n_m: float | Sequence[float] | None = None,
     accuracy: float | None = None,
     seed: int | None = None,
-) -> Design:
+) -> Any:
     """Choose lines, window, amplitude and hop for a machine; as `livebode design`.
 
     Parameters
     ----------
     experiment
-        Description of machine, limits and required accuracy: a TOML file as in docs/how-to/excitation.md, or the same
-        as a mapping.
+        Description of machine, limits and required accuracy: a TOML file as in
+        wings/design/docs/excitation.md, or the same as a mapping.
     directory
         New directory for the excitation and axis.toml, in every format; default: nothing is written.
     band_hz, resolution_hz, amplitude_n_m, accuracy, seed
@@ -37,7 +36,8 @@ def design(
     Returns
     -------
     Design
-        Its `choices` explain it, `waveform` is the excitation, and `peaks` are the predicted ones.
+        A `livebode_design.Design`: its `choices` explain it, `waveform` is the excitation, and `peaks` are the
+        predicted ones.
 
     Raises
     ------
@@ -47,6 +47,8 @@ def design(
         If no excitation meets the required accuracy within the limits.
     OutputError
         If the directory exists.
+    ExtraError
+        If the wing design was left out of the installation.
 
     Examples
     --------
@@ -57,6 +59,14 @@ def design(
     >>> found.waveform.lines.window, found.hop
     (400, 20)
     """
+    command = named("commands").get("design")
+    if command is None:
+        raise ExtraError(
+            "not-installed",
+            "livebode.design belongs to the wing design of livebode, which was left out of the installation",
+            "install the wing design too",
+            package="livebode_design",
+        )
     given = {
         "band_hz": None if band_hz is None else [float(f) for f in band_hz],
         "resolution_hz": resolution_hz,
@@ -65,16 +75,4 @@ def design(
         "seed": seed,
     }
     over = {name: value for name, value in given.items() if value is not None}
-    asked = _described(experiment, over)
-    if directory is None:
-        return choose(asked.spec(), asked.machine(), asked.machine_limits())
-    return design_experiment(asked, Path(directory)).design
-
-
-def _described(experiment: str | PathLike[str] | Mapping[str, Any], over: Mapping[str, Any]) -> Experiment:
-    if not isinstance(experiment, Mapping):
-        return Experiment.read(Path(experiment), over)
-    required = experiment.get("excitation")
-    if not isinstance(required, Mapping):
-        raise ConfigError("key-missing", "'excitation' is missing", "add it, with the band", key="excitation")
-    return Experiment.of({**experiment, "excitation": {**required, **over}}, "the description")
+    return loaded(command.python)(experiment, None if directory is None else Path(directory), over)

@@ -14,8 +14,6 @@ from livebode.pictures.bode import bode_figure as bode_figure
 from livebode.pictures.canvas import Canvas as Canvas
 from livebode.pictures.canvas import Scale as Scale
 from livebode.pictures.canvas import written as written
-from livebode.pictures.excitation import excitation_figure as excitation_figure
-from livebode.pictures.excitation import save_excitation_picture as save_excitation_picture
 from livebode.pictures.loop import loop_figure as loop_figure
 from livebode.pictures.loop import round_numbers as round_numbers
 from livebode.pictures.loop import save_loop_picture as save_loop_picture
@@ -23,8 +21,6 @@ from livebode.pictures.map import frequency_edges as frequency_edges
 from livebode.pictures.matrix import matrix_figure as matrix_figure
 from livebode.pictures.matrix import save_matrix_pictures as save_matrix_pictures
 from livebode.pictures.matrix import singular_values_figure as singular_values_figure
-from livebode.pictures.matrix_excitation import matrix_excitation_figure as matrix_excitation_figure
-from livebode.pictures.matrix_excitation import save_matrix_excitation_picture as save_matrix_excitation_picture
 from livebode.pictures.png import save as save
 from livebode.pictures.png import save_pictures as save_pictures
 from livebode.pictures.summary import MEAN_C as MEAN_C

@@ -12,7 +12,6 @@ from livebode.configuration import Axis
 from livebode.core import Lines, LivebodeError, counted
 from livebode.estimation import DETECTION_LINES_MIN
 from livebode.excitation import recognise
-from livebode.experiment_design import lines_text
 from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.plan import beginning, make_settings, roles_in_doubt
 from livebode.sources import Log
@@ -77,7 +76,7 @@ def settled(log: Log, tables: Tables, reasons: Mapping[str, str]) -> Settled:
     if "schedule" in tables["signals"] and len(lines.quiet) < DETECTION_LINES_MIN:
         lines = Lines(tuple(2 * k for k in lines.bins), lines.window * 2, log.rate_hz)
         periods = "two periods, so that bins without excitation show the noise in motion"
-    found = {"frequencies": lines_text(lines), "window": lines.window}
+    found = {"frequencies": lines.text, "window": lines.window}
     ends = f"{lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz"
     comments["lines", "frequencies"] = f"{counted(len(lines), 'line')}, {ends}"
     comments["lines", "window"] = f"samples: {lines.window / log.rate_hz:.6g} s, {periods}"

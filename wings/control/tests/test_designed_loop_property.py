@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from livebode import Lines, multisine
 from livebode.configuration import LoopSection
-from livebode.experiments import Experiment
 from livebode.simulation import BeltAxis, Mechanics, SimulatedAxis
 from livebode_control.loop_check.loop_check import check_loop
 from livebode_control.loop_check.loop_equation import LoopSignals
+from livebode_design import Experiment
 
 LINES = Lines.parse("20:140:20", rate_hz=4000, window=400)
 

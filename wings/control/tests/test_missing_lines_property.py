@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from livebode.core import Lines
-from livebode.experiment_design import ExperimentSpec
-from livebode.experiment_design.grid import grid
 from livebode_control.tuning.missing_lines import MissingLines
+from livebode_design import ExperimentSpec
+from livebode_design.grid import grid
 
 
 @st.composite

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines, RecordingError
-from livebode.excitation import multisine
-from livebode.experiment_design import Waveform, write
+from livebode.excitation import Waveform, multisine
 from livebode.structured_text import multisine as block_text
+from livebode_design import write
 from livebode_drives.designed import read_designed
 from tests.support.command import livebode
 from tests.support.errors import refused

@@ -12,10 +12,10 @@ import pytest
 from livebode.analysis import mean_of
 from livebode.configuration import Axis
 from livebode.core import MeasurementError
-from livebode.experiments import Experiment, Prepared, design_experiment, measure, prepare
-from livebode.experiments.measuring.playback import StopRequest
 from livebode.records import RunRecord
 from livebode.runtime import Destination, run
+from livebode_design import Experiment, Prepared, design_experiment, measure, prepare
+from livebode_design.playback import StopRequest
 from livebode_drives.designed import read_designed
 from tests.support.command import write_csv
 from tests.support.errors import refused

@@ -12,9 +12,9 @@ import pytest
 from numpy.typing import NDArray
 
 from livebode.core import ConfigError, MeasurementError
-from livebode.experiments import Experiment, prepare
-from livebode.experiments.measuring.player import make_player
 from livebode.sources.live import SourceSettings
+from livebode_design import Experiment, prepare
+from livebode_design.measuring import make_player
 from tests.support.command import livebode
 from tests.support.errors import refused
 from tests.support.forked import Command

@@ -34,6 +34,8 @@ from livebode.sources.live.next_spectrum import NextSpectrum as NextSpectrum
 from livebode.sources.live.opening import make_source as make_source
 from livebode.sources.live.opening import open_source as open_source
 from livebode.sources.live.pauses import Pauses as Pauses
+from livebode.sources.live.player import MeasureSection as MeasureSection
+from livebode.sources.live.player import Player as Player
 from livebode.sources.live.position import Origin as Origin
 from livebode.sources.live.position import Position as Position
 from livebode.sources.live.reach import TIMEOUT_S as TIMEOUT_S

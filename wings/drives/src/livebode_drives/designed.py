@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Lines, RecordingError
-from livebode.experiment_design import Waveform
+from livebode.excitation import Waveform
 
 _RAMP_S_MAX = 3600.0
 

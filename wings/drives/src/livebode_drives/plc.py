@@ -9,7 +9,7 @@ from livebode import multisine
 from livebode.arrays import Floats
 from livebode.configuration import Axis
 from livebode.core import ConfigError, Lines, UsageError, counted
-from livebode.experiment_design import Waveform
+from livebode.excitation import Waveform
 from livebode.sources.live import named_channels
 from livebode.structured_text import SMALLEST, check_rate
 from livebode_drives.settings import DriveKeys

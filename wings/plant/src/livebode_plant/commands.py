@@ -1,10 +1,11 @@
-"""The commands of many machines: the first sentence of the help of each and its function."""
+"""The commands of many machines: the first sentence of the help of each and its function; the kind of their file."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from livebode.cli import Command
+from livebode.configuration import FileKind
 
 _ARCHIVE: Mapping[str, Command] = {
     "run": Command(
@@ -96,7 +97,6 @@ COMMANDS: Mapping[str, Command] = {
         "Track every recording of an archive on all cores or a cluster, and keep the results in one lake.",
         commands=_ARCHIVE,
         extra="archive",
-        schema="livebode_plant.archive.settings:archive_schema",
     ),
     "fleet": Command(
         "Track the axes of a fleet from a log on several workers: every result once, also when a worker dies.",
@@ -104,3 +104,5 @@ COMMANDS: Mapping[str, Command] = {
         extra="fleet",
     ),
 }
+
+FILES: Mapping[str, FileKind] = {"archive": FileKind("livebode_plant.archive.settings:archive_schema")}

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from livebode.core import MeasurementError
-from livebode.experiment_design import Waveform
-from livebode.experiments import MeasureSection, Player
-from livebode.sources.live import LiveSource
+from livebode.excitation import Waveform
+from livebode.sources.live import LiveSource, MeasureSection, Player
 from livebode_drives.live.ads import AdsSource, import_pyads
 
 EVERY_S = 0.1

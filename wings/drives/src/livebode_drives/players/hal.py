@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import MeasurementError
-from livebode.experiment_design import Waveform
-from livebode.experiments import MeasureSection, Player
-from livebode.sources.live import LiveSource
+from livebode.excitation import Waveform
+from livebode.sources.live import LiveSource, MeasureSection, Player
 from livebode_drives.live.hal import HalSource
 from livebode_drives.live.hal_wiring import STREAMER_KEY, fifo, halcmd, links, pin_value, program
 

@@ -1,5 +1,0 @@
-"""Experiments: an excitation for a machine, within its limits, with the predicted accuracy."""
-
-from livebode.on_first_use import on_first_use
-
-__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

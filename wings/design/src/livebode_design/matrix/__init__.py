@@ -1,0 +1,1 @@
+"""The design for a machine with several motors."""
