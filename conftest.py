@@ -9,8 +9,9 @@ would compile all that it imports.
 
 Half a million objects of modules and tests live from the collection to the end. The garbage collector does not visit
 them: a sixth of the time of a collection was its search through them. For what tests make it comes a tenth as often:
-they make much that they keep to their end, and memory is there. What is loaded by then is not freed at the end of the
-process either, about which nanobind in DuckDB prints a page: tests import DuckDB where they use it.
+they make much that they keep to their end, and memory is there. A process that has used DuckDB visits all of them once
+more at its end: what tests import, or a run of several axes in the process freezes, would else not be freed, and
+nanobind in DuckDB prints a page of what is left.
 
 A generated example has no time limit: on a busy computer it measures the neighbours.
 
@@ -69,6 +70,8 @@ def pytest_collection_finish() -> None:
 def pytest_sessionfinish() -> None:
     if (browsers := sys.modules.get("tests.support.browser")) is not None:
         browsers.end_chromium()
+    if "duckdb" in sys.modules:
+        gc.unfreeze()
 
 
 @pytest.hookimpl(wrapper=True)

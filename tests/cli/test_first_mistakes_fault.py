@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import pty
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
@@ -16,6 +12,7 @@ from livebode.configuration import read_serve_section
 from livebode.core.installing import _clone, _packages
 from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_csv, write_parquet
+from tests.support.terminals import on_terminal
 
 BYTES = {
     "picture.csv": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR",
@@ -151,25 +148,11 @@ def test_no_name_is_cut_in_a_narrow_terminal(folder: Path) -> None:
     long = "MAIN.fbAxis.stStatus.fActualVelocityOfTheMotor"
     given = signals(400)
     write_parquet(folder / "long.parquet", {"t": given["t"], f"{long} [rad/s]": given["y"]})
-    text = on_terminal(40, "inspect", folder / "long.parquet") + on_terminal(40, "doctor", "--runs", folder)
+    text = "".join(
+        on_terminal(*words, columns=40)[1]
+        for words in (("inspect", folder / "long.parquet"), ("doctor", "--runs", folder))
+    )
     assert long in text
     assert "…" not in text
     for name in ("instruction set", "not applicable", "UDP receive buffer"):
         assert name in text
-
-
-def on_terminal(columns: int, *arguments: object) -> str:
-    reader, terminal = pty.openpty()
-    command = [Path(sys.executable).with_name("livebode"), *arguments]
-    environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": str(columns)}
-    process = subprocess.Popen(list(map(str, command)), stdout=terminal, stderr=terminal, env=environment)
-    os.close(terminal)
-    found = b""
-    try:
-        while piece := os.read(reader, 1 << 16):
-            found += piece
-    except OSError:  # so a terminal ends
-        pass
-    os.close(reader)
-    process.wait()
-    return found.decode()

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -20,7 +18,9 @@ from livebode.sources.live import Batch, encode_line
 from tests.support.baselines import with_checksum
 from tests.support.command import Result, livebode, write_parquet
 from tests.support.errors import refused
+from tests.support.forked import Command
 from tests.support.monitored import recorded, small_baseline
+from tests.support.peers.peer import PATIENCE_S
 
 SIGNALS = ["--excitation", "w", "--input", "u", "--output", "velocity"]
 OPTIONS = [*SIGNALS, "--lines", "20:140:20", "--window", "400", "--noise", "quiet"]
@@ -124,9 +124,9 @@ def changes_live(toml: Path, base: Path, out: Path) -> list[dict[str, object]]:
     axis = toml.with_name("live.toml")
     text = toml.read_text().replace(f'log = "{toml.stem}.parquet"', 'url = "stdin:"')
     axis.write_text(text)
-    command = [Path(sys.executable).with_name("livebode"), "run", axis, "--baseline", base, "--out", out]
-    done = subprocess.run([*map(str, command)], input=b"".join(lines), capture_output=True, check=False)
-    assert done.returncode == 0, done.stderr
+    with Command("run", axis, "--baseline", base, "--out", out) as process:
+        _, err = process.communicate(b"".join(lines), PATIENCE_S)
+        assert process.returncode == 0, err
     return [event for event in events(out) if str(event["kind"]).startswith("change")]
 
 

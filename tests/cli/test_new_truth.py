@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import pty
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -16,6 +13,7 @@ import pytest
 
 from livebode.interface import write_examples
 from tests.support.command import livebode, signals, write_csv
+from tests.support.terminals import on_terminal
 
 
 @pytest.fixture(scope="module")
@@ -98,31 +96,11 @@ def test_on_a_terminal_it_lists_the_channels_asks_again_after_a_wrong_name_and_t
         ("Excitation", "nonsense"), ("select one", "2"), ("Input", ""), ("Output", "velocity"), ("Schedule", "-"),
         ("Estimator", ""), ("Average", "n"), ("Model", "two-mass"),
     ]  # fmt: skip
-    code, text = asked(["new", folder / "moving.parquet", "--out", out], answers)
+    code, text = on_terminal("new", folder / "moving.parquet", "--out", out, columns=120, kind="dumb", answers=answers)
     assert code == 0, text
     assert "torque" in text
     assert tomllib.loads(out.read_text("utf-8"))["signals"] == {"excitation": "w", "input": "u", "output": "velocity"}
     assert "[fit]" in out.read_text("utf-8")
-
-
-def asked(arguments: list[object], answers: list[tuple[str, str]]) -> tuple[int, str]:
-    """Give each answer when the terminal shows its question."""
-    reader, terminal = pty.openpty()
-    command = [Path(sys.executable).with_name("livebode"), *arguments]
-    environment = os.environ | {"TERM": "dumb", "COLUMNS": "120"}
-    process = subprocess.Popen(
-        list(map(str, command)), stdin=terminal, stdout=terminal, stderr=terminal, env=environment
-    )
-    os.close(terminal)
-    shown, at, rest = "", 0, list(answers)
-    with contextlib.suppress(OSError):  # so a terminal ends
-        while piece := os.read(reader, 1 << 16):
-            shown += piece.decode()
-            while rest and rest[0][0] in shown[at:] and shown.endswith(": "):
-                at = len(shown)
-                os.write(reader, f"{rest.pop(0)[1]}\n".encode())
-    os.close(reader)
-    return process.wait(), shown
 
 
 def test_the_schedule_is_not_proposed_for_a_position_that_only_vibrates(tmp_path: Path) -> None:

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
-import pty
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
@@ -18,6 +13,7 @@ from hypothesis import strategies as st
 
 from livebode.cli.visible import visible
 from tests.support.command import livebode, signals
+from tests.support.terminals import on_terminal
 
 EVIL = "\x1b[2J\x1b]0;owned\x07\x9b31m\u202e"
 SHOWN = r"\u001b[2J\u001b]0;owned\u0007\u009b31m\u202e"
@@ -35,20 +31,9 @@ def evil(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def on_terminal(*arguments: object) -> str:
+def shown(*arguments: object) -> str:
     """What the command writes to a terminal, standard error included."""
-    reader, terminal = pty.openpty()
-    command = [Path(sys.executable).with_name("livebode"), *arguments]
-    environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "300"}
-    process = subprocess.Popen(list(map(str, command)), stdout=terminal, stderr=terminal, env=environment)
-    os.close(terminal)
-    found = b""
-    with contextlib.suppress(OSError):  # so a terminal ends
-        while piece := os.read(reader, 1 << 16):
-            found += piece
-    os.close(reader)
-    process.wait()
-    return found.decode()
+    return on_terminal(*arguments, columns=300)[1]
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +41,7 @@ def tracked(evil: Path) -> tuple[Path, str]:
     """A run on it, and what the terminal got."""
     out = evil.parent / "run"
     channels = ["--excitation", f"w{EVIL}", "--input", f"u{EVIL}", "--output", f"y{EVIL}"]
-    return out, on_terminal("run", evil, *channels, "--lines", "50,100,200", "--window", "100", "--out", out)
+    return out, shown("run", evil, *channels, "--lines", "50,100,200", "--window", "100", "--out", out)
 
 
 def is_harmless(text: str) -> bool:
@@ -65,8 +50,8 @@ def is_harmless(text: str) -> bool:
 
 
 def test_a_recordings_names_do_not_command_the_terminal(evil: Path, tracked: tuple[Path, str]) -> None:
-    named = [on_terminal("inspect", evil), on_terminal("inspect", evil, "--excitation", f"no{EVIL}")]
-    others = [tracked[1], on_terminal(f"no{EVIL}")]
+    named = [shown("inspect", evil), shown("inspect", evil, "--excitation", f"no{EVIL}")]
+    others = [tracked[1], shown(f"no{EVIL}")]
     assert all(map(is_harmless, named + others))
     assert all(SHOWN in text for text in named)
     assert "\x1b[" in tracked[1]  # the plot has its colours
@@ -75,12 +60,12 @@ def test_a_recordings_names_do_not_command_the_terminal(evil: Path, tracked: tup
 def test_events_of_a_stored_run_do_not_command_the_terminal(tracked: tuple[Path, str]) -> None:
     event = {"kind": "gap", "sample": 1, "time_s": 0.1, "message": EVIL, "details": {}}
     (tracked[0] / "events.jsonl").write_text(json.dumps(event) + "\n")
-    text = on_terminal("query", tracked[0], f"select message, 'x{EVIL}' as x from events")
+    text = shown("query", tracked[0], f"select message, 'x{EVIL}' as x from events")
     assert is_harmless(text)
 
 
 def test_the_help_has_colours_on_a_terminal_and_nowhere_else() -> None:
-    text = on_terminal("query", "--help")
+    text = shown("query", "--help")
     assert is_harmless(text)
     assert "\x1b[1;33mUsage: " in text
     assert "\x1b" not in livebode("query", "--help").out

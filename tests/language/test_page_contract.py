@@ -22,11 +22,10 @@ _PLACES = re.compile(r"\{(\w+)(:[^{}]*)?\}")
 def test_the_page_words_what_python_words(browser: Browser) -> None:
     templates = [text for text, own in catalogue("de").messages.items() if "{" in text and isinstance(own, str)]
     inner = Message("{missing_samples} samples were lost", missing_samples=12)
-    facts = {name: inner for text in templates for name, spec in _PLACES.findall(text) if not spec}
     numbers = {name: -1234.5 for text in templates for name, spec in _PLACES.findall(text) if spec}
     with moments_by(RunClock([(0.0, 1.7e9)])):
         messages = [
-            *(Message(text, **facts | {n: 12.5 for n, s in _PLACES.findall(text) if s}) for text in templates),
+            *(Message(text, **_facts(text, inner)) for text in templates),
             *(Message("{amount:.2f} {unit}", amount=number, unit="1.5") for number in numbers.values()),
             Message("Only larger changes are found: {changes}.", changes=[inner, "a.b", 3]),
             Message("Monitored again since {at}.", at=moment(12.25)),
@@ -43,6 +42,12 @@ def test_the_page_words_what_python_words(browser: Browser) -> None:
         assert tab.wrong == []
     with in_language("de"):
         assert found == [worded(message) for message in messages]
+
+
+def _facts(template: str, inner: Message) -> dict[str, Message | float]:
+    """A value for each place of a template, and for no other: each value is sent to the page, and worded there."""
+    places = _PLACES.findall(template)
+    return {name: inner for name, spec in places if not spec} | {name: 12.5 for name, spec in places if spec}
 
 
 def test_the_page_has_no_english_outside_of_its_catalogue(browser: Browser, tmp_path: Path) -> None:

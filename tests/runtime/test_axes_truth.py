@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import socket
-import time
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.peers.machine import Machine
 from tests.support.peers.peer import free_port
+from tests.support.peers.plain import wait_read
 from tests.support.recorded import same
 from tests.support.session_process import SHARED, Running, block, check_samples, events, numbers, source, summary_of
 
@@ -40,7 +40,7 @@ def test_each_axis_leaves_what_it_would_have_left_alone(tmp_path: Path, number: 
         running.tracked("y", 500)
         for machine in (a, b):
             machine.silence()
-        time.sleep(0.5)  # what was sent is on its way
+            wait_read(machine.settings["url"])
         code, out, err = running.end(number)
         sent = {"x": a.sent, "y": b.sent}
     assert (code, err) == (0, "")

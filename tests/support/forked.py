@@ -37,16 +37,23 @@ def server() -> ForkServerContext:
 
 
 class Command:
-    """`livebode` with these arguments, and what of subprocess.Popen the tests use; `pictures`: with those of a run."""
+    """`livebode` with these arguments, and what of subprocess.Popen the tests use; `pictures`: with those of a run.
 
-    def __init__(self, *arguments: object, pictures: bool = False) -> None:
+    With the descriptor of a `terminal`, all three streams are that.
+    """
+
+    def __init__(self, *arguments: object, pictures: bool = False, terminal: int | None = None) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="livebode-command-")
         self._printed = [Path(self._folder.name, name) for name in ("out", "err")]
         read, write = server().Pipe(duplex=False)
         self.stdin: BinaryIO = os.fdopen(os.dup(write.fileno()), "wb")
         write.close()
+        if terminal is not None:
+            read.close()
+            read = Connection(os.dup(terminal))
         here = (list(map(str, arguments)), dict(os.environ), os.getcwd())
-        self._process = server().Process(target=_run, args=(read, self._printed, pictures, *here))
+        printed = self._printed if terminal is None else []
+        self._process = server().Process(target=_run, args=(read, printed, pictures, *here))
         self._process.start()
         read.close()
 
@@ -113,7 +120,8 @@ def _run(
     environment: dict[str, str],
     directory: str,
 ) -> None:
-    os.dup2(given.fileno(), 0)
+    for number in range(3):
+        os.dup2(given.fileno(), number)
     given.close()
     for number, path in enumerate(printed, 1):
         with path.open("wb") as file:
