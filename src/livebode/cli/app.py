@@ -28,7 +28,7 @@ from livebode.cli.log_options import File, Level, LogOptions, logged
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
 from livebode.core import DamageWarning, LivebodeError, needing
-from livebode.plugins import PluginWarning, loaded, named
+from livebode.plugins import PluginWarning, loaded, named, wings_left_out
 from livebode.version import __version__
 
 _HELP = {"help_option_names": ["--help", "-h"]}
@@ -139,6 +139,11 @@ class _Group(_Light, TyperGroup):
         """The command that the arguments begin with, to be run or completed."""
         if f"--{args[0]}" in _OPTIONS and args[0] not in self._table:
             ctx.fail(f"No such command {args[0]!r}. Did you mean 'livebode --{args[0]}'?")
+        if args[0] not in self._table and (wings := wings_left_out("commands")):
+            ctx.fail(
+                f"No such command {args[0]!r}. If it belongs to a wing of livebode that is not installed "
+                f"({', '.join(wings)}), install that wing."
+            )
         name, listed, rest = super().resolve_command(ctx, args)
         return name, listed and self.commands[listed.name or ""], rest
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from livebode.drawing import FEW_LINES
 from livebode.pictures._style import Style, drawing, heading, new_figure, plain, style
+from livebode.pictures.plots import FEW_LINES
 from livebode.pictures.png import save
 
 if TYPE_CHECKING:

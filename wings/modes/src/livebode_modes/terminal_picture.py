@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from livebode.drawing import linear_ticks
-from livebode.pictures import Canvas, Scale, clock, written
+from livebode.pictures import Canvas, Scale, clock, linear_ticks, written
 from livebode_modes.curves import ModeCurve
 
 _WIDTH_MIN, _HEIGHT_MIN = 40, 10
