@@ -13,8 +13,7 @@ import numpy as np
 
 from livebode.pictures import drawing, heading, new_figure, plain
 from livebode.pictures._style import DARK, LIGHT
-from livebode_reports.svg import themed_svg, variables
-from livebode_reports.svg_renderer import draw_svg
+from livebode_reports.svg import draw_svg, themed_svg, variables
 
 HEAD_IN = 0.95
 AGE_TICKS_S = {"minute": 60.0, "hour": 3600.0, "day": 86400.0, "month": 30 * 86400.0, "year": 365 * 86400.0}

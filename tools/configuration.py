@@ -51,7 +51,7 @@ MORE = {
     "motion": "See [motion correction](../explanation/motion.md).",
     "machine": "The names form a path, such as `Graz/line 2/press 4/X`, which is the machine in the [list of runs and "
     "the trends](../how-to/runs.md) and in a report without `report.machine`. A name has no `/`.",
-    "report": "See [reports](../how-to/report.md).",
+    "report": "See [reports](../../wings/reports/docs/report.md).",
     "fit": "See [fits](../explanation/fits.md).",
     "monitoring": "See [monitoring](../how-to/monitoring.md).",
     "serve": "See [the dashboard](../how-to/dashboard.md).",

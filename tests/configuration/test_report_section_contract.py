@@ -8,7 +8,7 @@ import pytest
 
 from livebode.configuration import Axis, ReportSection, read_template
 from livebode.core import ConfigError
-from livebode_reports.logo import BYTES_MAX, read_logo
+from livebode_reports.first_page import BYTES_MAX, read_logo
 
 AXIS = '[source]\nlog = "a.csv"\n[signals]\noutput = "y"\n'
 WRONG = {

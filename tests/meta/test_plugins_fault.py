@@ -204,3 +204,33 @@ def test_without_the_wing_of_many_machines_its_commands_and_examples_do_not_exis
     assert "hall" not in answers["example"].stdout
     assert "No such command 'fleet'" in answers["fleet status"].stderr
     assert "choose axis or experiment or matrix-experiment" in answers["schema archive"].stderr
+
+
+def test_without_the_wing_reports_its_commands_and_the_page_say_what_to_install(tmp_path: Path) -> None:
+    log = write_parquet(tmp_path / "log.parquet", signals())
+    given = ["--excitation", "w", "--input", "u", "--output", "y", "--lines", "50,100,200", "--window", "100"]
+    done = without("reports", "run", log, *given, "--out", tmp_path / "run")
+    assert (done.returncode, done.stderr) == (0, "")
+    for command in ("report", "compare"):
+        done = without("reports", command, tmp_path / "run")
+        assert done.returncode == 2
+        sentence = (
+            f"No such command '{command}'. If it belongs to a wing of livebode that is not installed (reports), "
+            "install that wing."
+        )
+        assert sentence in " ".join(done.stderr.replace("│", " ").split())
+    code = """
+import sys
+sys.modules["livebode_reports"] = None
+from livebode.core import ExtraError, document_function
+try:
+    document_function("comparison")
+except ExtraError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stderr, done.stdout) == (
+        "",
+        "documents are made by the wing reports of livebode, which is not installed; "
+        "install the wing reports of livebode\n",
+    )

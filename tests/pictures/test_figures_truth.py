@@ -10,8 +10,7 @@ import pytest
 
 from livebode.cli.pictures import tracked_amount
 from livebode.core import Lines, Responses
-from livebode.drawing import quantiles, unwrapped
-from livebode.pictures import bode_figure, spread, terminal_bode, tracking_figure, with_holes
+from livebode.pictures import bode_figure, quantiles, spread, terminal_bode, tracking_figure, unwrapped, with_holes
 from livebode.pictures.summary import BOUND_C, PROBABILITY
 from livebode.pictures.tracking import is_falling
 from livebode.preparation import ChannelCheck

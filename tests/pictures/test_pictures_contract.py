@@ -120,7 +120,7 @@ def test_the_callers_matplotlib_keeps_its_settings_and_does_not_change_ours(tmp_
         assert [p.read_bytes() for p in save_pictures(some(), tmp_path / "b")] == plain
 
 
-def test_importing_the_report_loads_no_plotting_library() -> None:
+def test_importing_the_pictures_loads_no_plotting_library() -> None:
     look = "import sys, livebode.pictures; print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

@@ -20,7 +20,7 @@ from livebode.records import RunRecord, each_event, event_counts, query
 from livebode.records.grouped_events import event_rows
 from livebode.runtime import Document
 from livebode.runtime.event_groups import AT_ONCE, CAUSES, EXACT_MAX, QUIET_S, REPORT_S, EventGroups
-from livebode_reports.event_summary import EventSummary
+from livebode_reports.events import EventSummary
 from tests.support.runs import record
 
 RATE_HZ, WINDOW = 1000.0, 50

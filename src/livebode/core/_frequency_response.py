@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.arrays import Floats
+from livebode.arrays import Complex, Floats
 from livebode.core._kinds import PlotKind
 from livebode.core.lines import Lines, position, within
-from livebode.drawing import decibels
+from livebode.plugins import loaded
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -23,6 +23,12 @@ Quantity = Literal["plant", "open loop", "closed loop", "sensitivity"]
 
 PER_LINE = ("value", "sigma", "coherence", "valid", "input_coherence", "weight", "distortion")
 """Attributes with one value for each line."""
+
+
+def decibels(value: Complex | Floats) -> Floats:
+    """20·log10|value|, −inf for zero, NaN for NaN, without warnings."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(20 * np.log10(np.abs(value)))
 
 
 class FrequencyResponse:
@@ -165,9 +171,8 @@ measured line; the nearest are 50 and 60 Hz
         >>> axes.get_legend_handles_labels()[1]
         ['plant', 'bound: 63.2 % (1σ)']
         """
-        from livebode.core._plotting import plot_responses
-
-        return plot_responses(self._batch(), kind, axes=axes, c=c if bounds else None, label=label, color=color)
+        draw = loaded("livebode.pictures:plot_responses")  # a floor above: pictures need what they show
+        return draw(self._batch(), kind, axes=axes, c=c if bounds else None, label=label, color=color)
 
     def to_xarray(self) -> Dataset:
         """A labelled Dataset (extra `xarray`).

@@ -28,7 +28,7 @@ import numpy as np
 
 from livebode.core import Quantity, Responses
 from livebode.dashboard.quantities import QUANTITIES
-from livebode.drawing import unwrapped
+from livebode.pictures import unwrapped
 
 REFERENCES_MAX = 8
 KINDS = (

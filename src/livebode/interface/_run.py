@@ -23,11 +23,11 @@ from livebode.core import (
     counted,
     moment,
     moments_by,
-    plot_responses,
 )
 from livebode.fitting import Fit
 from livebode.locations import Url, local_copy, location, shared_copy
 from livebode.margins import Margins
+from livebode.pictures import plot_responses
 from livebode.plugins import loaded, named
 from livebode.records import PARAMETERS, RunRecord
 from livebode.tables import Table

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import Model, Response, Responses, moment
-from livebode.drawing import FEW_LINES, alone, band, bound, bound_db, bound_deg, decibels, ticks
+from livebode.core import Model, Response, Responses, decibels, moment
 from livebode.language import tr, trn
-from livebode.pictures import words
+from livebode.pictures import ticks, words
 from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, style
+from livebode.pictures.curves import bound_db, bound_deg
+from livebode.pictures.plots import FEW_LINES, alone, band, bound
 from livebode.pictures.summary import MEAN_PROBABILITY, PROBABILITY, Summary, summarised
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ def _draw(
 
 
 def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *panels: Axes) -> None:
-    from livebode.drawing import frequency_axis
+    from livebode.pictures.scales import frequency_axis
 
     magnitude, phase, *rest = panels
     for axes in panels:

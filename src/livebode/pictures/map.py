@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Responses
-from livebode.drawing import decibels, quantiles, ticks
+from livebode.core import Responses, decibels
 from livebode.language import tr
-from livebode.pictures import words
+from livebode.pictures import ticks, words
 from livebode.pictures._style import Style, plain
+from livebode.pictures.curves import quantiles
 
 if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import REASONS, MatrixResponses, moment
-from livebode.drawing import FEW_LINES, alone, bound, bound_db, decibels
+from livebode.core import REASONS, MatrixResponses, decibels, moment
 from livebode.language import tr, worded
 from livebode.pictures._style import Style, drawing, heading, new_figure, plain, shortened, style
+from livebode.pictures.curves import bound_db
+from livebode.pictures.plots import FEW_LINES, alone, bound
 from livebode.pictures.png import save
 from livebode.pictures.summary import BOUND_C, PROBABILITY
 from livebode.pictures.words import lines_phrase
@@ -59,7 +60,7 @@ def matrix_figure(
     """
     look, (down, across) = style(dark), responses.value.shape[2:]
     with drawing(look):
-        from livebode.drawing import frequency_axis
+        from livebode.pictures.scales import frequency_axis
 
         width, height = width_in or max(9.0, 1.05 + 3.4 * across), 1.8 + 3.2 * down
         figure = new_figure(width, height)
@@ -85,7 +86,7 @@ def singular_values_figure(responses: MatrixResponses, *, title: str = "", dark:
     """The singular values of the newest matrix over frequency, each with the bound that covers it with 99.7 %."""
     look, f = style(dark), responses.frequency_hz
     with drawing(look):
-        from livebode.drawing import frequency_axis
+        from livebode.pictures.scales import frequency_axis
 
         figure, bounds = new_figure(9.0, 4.8), tr("bounds: {percent:.1f} %", percent=100 * PROBABILITY)
         heading(

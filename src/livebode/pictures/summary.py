@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Response, Responses
-from livebode.drawing import circular, decibels, near, quantiles, unwrapped
+from livebode.core import Response, Responses, decibels
+from livebode.pictures.curves import circular, near, quantiles, unwrapped
 
 # The probability of ±3 standard deviations of a normal variable, used for the circle around a complex response.
 PROBABILITY = 0.9973

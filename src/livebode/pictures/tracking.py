@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Responses
-from livebode.drawing import decibels, ticks
+from livebode.core import Responses, decibels
 from livebode.language import numerals, tr
-from livebode.pictures import words
+from livebode.pictures import ticks, words
 from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
 from livebode.pictures.map import draw_maps
 from livebode.pictures.summary import BOUND_C, PROBABILITY, usable

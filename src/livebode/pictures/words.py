@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import MatrixResponses, Response, Responses, moment, moment_of_start
-from livebode.drawing import frequency_label
 from livebode.language import Message, numerals, tr, trn, worded
 from livebode.pictures._style import shortened
+from livebode.pictures.ticks import frequency_label
 
 _SYMBOL: dict[str, str] = {
     Message("plant"): "G",

@@ -21,9 +21,8 @@ from livebode.core import Document, Picture, PrintedTable
 from livebode.fitting import mean_response
 from livebode.records import RunRecord
 from livebode_reports.compare_report import Comparison
-from livebode_reports.figures import drawn
 from livebode_reports.run_report import run_report
-from livebode_reports.svg import pictures_svg
+from livebode_reports.svg import drawn, pictures_svg
 from livebode_reports.wording import polar_phrase
 from tests.support.command import livebode
 from tests.support.loop_runs import AXIS, record

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from livebode.drawing import FEW_LINES
-from livebode.pictures import Style, drawing, heading, new_figure, plain, save, style
+from livebode.pictures import FEW_LINES, Style, drawing, heading, new_figure, plain, save, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

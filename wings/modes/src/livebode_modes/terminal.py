@@ -15,9 +15,8 @@ import numpy as np
 from livebode.cli import can_draw, is_terminal, one_drawing_at_a_time, print_drawn, tell_how_to_draw
 from livebode.configuration import Axis
 from livebode.core import counted
-from livebode.drawing import linear_ticks
 from livebode.locations import original
-from livebode.pictures import Canvas, Scale, clock, written
+from livebode.pictures import Canvas, Scale, clock, linear_ticks, written
 from livebode.runtime import Draw, Outcome
 from livebode_modes.curves import ModeCurve, mode_curves
 

@@ -6,7 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -17,15 +17,15 @@ from livebode.analysis import Averaged
 from livebode.configuration import ReportSection, recorded_configuration, recorded_report
 from livebode.core import TONES, Document, Finding, Paragraph, Part, Picture, PrintedTable, Section, with_bound
 from livebode.estimates import kind_of
-from livebode.language import Message, in_language, number, recorded, tr, trn, worded
+from livebode.language import Message, number, recorded, tr, trn, worded
 from livebode.records import RunRecord, event_counts, read_summary
 from livebode_reports import first_page
 from livebode_reports.changes import Changes, QuantityChange, changes, percent
 from livebode_reports.comparison_verdict import detectable, verdict
 from livebode_reports.difference import ALPHA, Compared, Difference, compare
+from livebode_reports.kinds import rule_of
 from livebode_reports.limits import limits
 from livebode_reports.report_data import entry_title, read, written
-from livebode_reports.tables import rule_of
 from livebode_reports.wording import BOUND_95, decibels, pairs, polar, polar_phrase, signed
 
 TONES_OF_A_COMPARISON = {**TONES, "ok": Message("no difference shown")}
@@ -36,16 +36,6 @@ def comparison_of(before: Path, after: Path) -> Any:
     """What compares two runs: a class such as `Comparison`. RecordError if one is not a run."""
     first, second = (kind_of(read_summary(path)[0]) for path in (before, after))
     return (first == second and rule_of(first, "compare")) or Comparison
-
-
-def comparison_page(before: Path, after: Path, language: str) -> str:
-    """The report of two runs as a page in this language; RecordError if one is not a run."""
-    from livebode_reports.html import to_html  # with Matplotlib
-
-    with in_language(language):
-        found = comparison_of(before, after).of(before, after)
-        header = first_page.trusted(recorded_report(read_summary(after)[0]), after)
-        return to_html(found.document(datetime.now(UTC), header=header))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,22 +8,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import Response
-from livebode.drawing import FEW_LINES, bound_db, bound_deg, decibels, frequency_label, line_ticks, unwrapped
-from livebode.drawing import bound as draw_bound
+from livebode.core import Response, decibels
 from livebode.language import tr, trn
 from livebode.pictures import (
+    FEW_LINES,
     MEAN_C,
     Style,
+    bound_db,
+    bound_deg,
     decibel_label,
     drawing,
     frequency_edges,
+    frequency_label,
     heading,
+    line_ticks,
     new_figure,
     plain,
     quantity,
     style,
+    unwrapped,
 )
+from livebode.pictures import bound as draw_bound
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +56,7 @@ def comparison_figure(
     dark
         Whether to draw light on dark.
     """
-    from livebode.drawing import frequency_axis
+    from livebode.pictures import frequency_axis
 
     look = style(dark)
     f = before.lines.frequency_hz

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from livebode.core import Finding, Tone
 from livebode.language import listed, number, tr, trn, worded
-from livebode_reports.alarms import alarms
 from livebode_reports.changes import Changes, QuantityChange, percent
 from livebode_reports.difference import Compared, ComparedPlace, Difference
-from livebode_reports.event_summary import EventSummary
+from livebode_reports.events import EventSummary, alarms
 from livebode_reports.wording import polar_phrase
 
 _URGENT: tuple[Tone, ...] = ("alarm", "differs", "check", "open", "ok")

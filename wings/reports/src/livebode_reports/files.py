@@ -1,10 +1,15 @@
-"""The documents of `livebode report` and `livebode compare`: one HTML file, and a PDF if Typst is installed."""
+"""Documents as files, one HTML file and a PDF if Typst is installed, and as a page of the dashboard."""
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 
+from livebode.configuration import recorded_report
 from livebode.core import Document, OutputError, install_command
+from livebode.language import in_language
+from livebode.records import read_summary
+from livebode_reports.first_page import trusted
 
 _NO_PDF = "no PDF: Typst is not installed; run {}, or print the page from a browser"
 
@@ -43,3 +48,14 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
             return [page], f"no PDF: {error}"
         raise
     return [page, paper], ""
+
+
+def comparison_page(before: Path, after: Path, language: str) -> str:
+    """The report of two runs as a page in this language; RecordError if one is not a run."""
+    from livebode_reports.compare_report import comparison_of
+    from livebode_reports.html import to_html
+
+    with in_language(language):
+        found = comparison_of(before, after).of(before, after)
+        header = trusted(recorded_report(read_summary(after)[0]), after)
+        return to_html(found.document(datetime.now(UTC), header=header))

@@ -80,7 +80,7 @@ def report_command(
     from livebode.language import in_language
     from livebode.records import RunRecord, entry_missing, to_json
     from livebode_reports.files import write_documents
-    from livebode_reports.tables import rule_of
+    from livebode_reports.kinds import rule_of
 
     run = RunRecord.open(directory, on_damage=lambda _: None, matrix=True, entry=entry)
     options = {

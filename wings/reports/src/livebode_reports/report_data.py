@@ -16,7 +16,7 @@ from livebode.fitting import Fit
 from livebode.language import listed, tr, worded
 from livebode.records import RunRecord
 from livebode_reports.acceptance import Accepted, LimitEvidence, accepted
-from livebode_reports.event_summary import EventSummary
+from livebode_reports.events import EventSummary
 from livebode_reports.parameter_track import Track, tracks
 
 if TYPE_CHECKING:

@@ -12,9 +12,8 @@ from livebode.plugins import loaded, named
 from livebode.records import RunRecord
 from livebode_reports import first_page, sections
 from livebode_reports.acceptance import Accepted
-from livebode_reports.distortion import distortion
 from livebode_reports.limits import limits
-from livebode_reports.measured import details, how
+from livebode_reports.measured import details, distortion, how
 from livebode_reports.report_data import Judged, ReportData, RunData, entry_title, read, recordings, written
 from livebode_reports.verdict import verdict
 from livebode_reports.wording import duration

@@ -12,7 +12,7 @@ from livebode.core import Listing, Paragraph, Part, Picture, PrintedTable, Secti
 from livebode.fitting import Fit
 from livebode.language import Message, listed, number, tr, worded
 from livebode.margins import WORDS
-from livebode_reports.alarms import alarms
+from livebode_reports.events import alarms
 from livebode_reports.parameter_track import Track
 from livebode_reports.report_data import ReportData, RunData, by_schedule
 from livebode_reports.wording import (

@@ -1,17 +1,25 @@
-"""A figure as SVG in a page: its colours follow the light or dark page, and its text remains text."""
+"""The pictures of a document as SVG: their colours follow the light or dark page, and their text remains text."""
 
 from __future__ import annotations
 
 import io
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TextIO
 
-from livebode.core import Document
-from livebode.pictures import DARK, LIGHT, Style, drawing, quiet_about_letters
-from livebode_reports.figures import drawn
+from livebode.core import Document, Picture, needing
+from livebode.language import Message, numerals, worded
+from livebode.pictures import DARK, LIGHT, Style, drawing, quiet_about_letters, wide_letters
+from livebode.plugins import loaded
+
+with needing("Matplotlib", "plots", "a picture"):
+    from matplotlib.backends.backend_mixed import MixedModeRenderer
+    from matplotlib.backends.backend_svg import RendererSVG
+    from matplotlib.ticker import Formatter
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 
 _PROLOGUE = re.compile(r"^.*?(?=<svg)", re.S)
 _METADATA = re.compile(r"<metadata>.*?</metadata>", re.S)
@@ -47,7 +55,7 @@ def _svg(figure: Figure, salt: str) -> str:
 
     text = io.StringIO()
     with drawing(LIGHT), matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": salt}), quiet_about_letters():
-        from livebode_reports.svg_renderer import draw_svg
+        from livebode_reports.svg import draw_svg
 
         draw_svg(figure, text)
     svg = _METADATA.sub("", _PROLOGUE.sub("", text.getvalue(), count=1), count=1)
@@ -77,3 +85,86 @@ def _literal(text: str) -> str:
 
 
 _KNOWN = frozenset(_pairs(DARK))
+
+
+WIDTH_IN = 9.0
+"""Width of all pictures of a document; on A4 they are scaled to three quarters, with letters of 7 points."""
+
+
+_FIGURES: Mapping[str, tuple[str, str, bool]] = {
+    "bode": ("livebode.pictures:bode_figure", Message("Average response"), False),
+    "tracking": ("livebode.pictures:tracking_figure", Message("Magnitude over time"), True),
+    "parameters": ("livebode_reports.parameters:parameters_figure", "", False),
+    "loop": ("livebode.pictures:loop_figure", Message("Open loop"), True),
+    "validation": ("livebode.pictures:validation_figure", Message("Measured and simulated"), False),
+    "matrix": ("livebode.pictures:matrix_figure", Message("Matrix of responses"), True),
+    "singular values": ("livebode.pictures:singular_values_figure", Message("Singular values"), False),
+    "comparison": ("livebode_reports.comparison:comparison_figure", "", False),
+    "places": ("livebode_reports.comparison:places_figure", "", False),
+}
+"""What draws each kind, its title, and whether it needs the width of the page."""
+
+
+def drawn(picture: Picture) -> Figure:
+    """The picture in the light look and the language in use."""
+    figure = _figure(picture)
+    localise_ticks(figure)
+    return figure
+
+
+def _figure(picture: Picture) -> Figure:
+    reference, title, wide = _FIGURES.get(picture.what, (picture.what, "", True))
+    options: dict[str, Any] = {"title": worded(title)} if title else {}
+    if wide:
+        options["width_in"] = WIDTH_IN
+    figure: Figure = loaded(reference)(**picture.data, **options)
+    return figure
+
+
+_LACKING = 0.4  # of the size: a wide letter is as wide as its size, and the box for an unknown one 0.6 of it
+
+
+def draw_svg(figure: Figure, file: TextIO) -> None:
+    """Write the figure as SVG, without date."""
+    width_in, height_in = figure.get_size_inches()
+    before, figure.dpi = figure.dpi, 72
+    metadata = {"Date": None, "Creator": None}
+    try:
+        vector = _Wide(72 * width_in, 72 * height_in, file, image_dpi=before, metadata=metadata)  # type: ignore[no-untyped-call]
+        mixed: Any = MixedModeRenderer(figure, width_in, height_in, before, vector)  # type: ignore[no-untyped-call]
+        figure.draw(mixed)
+        mixed.finalize()
+    finally:
+        figure.dpi = before
+
+
+class _Wide(RendererSVG):
+    def get_text_width_height_descent(self, s: str, prop: Any, ismath: Any) -> tuple[float, float, float]:
+        width, height, descent = super().get_text_width_height_descent(s, prop, ismath)  # type: ignore[no-untyped-call]
+        return width + _LACKING * wide_letters(s) * prop.get_size_in_points(), height, descent
+
+
+def localise_ticks(figure: Figure) -> None:
+    """Let all axes of the figure format their numbers as before, in the language in use."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(_Local(axis.get_major_formatter()))
+
+
+class _Local(Formatter):
+    def __init__(self, usual: Formatter) -> None:
+        self._usual = usual
+
+    def set_axis(self, axis: Any) -> None:
+        super().set_axis(axis)
+        self._usual.set_axis(axis)
+
+    def set_locs(self, locs: list[float]) -> None:
+        super().set_locs(locs)
+        self._usual.set_locs(locs)
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return numerals(self._usual(x, pos))
+
+    def get_offset(self) -> str:
+        return numerals(self._usual.get_offset())

@@ -10,7 +10,7 @@ from livebode.core import Finding, Tone
 from livebode.language import listed, number, tr, trn, worded
 from livebode.margins import worst
 from livebode.records import RunRecord
-from livebode_reports.alarms import alarms
+from livebode_reports.events import alarms
 from livebode_reports.parameter_track import failed
 from livebode_reports.report_data import ReportData, RunData
 from livebode_reports.wording import lines_of, share

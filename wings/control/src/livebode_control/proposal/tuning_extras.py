@@ -38,7 +38,7 @@ def extra_panels(
 
 def _noise(found: ControllerProposal, axes: Axes, look: Style) -> None:
     """Rms of the plant input due to the noise up to each frequency, before and after; dotted: the limit."""
-    from livebode.drawing import frequency_axis
+    from livebode.pictures import frequency_axis
 
     before = found.loop.feedback
     curves: list[tuple[Model, str, tuple[int, ...]]] = [(found.feedback.model, look.run, (1, 0))]

@@ -113,7 +113,7 @@ def _curves(found: ControllerProposal) -> list[tuple[Model, bool]]:
 
 
 def _bode(magnitude: Axes, phase: Axes, look: Style, found: ControllerProposal) -> None:
-    from livebode.drawing import frequency_axis
+    from livebode.pictures import frequency_axis
 
     plant = found.plant
     at = ~plant.above & (plant.frequency_hz >= plant.lines_hz[0])

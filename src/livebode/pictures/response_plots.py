@@ -1,18 +1,14 @@
-"""Responses on axes: which curves they are, and on what they are drawn."""
+"""`plot` of responses and matrices: which curves they are, and on what they are drawn."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
 
-from livebode.core._kinds import PlotKind
-from livebode.core.errors import UsageError
-from livebode.core.installing import needing
-from livebode.drawing import Cloud, Curve
-
-if TYPE_CHECKING:
-    from livebode.core._response import Response, Responses
+from livebode.core import MatrixResponses, PlotKind, Response, Responses, UsageError, needing
+from livebode.pictures.curves import Cloud, Curve
+from livebode.pictures.plots import draw_bode, draw_nichols, draw_nyquist
 
 
 def plot_responses(
@@ -78,12 +74,8 @@ def _draw(kind: PlotKind, panels: Any, responses: Responses, one: Response, curv
     rows = use.any(axis=1)
     cloud = Cloud(np.where(use, responses.value, np.nan)[rows]) if np.count_nonzero(rows) > 1 else None
     if kind == "bode":
-        from livebode.drawing import draw_bode
-
         draw_bode(panels[0], panels[1], curve, cloud)
         return
-    from livebode.drawing import draw_nichols, draw_nyquist
-
     draw = draw_nyquist if kind == "nyquist" else draw_nichols
     draw(panels[0], curve, cloud, critical=one.quantity == "open loop")
 
@@ -95,3 +87,44 @@ def _labels(kind: PlotKind, panels: Any, responses: Responses) -> None:
         panels[0].set_ylabel(f"imaginary part in {unit}" if unit else "imaginary part")
     else:
         panels[0].set_ylabel(f"magnitude in dB re 1 {unit}" if unit else "magnitude in dB")
+
+
+def plot_matrix(responses: MatrixResponses, *, axes: Any, c: float | None, label: str | None, color: Any) -> Any:
+    """For `MatrixResponses.plot`; `c` None draws no bound."""
+    shape = 2 * len(responses.outputs), len(responses.inputs)
+    panels = _new_matrix(*shape) if axes is None else np.asarray(axes, dtype=object)
+    if panels.shape != shape:
+        raise UsageError(
+            "wrong-shape",
+            f"{shape[0] // 2} outputs and {shape[1]} inputs need axes of shape {shape}, and these have {panels.shape}",
+            f"give those of plt.subplots({shape[0]}, {shape[1]}, squeeze=False), or none for a new figure",
+            argument="axes",
+            value=list(panels.shape),
+        )
+    for o, output in enumerate(responses.outputs):
+        for i, input in enumerate(responses.inputs):
+            pair = panels[2 * o : 2 * o + 2, i]
+            plot_responses(responses.entry(o, i), "bode", axes=pair, c=c, label=label, color=color)
+            pair[0].set_title(f"{input} → {output}", fontsize="medium")
+    _outer_labels(panels)
+    return panels
+
+
+def _new_matrix(rows: int, columns: int) -> Any:
+    with needing("Matplotlib", "plots", "a picture"):
+        from matplotlib import pyplot
+
+    ratios = {"height_ratios": [3, 2] * (rows // 2)}
+    size = (2.0 + 3.4 * columns, 1.0 + 1.5 * rows)
+    _, found = pyplot.subplots(
+        rows, columns, sharex=True, sharey="row", squeeze=False, gridspec_kw=ratios, layout="constrained", figsize=size
+    )
+    return found
+
+
+def _outer_labels(panels: Any) -> None:
+    """Labels at the left and at the bottom only."""
+    for inner in panels[:, 1:].ravel():
+        inner.set_ylabel("")
+    for upper in panels[:-1].ravel():
+        upper.set_xlabel("")

@@ -1,11 +1,15 @@
-"""Complex values and their bounds as the numbers of a picture: decibels, unwrapped degrees, quantiles, circles."""
+"""Curves with bounds, and the numbers that are drawn of them: unwrapped degrees, quantiles, ends of bounds."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
+from livebode.core import decibels
 
 SPAN = (0.05, 0.95)
 FLOOR_DB = -1000.0
@@ -13,12 +17,6 @@ FLOOR_DB = -1000.0
 # The middle of an unwrapped phase curve is between −225° and 135°: the cut is as far as possible from the usual angles
 # of machines (multiples of 90°, with a small delay), so that noise does not shift a curve by a whole turn.
 _TURN_FROM_DEG = -225.0
-
-
-def decibels(value: Complex | Floats) -> Floats:
-    """20·log10|value|, −inf for zero, NaN for NaN, without warnings."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(20 * np.log10(np.abs(value)))
 
 
 def bound_db(value: Complex, radius: Floats) -> tuple[Floats, Floats]:
@@ -94,3 +92,51 @@ def circular(value: Complex) -> tuple[Floats, Floats]:
         direction = np.where(np.abs(direction) > 0, direction, 1.0)
         deviation_deg = quantiles(np.degrees(np.angle(turned * direction.conj())))
     return np.degrees(np.angle(direction)) + deviation_deg[1], deviation_deg
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A complex value at each frequency, with a circle around it.
+
+    Attributes
+    ----------
+    frequency_hz
+        (lines,), ascending.
+    value
+        (lines,); NaN where nothing is drawn.
+    radius
+        Of the circle that is the bound, unit of `value`; NaN where none is known.
+    label, bound_label
+        In a legend; an empty `bound_label` draws no bound.
+    color
+        Any colour of Matplotlib; None for the next of the axes.
+    """
+
+    frequency_hz: Floats
+    value: Complex
+    radius: Floats
+    label: str
+    bound_label: str
+    color: Any = None
+
+    @property
+    def bounded(self) -> bool:
+        """Whether there is a bound to draw."""
+        return bool(self.bound_label) and bool(np.isfinite(self.radius).any())
+
+    @property
+    def phase_deg(self) -> Floats:
+        """Unwrapped along frequency; lines whose bound contains zero follow the others, (lines,)."""
+        return unwrapped(np.degrees(np.angle(self.value)), self.radius > np.abs(self.value))
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Values of the other responses behind a Curve, (rows, lines); NaN where nothing is drawn."""
+
+    value: Complex
+
+    @property
+    def label(self) -> str:
+        """In the legend of a Bode plot."""
+        return f"5–95 % of {len(self.value)} responses"

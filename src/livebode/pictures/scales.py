@@ -10,7 +10,7 @@ from matplotlib.markers import TICKDOWN
 from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, Locator, NullFormatter, NullLocator
 
 from livebode.arrays import Floats
-from livebode.drawing import ticks
+from livebode.pictures import ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,15 +1,16 @@
-"""The events of a run, grouped by kind, in bounded memory."""
+"""Events of a run and results of its monitoring, as a report shows them."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
-from livebode.core import Event, Paragraph, Part, PrintedTable, moment
-from livebode.language import number, tr, trn, worded
-from livebode.monitoring import UNMONITORED
-from livebode.records import each_event, event_counts
+from livebode.core import Event, Finding, Paragraph, Part, PrintedTable, moment
+from livebode.language import number, recorded, tr, trn, worded
+from livebode.monitoring import UNMONITORED, result_tone
+from livebode.records import RunRecord, each_event, event_counts
 
 ALARMS = (
     "change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful", *UNMONITORED,
@@ -93,3 +94,49 @@ class EventSummary:
         return grouped, PrintedTable(
             (tr("time"), tr("kind"), tr("message")), in_full, note=note if self.left_out else ""
         )
+
+
+_ACTIVE_MAX = 5
+
+
+def alarms(run: RunRecord, event_summary: EventSummary) -> tuple[Finding, ...]:
+    """The summary of the monitoring, then the active alarms."""
+    monitoring: dict[str, Any] = run.summary.get("monitoring", {})
+    if "message" not in monitoring or (run.finished and monitoring.get("baseline") is None):
+        return (_so_far(run, event_summary),)
+    active = bool(monitoring.get("standing"))
+    tone = result_tone(monitoring, active=active)
+    latest = _newest(event_summary)[-_ACTIVE_MAX:] if active else []
+    return (
+        Finding(tone, worded(recorded(monitoring.get("words", {}), monitoring["message"]))),
+        *(Finding("alarm", worded(event.words)) for event in latest),
+    )
+
+
+def _newest(event_summary: EventSummary) -> list[Event]:
+    """The newest report of each change that has not cleared."""
+    found: dict[tuple[str, str], Event] = {}
+    for event in event_summary.in_full:
+        key = str(event.details.get("what")), str(event.details.get("place_m"))
+        if event.kind in ("change", "change-corrected"):
+            found[key] = event
+        elif event.kind == "change-cleared":
+            found.pop(key, None)
+    return list(found.values())
+
+
+def _so_far(run: RunRecord, event_summary: EventSummary) -> Finding:
+    """The changes so far, if run.json does not contain a summary yet."""
+    if run.finished:
+        return Finding(
+            "open", tr("Changes are not assessed: the run was not compared with a baseline of the healthy machine.")
+        )
+    came, cleared = event_summary.count("change"), event_summary.count("change-cleared")
+    if not came:
+        text = tr("No change was reported so far; the final verdict is available at the end of the run.")
+        return Finding("open", text)
+    message = trn(
+        "So far {n:,} change reported, {cleared} cleared.", "So far {n:,} changes reported, {cleared} cleared.", came,
+        cleared=cleared,
+    )  # fmt: skip
+    return Finding("alarm" if came > cleared else "check", message)

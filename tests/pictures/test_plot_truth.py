@@ -14,7 +14,7 @@ from matplotlib.colors import same_color
 
 from livebode import Lines, Response, Responses, UsageError, example_responses
 from livebode.core import Quantity
-from livebode.drawing import draw_bode
+from livebode.pictures import Curve, draw_bode
 from tests.support.errors import refused
 from tests.support.responses import any_responses, made
 
@@ -170,10 +170,7 @@ def test_no_response_is_too_odd_to_draw(responses: Responses, kind: str) -> None
     plt.close(figure)
 
 
-def test_the_parts_draw_without_the_core() -> None:
-    """`livebode.drawing` takes arrays."""
-    from livebode.drawing import Curve
-
+def test_arrays_are_drawn_without_a_response() -> None:
     figure, (magnitude, phase) = plt.subplots(2)
     f = np.array([1.0, 2.0, 4.0])
     draw_bode(magnitude, phase, Curve(f, 1 / (1 + 1j * f), np.full(3, np.nan), "low-pass", ""))
