@@ -8,7 +8,7 @@ a model of the moving machine. 200 responses a second are the default at a windo
 thread, the least of three rounds, after the fits of the first responses; the record and the dashboard are not part of
 it (`python -m bench.live`).
 
-The fits of all axes of a process have half of a core at most (`livebode.runtime.fit_budget`), and are thinned beyond
+The fits of all axes of a process have half of a core at most (`livebode.runtime.shedding`), and are thinned beyond
 that; samples and monitoring are not. The last columns say how many axes there is time for, and how many fits a second
 each of 16 axes then has.
 """
@@ -32,7 +32,7 @@ from livebode.core import Block, Lines
 from livebode.excitation import multisine
 from livebode.preparation import make_follower
 from livebode.runtime import Destination, SingleResponse, run
-from livebode.runtime.fit_budget import SHARE
+from livebode.runtime.shedding import SHARE
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 
 UNITS = {"u": "N m", "velocity": "rad/s", "w": "N m"}

@@ -17,7 +17,7 @@ RESPONSE = "response"
 ESTIMATES: Mapping[str, Mapping[str, str]] = {
     RESPONSE: {
         "estimate": "livebode.runtime.single_response:SingleResponse",
-        "recording": "livebode.runtime.recording:examined_recording",
+        "recording": "livebode.runtime.recordings:examined_recordings",
         "draw": "livebode.cli.pictures:drawing_of",
         "show": "livebode.cli.pictures:show",
         "page": "livebode.dashboard.matrix_view:views_of_response",

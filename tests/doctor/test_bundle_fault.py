@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from livebode.configuration import MAY_BE_SECRET, Axis
 from livebode.core import OutputError
 from livebode.doctor import Check, Subject, bundle, write_bundle
-from livebode.doctor.secrets import REMOVED, Secrets
+from livebode.doctor.bundle import REMOVED, Secrets
 from livebode_design import Experiment
 from tests.support.command import livebode, signals
 from tests.support.runs import small_run

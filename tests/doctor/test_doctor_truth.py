@@ -20,10 +20,8 @@ import pytest
 
 from livebode.core import UsageError, install_command
 from livebode.doctor import Subject
-from livebode.doctor.disk import check_disk
-from livebode.doctor.extras import check_extras
-from livebode.doctor.extras import judged as judged_extras
-from livebode.doctor.udp_buffer import judged
+from livebode.doctor.computer import check_disk, judged_buffer
+from livebode.doctor.installation import check_extras, judged_extras
 from livebode.kernel import instruction_sets
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.errors import refused
@@ -34,7 +32,7 @@ from tests.support.small_axis import ONE_LINE_DIRECT
 ROOT = Path(__file__).parents[2]
 FULL_DISK = """
 import contextlib, pathlib, sys
-from livebode.doctor.disk import check_disk
+from livebode.doctor.computer import check_disk
 place = pathlib.Path(sys.argv[1])
 for size in (0, 1 << 16, 1):
     with contextlib.suppress(OSError), (place / "other").open("ab", buffering=0) as other:
@@ -268,7 +266,7 @@ def test_two_configurations_at_once_are_refused() -> None:
 
 
 def test_a_receive_buffer_that_is_too_small_is_a_warning_with_the_command() -> None:
-    found = judged(212992, 4 << 20)
+    found = judged_buffer(212992, 4 << 20)
     assert found.verdict == "warning"
     assert "212992" in found.message
     assert "4194304" in found.remedy

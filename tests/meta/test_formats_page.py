@@ -12,10 +12,10 @@ import pytest
 
 from livebode.core import state
 from livebode.records import PARAMETERS, RESPONSES, ColumnTable
+from livebode.records.json_format import VERSIONS
 from livebode.records.segments import frames
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE
 from livebode.records.segments.journal import Journal
-from livebode.records.versions import VERSIONS
 from livebode.version import __version__
 from livebode_plant.lake.wide_responses import wide_schema
 from tests.support.monitored import small_baseline

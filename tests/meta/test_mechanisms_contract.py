@@ -29,7 +29,7 @@ SOURCES = (ROOT / "src/livebode", *ROOT.glob("wings/*/src"))
                 "livebode_plant/cli/fleet/demo_command.py",
             },
         ),
-        (r"\bfsync\(", {"core/files.py", "doctor/disk.py"}),
+        (r"\bfsync\(", {"core/files.py", "doctor/computer.py"}),
         # A record that is paused at its end raises without an error of the system.
         (r'"not-written",\n', {"records/segments/store.py"}),
         (r'"not-written", ', {"core/write_errors.py"}),

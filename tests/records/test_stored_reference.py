@@ -15,11 +15,11 @@ from livebode.core import Block, Lines, RecordError, StateError
 from livebode.estimation import Tracker
 from livebode.monitoring import Baseline, Monitor
 from livebode.records import RUN, RunRecord, last_commit, read_summary, to_frame
+from livebode.records.json_format import VERSIONS, format_of
 from livebode.records.segments.frames import FORMAT
 from livebode.records.segments.json_lines import to_line
 from livebode.records.segments.recovery import recover
 from livebode.records.summary_file import COPY, to_document
-from livebode.records.versions import VERSIONS, format_of
 from tests.support import stored, stored_matrix
 from tests.support.errors import refused
 from tests.support.recorded import NAMES

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.runtime.fit_budget import CREDIT_S_MAX, RELIEF_TO_S, SHARE, FitBudget
+from livebode.runtime.shedding import CREDIT_S_MAX, RELIEF_TO_S, SHARE, FitBudget
 
 
 class Time:

@@ -19,7 +19,7 @@ from livebode.configuration import Axis
 from livebode.core import Block, Channel, ConfigError, GridError, Lines, SpectraLayout
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.preparation.live_plan import check_spectra
+from livebode.preparation.followers import check_spectra
 from livebode.records import RunRecord
 from livebode.runtime.change_detection import change_detection
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss

@@ -9,7 +9,7 @@ import pytest
 
 PROGRAM = """
 import resource, sys
-from livebode.runtime.open_files import allow_open_files
+from livebode.runtime.session import allow_open_files
 resource.setrlimit(resource.RLIMIT_NOFILE, (64, int(sys.argv[1])))
 allow_open_files()
 print(*resource.getrlimit(resource.RLIMIT_NOFILE))

@@ -19,7 +19,7 @@ from livebode.analysis import mean_of
 from livebode.configuration import Axis, ReadyCondition
 from livebode.core import Block, Channel, ConfigError, Event, Lines, SpectraLayout
 from livebode.monitoring import ALARMS
-from livebode.preparation.live_plan import check_spectra
+from livebode.preparation.followers import check_spectra
 from livebode.records import RunRecord
 from livebode.runtime import ENDED, SUPPRESSED, Destination, TrackerResults, run
 from livebode.runtime.readiness import Readiness

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from livebode.core import RecordingError
 from livebode.sources import open_log
-from livebode.sources.mat5stream import LENGTH_MIN
+from livebode.sources.matlab import LENGTH_MIN
 
 CODES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "f4": 7, "f8": 9}
 

@@ -6,7 +6,9 @@ from typing import Any
 
 from livebode import sources
 from livebode.configuration.axis import Axis
-from livebode.sources import Log, open_log
+from livebode.core import RecordingError
+from livebode.locations import local_copy
+from livebode.sources import UNEVEN, Log, open_log
 
 _NAMES = {
     "signals": ("outputs", "inputs", "excitations", "schedule", "ready"),
@@ -30,7 +32,15 @@ def open_even_or_uneven(axis: Axis) -> Log:
     if axis.tracking.estimator == "direct":
         named = [signals.input, *named]
     names = list(dict.fromkeys(name for name in named if name))
-    return sources.open_even_or_uneven(path, names, signals.listed("output"), **_reading(axis))
+    with local_copy(path):
+        try:
+            log = open_recording(axis)
+            log.check_clocks(names)
+            return log
+        except RecordingError as error:
+            if error.code not in UNEVEN or source.time == "none":
+                raise
+        return sources.open_uneven(path, names, **_reading(axis))
 
 
 def with_shared_names(axis: Axis, log: Log) -> Axis:

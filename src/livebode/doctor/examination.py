@@ -5,16 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from livebode.doctor.check import Check
-from livebode.doctor.clock import check_clock
-from livebode.doctor.configuration import check_configuration, check_run
-from livebode.doctor.dashboard_port import check_dashboard_port
-from livebode.doctor.disk import check_disk
-from livebode.doctor.extras import check_extras
-from livebode.doctor.instructions import check_instruction_set
-from livebode.doctor.plugins import check_plugins
-from livebode.doctor.sources import check_sources
+from livebode.doctor.computer import check_clock, check_dashboard_port, check_disk, check_udp_buffer
+from livebode.doctor.installation import check_extras, check_instruction_set, check_plugins
+from livebode.doctor.measurement import check_configuration, check_run, check_sources
 from livebode.doctor.subject import Subject
-from livebode.doctor.udp_buffer import check_udp_buffer
 
 
 def examine(subject: Subject, directory: Path) -> list[Check]:

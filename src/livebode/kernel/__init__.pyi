@@ -30,6 +30,7 @@ from livebode.kernel._instructions import INSTRUCTION_SET_VARIABLE as INSTRUCTIO
 from livebode.kernel._instructions import chosen_instruction_set as chosen_instruction_set
 from livebode.kernel._instructions import instruction_set as instruction_set
 from livebode.kernel._instructions import instruction_sets as instruction_sets
+from livebode.kernel._instructions import largest_sizes as largest_sizes
 from livebode.kernel._lines import MEANS as MEANS
 from livebode.kernel._lines import NOISE_LARGER as NOISE_LARGER
 from livebode.kernel._lines import NOISE_MOVING as NOISE_MOVING
@@ -63,5 +64,4 @@ from livebode.kernel._repeating import RepeatingSettings as RepeatingSettings
 from livebode.kernel._repeating import Tones as Tones
 from livebode.kernel._repeating import judge_periods as judge_periods
 from livebode.kernel._runs import decode_runs as decode_runs
-from livebode.kernel._sizes import largest_sizes as largest_sizes
 from livebode.kernel._sliding import SlidingDFT as SlidingDFT

@@ -1,7 +1,3 @@
-from livebode.language._catalogue import ENGLISH as ENGLISH
-from livebode.language._catalogue import Catalogue as Catalogue
-from livebode.language._catalogue import available as available
-from livebode.language._catalogue import catalogue as catalogue
 from livebode.language.message import Message as Message
 from livebode.language.message import Moment as Moment
 from livebode.language.message import for_page as for_page
@@ -9,6 +5,10 @@ from livebode.language.message import recorded as recorded
 from livebode.language.message import worded as worded
 from livebode.language.negotiation import catalogue_for_page as catalogue_for_page
 from livebode.language.negotiation import negotiated as negotiated
+from livebode.language.translation import ENGLISH as ENGLISH
+from livebode.language.translation import Catalogue as Catalogue
+from livebode.language.translation import available as available
+from livebode.language.translation import catalogue as catalogue
 from livebode.language.translation import current_language as current_language
 from livebode.language.translation import date as date
 from livebode.language.translation import in_language as in_language

@@ -14,8 +14,7 @@ from math import isfinite
 from numbers import Integral, Real
 from typing import Any
 
-from livebode.language._catalogue import ENGLISH, Catalogue
-from livebode.language.translation import current_language, numerals
+from livebode.language.translation import ENGLISH, Catalogue, current_language, numerals
 
 _PLACE = re.compile(r"\{(\w+)(?::(\+?,?(?:\.\d\d?)?[a-z]?))?\}")
 _TEMPLATE, _MOMENT = "template", "digits"  # names that tell the plain form of a message and of a moment

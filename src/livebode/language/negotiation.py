@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from functools import cache
 
-from livebode.language._catalogue import ENGLISH, available, catalogue
+from livebode.language.translation import ENGLISH, available, catalogue
 
 _HEADER_LETTERS = 500
 _PREFERENCES_MAX = 32

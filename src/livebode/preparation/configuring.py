@@ -12,8 +12,9 @@ from livebode.configuration import Axis
 from livebode.core import Lines, LivebodeError, counted
 from livebode.estimation import DETECTION_LINES_MIN
 from livebode.excitation import recognise
+from livebode.preparation.followers import make_settings
 from livebode.preparation.nonperiodic import suits_lpm
-from livebode.preparation.plan import beginning, make_settings, roles_in_doubt
+from livebode.preparation.plan import beginning, roles_in_doubt
 from livebode.sources import Log
 
 _NOT_REPEATING = ("signal.not-periodic", "signal.too-short")

@@ -1,4 +1,4 @@
-"""Settings of a tracker from an Axis and its recording; "auto" values are determined here."""
+"""Settings of a tracker from an Axis and its recording; "auto" values are determined here, specified ones compared."""
 
 from __future__ import annotations
 
@@ -7,14 +7,77 @@ from typing import Protocol
 
 import numpy as np
 
-from livebode import estimation
 from livebode.configuration import Axis
-from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines
-from livebode.estimation import Follower, RippleOrder, Settings, Tracker
+from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines, LivebodeError
+from livebode.estimation import RippleOrder, Settings
+from livebode.language import Message
 from livebode.preparation.checks import check_length
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
-from livebode.preparation.window_check import WINDOWS_COMPARED, divided_window, window_doubt
 from livebode.sources import Log
+
+_LAGS = 8  # samples around the window in which another period is searched
+_ROUNDING = 1e-12
+WINDOWS_COMPARED = 4
+
+
+def window_doubt(samples: np.ndarray, settings: Settings) -> list[Event]:
+    """An event if the beginning of an excitation repeats better after another number of samples than the window.
+
+    With a window that is wrong by one sample, every estimate is wrong by more than its bounds, without other symptoms.
+    The run continues, because the person may know better: with hum, the recording repeats after a longer time than the
+    excitation.
+    """
+    window = settings.lines.window
+    lags = range(max(1, window - _LAGS), window + _LAGS + 1)
+    if samples.size < window + _LAGS + window // 2:
+        return []
+    differences = {lag: _difference(samples, lag, window + _LAGS) for lag in lags}
+    best = min(differences, key=lambda lag: (differences[lag], abs(lag - window)))
+    if differences[window] <= _ROUNDING or differences[best] >= differences[window] / 2:
+        return []
+    return [_doubt(settings, best, differences[window] / 2, differences[best] / 2)]
+
+
+def divided_window(samples: np.ndarray, settings: Settings) -> list[Event]:
+    """An event if a whole number of the excitation's periods, as `recognise` finds it, is not the window."""
+    from livebode.excitation import recognise  # its statistics are slow to import
+
+    window = settings.lines.window
+    try:
+        period = recognise(samples, settings.lines.rate_hz, doubtful=True).period
+    except LivebodeError:  # the person knows better
+        return []
+    longest = max(window, period)
+    if window % period == 0 or samples.size <= longest:
+        return []
+    changes, rest = (_difference(samples, lag, longest) / 2 for lag in (window, period))
+    return [_doubt(settings, period, changes, rest)]
+
+
+def _doubt(settings: Settings, period: int, changes: float, rest: float) -> Event:
+    window = settings.lines.window
+    message = Message(
+        "{channel} repeats every {period} samples rather than every {window}: {changes_percent:.2g} % of its "
+        "power changes from one window to the next, {rest_percent:.2g} % from one such period to the next; "
+        "compare lines.window with the design of the excitation",
+        channel=repr(settings.excitation),
+        period=period,
+        window=window,
+        changes_percent=100 * changes,
+        rest_percent=100 * rest,
+    )
+    facts = {"window": window, "period": period, "share_that_changes": changes}
+    return Event("window-doubtful", 0, 0.0, message, facts)
+
+
+def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
+    """Mean square of x(n + lag) − x(n) over that of x, over as many samples for every lag up to `ahead`."""
+    n = samples.size - ahead
+    rest = samples[lag : lag + n] - samples[:n]
+    rest = rest[np.isfinite(rest)]
+    power = float(np.nanvar(samples))
+    return float(np.dot(rest, rest)) / (rest.size * power) if rest.size and power > 0 else 0.0
+
 
 SEARCHED = 1 << 22
 """Samples that "auto" and `inspect` use: half an hour at 2 kHz, and 100 MB of work."""
@@ -28,52 +91,6 @@ class RecordedSource(Protocol):
     def first(self) -> int: ...
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
-
-
-def make_follower(axis: Axis, log: Log) -> Follower:
-    """A Tracker for this recording, or with [motion] a MotionCorrection; LivebodeError if they do not fit."""
-    return follower_of(axis, make_settings(axis, log))
-
-
-def follower_of(axis: Axis, settings: Settings) -> Follower:
-    """The follower with these settings; ConfigError if the axis has a [motion] that they do not permit."""
-    if not settings.periodic:
-        if axis.motion is not None:
-            raise ConfigError(
-                "key-conflict",
-                f"[motion] needs an excitation that repeats, but tracking.estimator is {settings.estimator!r}",
-                "remove [motion], or choose another estimator",
-                key="motion",
-            )
-        return estimation.NonPeriodicTracker(settings)
-    if axis.motion is None:
-        return Tracker(settings)
-    # The simulation, which its model needs, is slow to import.
-    from livebode.motion import MotionCorrection
-
-    chunk_samples = round(axis.motion.chunk_s * settings.lines.rate_hz)
-    if chunk_samples < 2 * settings.lines.window:
-        raise ConfigError(
-            "value-invalid",
-            f"motion.chunk_s = {axis.motion.chunk_s:g} is {chunk_samples} samples, less than two windows of "
-            f"{settings.lines.window}",
-            "set it to the duration of a stroke",
-            key="motion.chunk_s",
-            value=axis.motion.chunk_s,
-            window=settings.lines.window,
-        )
-    return MotionCorrection(
-        settings, radius_m=axis.motion.radius_m, chunk_samples=chunk_samples, driven_by=axis.motion.driven_by
-    )
-
-
-def make_settings(axis: Axis, log: Log) -> Settings:
-    """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
-    if not axis.tracking.periodic:
-        from livebode.preparation.nonperiodic import nonperiodic_settings  # loads the method of local polynomials
-
-        return nonperiodic_settings(axis, log)
-    return settings_of(axis, log.rate_hz, make_lines(axis, log))
 
 
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:

@@ -1,12 +1,10 @@
 from livebode.configuration.publish_section import PublishSection as PublishSection
 from livebode.configuration.sink_kind import SinkKind as SinkKind
-from livebode.publishing._exposure import exposure as exposure
-from livebode.publishing.failures import cannot_listen as cannot_listen
-from livebode.publishing.failures import unreachable as unreachable
 from livebode.publishing.messages import AxisValues as AxisValues
 from livebode.publishing.messages import EventMessage as EventMessage
 from livebode.publishing.messages import Measurement as Measurement
 from livebode.publishing.publisher import Publisher as Publisher
+from livebode.publishing.publisher import exposure as exposure
 from livebode.publishing.publisher import sections_of as sections_of
 from livebode.publishing.secrets import address as address
 from livebode.publishing.secrets import client_tls as client_tls
@@ -15,4 +13,6 @@ from livebode.publishing.secrets import server_tls as server_tls
 from livebode.publishing.secrets import signing_key as signing_key
 from livebode.publishing.secrets import token as token
 from livebode.publishing.sink import SinkConnection as SinkConnection
+from livebode.publishing.sink import cannot_listen as cannot_listen
 from livebode.publishing.sink import open_sink as open_sink
+from livebode.publishing.sink import unreachable as unreachable

@@ -1,4 +1,4 @@
-"""Publisher: the receivers of a session, and what its axes send to them."""
+"""Publisher: the receivers of a run, and what leaves this computer unencrypted."""
 
 from __future__ import annotations
 
@@ -8,12 +8,29 @@ from pathlib import Path
 from typing import Any, Self
 
 from livebode.configuration import Axis, PublishSection
-from livebode.core import ConfigError
-from livebode.publishing._exposure import exposure
+from livebode.core import ConfigError, on_loopback
+from livebode.plugins import named
 from livebode.publishing.delivery import DeliveryThread
 from livebode.publishing.feed import AxisFeed
 from livebode.publishing.outbox import Outbox
+from livebode.publishing.secrets import address
 from livebode.publishing.sink import SinkConnection, open_sink
+
+
+def exposure(section: PublishSection) -> str | None:
+    """A sentence on who else can read the results or the password; None if nobody can. ConfigError as `address`."""
+    if not named("sinks")[section.kind].serves:
+        return None
+    _, host, port, _ = address(section)
+    if on_loopback(host):
+        return None
+    if section.username is None:
+        remedy = "" if section.kind == "prometheus" else "set username and password_file, or "
+        return f"whoever reaches {host}:{port} can read the results; {remedy}restrict it by a firewall"
+    if section.certificate_file is None:
+        return f"the password to {host}:{port} is sent unencrypted; set certificate_file and key_file"
+    return None
+
 
 CLOSE_S = 5.0
 """Longest time at the end in which events that wait are sent."""

@@ -16,6 +16,7 @@ from livebode.records.inside import check_folder as check_folder
 from livebode.records.inside import is_folder as is_folder
 from livebode.records.inside import open_read as open_read
 from livebode.records.inside import read_bytes as read_bytes
+from livebode.records.json_format import to_json as to_json
 from livebode.records.loop_check_file import read_loop_check as read_loop_check
 from livebode.records.loop_check_file import write_loop_check as write_loop_check
 from livebode.records.matrix_run import entries_of as entries_of
@@ -31,16 +32,15 @@ from livebode.records.matrix_table import matrix_rows as matrix_rows
 from livebode.records.notes import Notes as Notes
 from livebode.records.notes import read_notes as read_notes
 from livebode.records.notes import write_notes as write_notes
-from livebode.records.parameter_table import PARAMETER_SCHEMA as PARAMETER_SCHEMA
-from livebode.records.parameter_table import PARAMETERS as PARAMETERS
-from livebode.records.parameter_table import parameter_rows as parameter_rows
-from livebode.records.plain_json import to_json as to_json
 from livebode.records.removal import check_removable as check_removable
 from livebode.records.removal import remove as remove
 from livebode.records.removal import remove_folder as remove_folder
+from livebode.records.response_table import PARAMETER_SCHEMA as PARAMETER_SCHEMA
+from livebode.records.response_table import PARAMETERS as PARAMETERS
 from livebode.records.response_table import RESPONSE_SCHEMA as RESPONSE_SCHEMA
 from livebode.records.response_table import RESPONSES as RESPONSES
 from livebode.records.response_table import as_batch as as_batch
+from livebode.records.response_table import parameter_rows as parameter_rows
 from livebode.records.run import RunRecord as RunRecord
 from livebode.records.run import kinds_in as kinds_in
 from livebode.records.run import lines_in as lines_in

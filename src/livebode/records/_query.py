@@ -9,7 +9,7 @@ from typing import Any
 from livebode.core import Event, RunClock, moment, moments_by, needing
 from livebode.records.confined_sql import QueryResult, QueryTables, answer_query
 from livebode.records.grouped_events import each_event, event_rows
-from livebode.records.plain_json import to_json
+from livebode.records.json_format import to_json
 from livebode.records.run import Files, RunRecord
 from livebode.records.segments.manifest import TIERS
 from livebode.records.segments.verified_files import segment_groups

@@ -8,8 +8,7 @@ from typing import Any
 
 from livebode.core import MatrixResponses, Parameters, Responses
 from livebode.records.matrix_table import COVARIANCE, MATRIX_RESPONSES, covariance_rows, matrix_rows
-from livebode.records.parameter_table import PARAMETERS, parameter_rows
-from livebode.records.response_table import RESPONSES, as_batch
+from livebode.records.response_table import PARAMETERS, RESPONSES, as_batch, parameter_rows
 from livebode.records.table_file import ColumnTable
 from livebode.tables import Table
 

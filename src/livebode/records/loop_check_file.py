@@ -8,8 +8,7 @@ from typing import Any
 
 from livebode.core import RecordError, write_whole, writing
 from livebode.records.inside import check_own, read_bytes
-from livebode.records.plain_json import to_json
-from livebode.records.versions import check_version, format_of
+from livebode.records.json_format import check_version, format_of, to_json
 
 NAME = "loop-check.json"
 _BYTES_MAX = 16 << 20

@@ -9,8 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, Validation
 
 from livebode.core import RecordError, write_whole, writing
 from livebode.records.inside import check_own, read_bytes
-from livebode.records.plain_json import to_json
-from livebode.records.versions import check_version, format_of
+from livebode.records.json_format import check_version, format_of, to_json
 
 NAME = "notes.json"
 _BYTES_MAX = 32 << 10

@@ -15,8 +15,8 @@ import numpy as np
 
 from livebode.core import Lines, Quantity, RecordError, Responses, write_whole, writing
 from livebode.records.inside import read_bytes
+from livebode.records.json_format import check_version, format_of
 from livebode.records.summary_file import from_document, to_document
-from livebode.records.versions import check_version, format_of
 
 SAVED = "references.json"
 REFERENCES_MAX, ANNOTATIONS_MAX = 32, 200

@@ -10,8 +10,7 @@ from typing import Any
 
 from livebode.core import RecordError, nearest_name
 from livebode.records.inside import read_bytes
-from livebode.records.plain_json import to_json
-from livebode.records.versions import check_version, format_of
+from livebode.records.json_format import check_version, format_of, to_json
 
 RUN, COPY = "run.json", "run-copy.json"
 _SIZE_BYTES_MAX = 64 << 20

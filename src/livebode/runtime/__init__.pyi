@@ -21,11 +21,10 @@ from livebode.runtime.estimate import Outcome as Outcome
 from livebode.runtime.feed import Feed as Feed
 from livebode.runtime.fits import Fits as Fits
 from livebode.runtime.matrix_baseline import MatrixBaseline as MatrixBaseline
-from livebode.runtime.provenance import dated as dated
-from livebode.runtime.provenance import of_log as of_log
 from livebode.runtime.readiness import ENDED as ENDED
 from livebode.runtime.readiness import SUPPRESSED as SUPPRESSED
 from livebode.runtime.recorded_run import RecordedRun as RecordedRun
+from livebode.runtime.recorder import RecordInOnePiece as RecordInOnePiece
 from livebode.runtime.response_matrix import ResponseMatrix as ResponseMatrix
 from livebode.runtime.run_control import RunControl as RunControl
 from livebode.runtime.run_control import StoppedError as StoppedError
@@ -33,5 +32,6 @@ from livebode.runtime.run_loop import RunLoop as RunLoop
 from livebode.runtime.session import Session as Session
 from livebode.runtime.single_response import SingleResponse as SingleResponse
 from livebode.runtime.status import Status as Status
+from livebode.runtime.summary import dated as dated
+from livebode.runtime.summary import of_log as of_log
 from livebode.runtime.summary import versions as versions
-from livebode.runtime.whole_record import RecordInOnePiece as RecordInOnePiece

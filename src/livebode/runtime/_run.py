@@ -10,9 +10,9 @@ from livebode.estimates import rule
 from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import ExaminedRecording, Outcome
 from livebode.runtime.feed import Feed
-from livebode.runtime.provenance import provenance
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import RunLoop
+from livebode.runtime.summary import provenance
 
 
 def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outcome:

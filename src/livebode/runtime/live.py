@@ -20,10 +20,10 @@ from livebode.runtime.continuing import PreviousRun, StreamPosition, stream_posi
 from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import Estimate, Outcome
 from livebode.runtime.live_feed import LiveFeed
-from livebode.runtime.provenance import provenance
 from livebode.runtime.recorded_run import source_of
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import RunLoop
+from livebode.runtime.summary import provenance
 from livebode.sources.live import LiveSource, ReplaySource
 
 _logger = logging.getLogger(__name__)

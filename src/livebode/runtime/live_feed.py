@@ -11,11 +11,11 @@ from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition
 from livebode.runtime.event_groups import CAUSES
 from livebode.runtime.feed import Feed
-from livebode.runtime.provenance import recorded_live
 from livebode.runtime.recorder import Recorder
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.sender_numbers import SenderNumbers
 from livebode.runtime.shedding import LoadShedding
+from livebode.runtime.summary import recorded_live
 from livebode.runtime.turns import Turn
 from livebode.sources.live import LiveBlock, LiveSource
 
@@ -46,6 +46,7 @@ class LiveFeed(Feed):
         relation: ClockRelation,
     ) -> None:
         super().__init__(source, control, again=False)
+        source.has_record = True
         self.live, self.position, self.previous = source, position, previous
         self.shedding, self.record_wait = LoadShedding(source, lambda: control.ended), source.backlog_cause
         self._live, self._load, self._relation = source, self.shedding, relation

@@ -23,17 +23,13 @@ from livebode.preparation import (
 )
 from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import ExaminedRecording
-from livebode.runtime.provenance import dated
 from livebode.runtime.single_response import SingleResponse
+from livebode.runtime.summary import dated
 from livebode.sources import Log
 
 
 def examined_recording(axis: Axis, to: Destination) -> ExaminedRecording:
-    """Open a recording or several, and examine each as a whole."""
-    if len(axis.source.logs) > 1:
-        from livebode.runtime.recordings import examined_recordings
-
-        return examined_recordings(axis)
+    """Open a recording, and examine it as a whole."""
     opened = open_even_or_uneven(axis)
     if not opened.even:
         from livebode.runtime.uneven_recording import examined_uneven

@@ -6,18 +6,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from livebode import estimation, fitting, preparation
 from livebode.configuration import Axis, open_recording, with_shared_names
 from livebode.core import Block, Channel, Event, RecordingError
-from livebode.estimation import SuccessiveTrackers, Tracker
-from livebode.fitting import RecordingsMean
+from livebode.estimation import Tracker
 from livebode.language import Message
 from livebode.locations import Location, local_copy
-from livebode.preparation import AlignedLog, ChannelCheck, check_same, configured_part, make_settings, realisations
+from livebode.preparation import AlignedLog, ChannelCheck, configured_part, make_settings
 from livebode.records import content_sha256
+from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import ExaminedRecording
-from livebode.runtime.provenance import RecordedSpan, recorded
-from livebode.runtime.recording import Examined, examined
+from livebode.runtime.recording import Examined, examined, examined_recording
 from livebode.runtime.single_response import SingleResponse
+from livebode.runtime.summary import RecordedSpan, recorded
 from livebode.sources import Log, located
 
 
@@ -68,15 +69,17 @@ class SuccessiveRecordings:
                 begins = False
 
 
-def examined_recordings(axis: Axis) -> ExaminedRecording:
-    """Open several recordings, and examine each as a whole; they are tracked one after the other."""
+def examined_recordings(axis: Axis, to: Destination) -> ExaminedRecording:
+    """Open a recording or several, and examine each as a whole; several are tracked one after the other."""
+    if len(axis.source.logs) == 1:
+        return examined_recording(axis, to)
     axis, parts = _prepared(axis)
     sources, settings = [part.of.source for part in parts], parts[0].tracker.settings
-    starts, differ = [part.first for part in parts], realisations(sources, settings)
+    starts, differ = [part.first for part in parts], preparation.realisations(sources, settings)
     estimate = SingleResponse.of(
-        axis, SuccessiveTrackers([part.tracker for part in parts], starts), parts[0].log.channels
+        axis, estimation.SuccessiveTrackers([part.tracker for part in parts], starts), parts[0].log.channels
     )
-    estimate.recordings = RecordingsMean(starts, realisations=differ)
+    estimate.recordings = fitting.RecordingsMean(starts, realisations=differ)
     found = parts[0].of.found | {
         "clock": "relative",
         "phase_slips": sum(part.of.found["phase_slips"] for part in parts),
@@ -111,7 +114,7 @@ def _prepared(axis: Axis) -> tuple[Axis, list[_Part]]:
             log = log.naming(list(dict.fromkeys([*axis.signals.named, *axis.monitoring.covariates])))
             settings = make_settings(own, log)
             if parts:
-                check_same(parts[0].log, parts[0].tracker.settings, log, settings)
+                preparation.check_same(parts[0].log, parts[0].tracker.settings, log, settings)
                 settings = parts[0].tracker.settings
             sha256 = _sha256(path, parts)
             parts.append(_part(own, log, sha256, Tracker(settings), parts[-1].stop if parts else 0))

@@ -39,8 +39,8 @@ from livebode.runtime.estimate import (
 )
 from livebode.runtime.matrix_columns import MatrixColumns
 from livebode.runtime.matrix_detection import MatrixDetection, matrix_detection
-from livebode.runtime.provenance import dated, of_log
 from livebode.runtime.readiness import Readiness
+from livebode.runtime.summary import dated, of_log
 from livebode.sources import Log
 from livebode.sources.live import LiveSource
 

@@ -17,10 +17,10 @@ from livebode.runtime.destination import Destination
 from livebode.runtime.documents import Channels, ClockSet, RunEnded, RunStarted, TrackerResults
 from livebode.runtime.estimate import Estimate, Outcome, RunContext
 from livebode.runtime.feed import Feed
+from livebode.runtime.recorder import WholeRecord
 from livebode.runtime.run_control import StoppedError
 from livebode.runtime.run_counts import RunCounts
 from livebode.runtime.stream import Stream
-from livebode.runtime.whole_record import WholeRecord
 
 if TYPE_CHECKING:
     from livebode.runtime.recorder import Recorder

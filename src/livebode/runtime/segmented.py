@@ -120,8 +120,6 @@ class SegmentedRecord:
     ) -> None:
         self.path = path
         self._position, self._source, self._waiting = position, source, waiting
-        if source is not None:
-            source.has_record = True
         self._tracked: tuple[int, float] | None = None
         self._new, self._waited = False, waiting()
         self._first = (0, 0.0) if previous is None else (previous.sample, previous.time_s)

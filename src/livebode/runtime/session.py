@@ -1,4 +1,4 @@
-"""Session: the axes of a configuration, each in its thread, until all ended; also applies edits of the file."""
+"""Session: several axes, each in a thread; the files that they may open."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 
 from livebode.configuration import Axes, Axis, ConfigurationFile
@@ -17,9 +17,23 @@ from livebode.runtime.allocation import FreeMemory, share_between_threads
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
 from livebode.runtime.destination import Destination, nothing
-from livebode.runtime.open_files import allow_open_files
 from livebode.runtime.service_manager import ServiceManager
 from livebode.runtime.status import Status
+
+OPEN_FILES = 1 << 14
+"""Enough for 256 axes, each with some files, and for the page."""
+
+
+def allow_open_files() -> None:
+    """Raise the limit of this process, which is often 1,024, as far as the system permits it, up to `OPEN_FILES`."""
+    with suppress(ImportError, OSError, ValueError):  # not a POSIX system, or one that does not permit it
+        import resource
+
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        required = OPEN_FILES if hard == resource.RLIM_INFINITY else min(OPEN_FILES, hard)
+        if soft != resource.RLIM_INFINITY and soft < required:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (required, hard))
+
 
 TICK_S = 0.1
 LOOK_S = 1.0

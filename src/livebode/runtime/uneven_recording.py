@@ -19,8 +19,8 @@ from livebode.preparation import (
     uneven_settings,
 )
 from livebode.runtime.estimate import ExaminedRecording
-from livebode.runtime.provenance import RecordedSpan, recorded
 from livebode.runtime.single_response import SingleResponse
+from livebode.runtime.summary import RecordedSpan, recorded
 from livebode.sources import Log, UnevenLog
 
 

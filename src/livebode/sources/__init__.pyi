@@ -15,7 +15,6 @@ from livebode.sources.formats import no_frames as no_frames
 from livebode.sources.formats import read_head as read_head
 from livebode.sources.log import Log as Log
 from livebode.sources.opening import UNEVEN as UNEVEN
-from livebode.sources.opening import open_even_or_uneven as open_even_or_uneven
 from livebode.sources.opening import open_log as open_log
 from livebode.sources.recording import COLUMNS_MAX as COLUMNS_MAX
 from livebode.sources.recording import Chunk as Chunk
@@ -25,8 +24,8 @@ from livebode.sources.recording import Skipped as Skipped
 from livebode.sources.recording import contained as contained
 from livebode.sources.recording import located as located
 from livebode.sources.resample import Resampler as Resampler
-from livebode.sources.rounding import exact_rate_hz as exact_rate_hz
 from livebode.sources.steps import Gap as Gap
+from livebode.sources.steps import exact_rate_hz as exact_rate_hz
 from livebode.sources.timing import Timing as Timing
 from livebode.sources.uneven import ClockGroup as ClockGroup
 from livebode.sources.uneven import UnevenLog as UnevenLog

@@ -1,26 +1,178 @@
-"""CSV, TSV and similar: detected by `dialect`, read in pieces by `rows`, errors located by `locate`."""
+"""Text tables: whole lines of any stream, tidied, read by columns; and the line that a reader rejects."""
 
 from __future__ import annotations
 
+import codecs
 import io
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import IO, Any, BinaryIO, ClassVar
 
 import numpy as np
 
 from livebode.core import RecordingError
-from livebode.sources.cells import CellKind
-from livebode.sources.dialect import Dialect, find_dialect
-from livebode.sources.locate import locate
+from livebode.sources.cells import EMPTY, CellKind, is_comment, is_moment, is_number
+from livebode.sources.dialect import BLANK, Dialect, find_dialect
 from livebode.sources.recording import Chunk, Column, Recording, Skipped
 from livebode.sources.rows import ROW_BYTES_MAX, RowError, RowReader
-from livebode.sources.tidy import Tidied
 from livebode.sources.timing import time_rank
 from livebode.sources.units import SECONDS, split_units
-from livebode.sources.whole_lines import whole_lines
+
+
+def whole_lines(file: IO[bytes], piece_bytes: int) -> Iterator[bytes]:
+    r"""About `piece_bytes` at a time, as they are read; a line that is longer, or that has no end, may end anywhere.
+
+    Lines end with ``\n``, ``\r\n`` or ``\r``. A piece may begin with the ``\n`` of the line before it.
+
+    >>> import io
+    >>> list(whole_lines(io.BytesIO(b"1\n22\n333\n4"), 4))
+    [b'1\n', b'22\n', b'333\n', b'4']
+    """
+    rest = b""
+    while piece := file.read(piece_bytes):
+        end = max(piece.rfind(b"\n"), piece.rfind(b"\r")) + 1
+        if end or len(rest) >= piece_bytes:
+            yield rest + piece[:end]
+            rest = piece[end:]
+        else:
+            rest += piece
+    if rest:
+        yield rest
+
+
+PIECE = 1 << 20
+COMMENT = re.compile(r"(?m)^[ \t]*[#%].*\n?")
+BLANK_LINE = re.compile(r"(?m)^[ \x1a]+\r?(?:\n|\Z)")
+END_MARK = "\x1a"
+"""Ctrl-Z, which DOS programs and LabVIEW write at the end of a text."""
+MARGINS = re.compile(r"(?m)^[ \t]+|[ \t]+(?=\r?$)")
+BLANKS = re.compile(r"[ \t]+")
+
+
+class Tidied(io.RawIOBase):
+    r"""The text of `raw` from its current position, simplified line by line as its dialect needs it.
+
+    >>> blanks = Dialect("\t", True, ".")
+    >>> io.BufferedReader(Tidied(io.BytesIO(b"  1   2 \n# note\n 3 4"), blanks)).read()
+    b'1\t2\n3\t4'
+    """
+
+    def __init__(self, raw: BinaryIO, dialect: Dialect) -> None:
+        self._raw, self._dialect = raw, dialect
+        # A ragged table grows by its width with each short line: its pieces are as much smaller.
+        self._piece = max(1 << 12, PIECE // max(dialect.width, 1)) if dialect.ragged else PIECE
+        self._decoder = codecs.getincrementaldecoder(dialect.encoding)("replace")
+        self._kept = ""
+        self._ready = b""
+        self._done = False
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: bytearray | memoryview) -> int:  # type: ignore[override]
+        while not self._ready and not self._done:
+            self._fill()
+        count = min(len(buffer), len(self._ready))
+        buffer[:count] = self._ready[:count]
+        self._ready = self._ready[count:]
+        return count
+
+    def _fill(self) -> None:
+        raw = self._raw.read(self._piece)
+        self._done = not raw
+        text = self._kept + self._decoder.decode(raw, final=self._done)
+        end = len(text) if self._done else text.rfind("\n") + 1
+        if end == 0 and len(text) > 4 * PIECE:  # no valid line is this long; the reader of rows reports it
+            end = len(text)
+        text, self._kept = text[:end], text[end:]
+        text = BLANK_LINE.sub("", COMMENT.sub("", text))
+        if self._done:
+            text = text.rstrip(END_MARK)
+        if self._dialect.ragged:
+            lines = (line.rstrip("\r") for line in text.split("\n"))
+            text = "".join(self._filled(line) for line in lines if line.strip() not in ("", "EOF"))
+        elif self._dialect.spaced:
+            text = BLANKS.sub("\t", MARGINS.sub("", text))
+        self._ready = text.encode("utf-8")
+
+    def _filled(self, line: str) -> str:
+        if self._dialect.spaced:
+            line = "\t".join(self._dialect.split(line))
+        missing = self._dialect.width - 1 - line.count(self._dialect.delimiter)
+        return f"{line}{self._dialect.delimiter * missing}\n"
+
+
+def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max: int) -> RecordingError | None:
+    """The error in the first line that is too long, has a wrong number of cells, or text in `columns`; else None.
+
+    Lines count from 1 as in an editor.
+    """
+    number = 0
+    with path.open("r", encoding=dialect.encoding, errors="replace", newline=None) as file:
+        while line := file.readline(line_bytes_max + 1):
+            number += 1
+            if number < dialect.first_line or not line.strip(BLANK) or (dialect.untidy and is_comment(line)):
+                continue
+            if len(line) > line_bytes_max:
+                return RecordingError(
+                    "line-too-long",
+                    f"line {number} of {path} is longer than {line_bytes_max} bytes",
+                    "check that this is a recording",
+                    path=str(path),
+                    line=number,
+                    limit_bytes=line_bytes_max,
+                )
+            if error := check_line(path, dialect, columns, number, line.rstrip("\n")):
+                return error
+    return None
+
+
+def check_line(path: Path, dialect: Dialect, columns: Sequence[int], number: int, line: str) -> RecordingError | None:
+    cells = dialect.split(line)
+    if dialect.ragged:
+        if cells == ["EOF"]:
+            return None
+        cells += [""] * (dialect.width - len(cells))
+    if len(cells) != dialect.width:
+        return RecordingError(
+            "line-ragged",
+            f"line {number} of {path} has {len(cells)} cells, the others {dialect.width}",
+            f"repair this line, or {_of_a_mark(dialect)}",
+            path=str(path),
+            line=number,
+            cells=len(cells),
+            columns=dialect.width,
+        )
+    for at in columns:
+        cell = cells[at].strip()
+        fits = is_moment(cell) if dialect.kinds[at] is CellKind.MOMENT else is_number(cell, dialect.decimal)
+        if cell not in EMPTY and not fits:
+            name = dialect.headings[at]
+            return RecordingError(
+                "cell-not-a-number",
+                f"line {number} of {path}, column {name!r}: {cell[:40]!r} is not a number",
+                "correct it, or leave it empty if this is not the time"
+                if any(is_number(other, dialect.decimal) or is_moment(other) for other in cells)
+                else _of_a_mark(dialect),
+                path=str(path),
+                line=number,
+                channel=name,
+                value=cell[:40],
+            )
+    return None
+
+
+def _of_a_mark(dialect: Dialect) -> str:
+    """Remedy for a line that a logger writes where samples are missing: without a time, it alone shows the gap."""
+    row = (" " if dialect.spaced else dialect.delimiter).join(["nan"] * dialect.width)
+    return (
+        f"delete this line if the time continues to rise behind it, replace it by {row!r} if there is no column of "
+        "time, or else split the file there"
+    )
+
 
 _PIECE_BYTES = 4 << 20
 

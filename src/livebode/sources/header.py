@@ -1,13 +1,15 @@
-"""Beginning of a text table: its header, a row of units, the first row of values."""
+"""Header of a text table: names and units in its first rows, and in statements and comments above them."""
 
 from __future__ import annotations
 
+import csv
+import re
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from livebode.core import read_unit
 from livebode.sources.cells import EMPTY, CellKind, is_moment, is_number, is_value, is_word
-from livebode.sources.units import SECONDS, split_unit, unbracketed
+from livebode.sources.units import BRACKETED, SECONDS, split_unit, unbracketed
 
 _UNITS = frozenset(
     (
@@ -125,3 +127,102 @@ def fits_kind(cell: str, kind: CellKind, decimal: str) -> bool:
 
 def padded(cells: list[str], width: int) -> list[str]:
     return [*cells, *[""] * (width - len(cells))]
+
+
+_NUMBER = r"(?P<value>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+_INTERVAL = re.compile(
+    rf"\b(?:sampl\w*[ _](?:interval|period)|tinc|hresolution|delta[ _]?t)\b[^\w\n+.-]*(?:\w+:)?[^\w\n+.-]*{_NUMBER}"
+    r"[^\w\n]{0,3}(?P<unit>[mµun]?s(?:ec)?\b)?",
+    re.IGNORECASE,
+)
+_RATE = re.compile(
+    rf"\bsampl\w*[ _]?(?:rate|frequency|freq)\b[^\w\n+.-]*-? ?(?:\w+:)?{_NUMBER}[^\w\n]{{0,2}}(?P<unit>[kMG]?)",
+    re.IGNORECASE,
+)
+_PREFIX = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
+_NAMES = re.compile(r"(?:trace|channel|signal)[ _]?names?|names?|labels?", re.IGNORECASE)
+_UNITS_OF = re.compile(r"(?:v|y|vertical[ _]?)?units?", re.IGNORECASE)
+
+
+def stated_period_s(above: str) -> float | None:
+    """Seconds from sample to sample, as the lines above a table say.
+
+    >>> stated_period_s("Sample Interval,CH1:2.0E-03"), stated_period_s("Sampling Frequency - 1000")
+    (0.002, 0.001)
+    >>> stated_period_s("CH1(V),t0 = -5e-01, tInc = 1.0e-03,"), stated_period_s("Sample,of,nothing")
+    (0.001, None)
+    """
+    if found := _INTERVAL.search(above):
+        period_s = float(found["value"]) * SECONDS.get((found["unit"] or "s").casefold(), 1.0)
+        return period_s if period_s > 0 else None
+    if found := _RATE.search(above):
+        rate_hz = float(found["value"]) * _PREFIX.get(found["unit"], 1.0)
+        return 1 / rate_hz if rate_hz > 0 else None
+    return None
+
+
+def keyed_header(above: Sequence[list[str]], width: int) -> tuple[list[str], list[str]]:
+    """Names and units of a table whose first column has only the keys of the lines above it; empty without names.
+
+    >>> keyed_header([["TraceName", "Force", "Accel"], ["VUnit", "N", "g"]], 3)
+    (['', 'Force', 'Accel'], ['', 'N', 'g'])
+    """
+    rows = [cells for cells in above if len(cells) == width]
+    found = [next((["", *cells[1:]] for cells in rows if key.fullmatch(cells[0])), []) for key in (_NAMES, _UNITS_OF)]
+    return (found[0], found[1]) if found[0] else ([], [])
+
+
+MARKS = " \t#%"
+DELIMITERS = ",", ";", "\t", "|"
+
+
+def find_comment_header(comments: Sequence[str], width: int, delimiter: str) -> tuple[list[str], list[str]]:
+    """Names and units in the comments above a table of `width` columns; both empty if there are none.
+
+    The comment next to the table is tried first, and only there may blanks separate the names, because prose has
+    blanks too. A last comment of units in brackets belongs to the names above it.
+
+    >>> find_comment_header(["# taken by hand", "#time,accel_x"], 2, ",")
+    (['time', 'accel_x'], [])
+    >>> find_comment_header(["# t u", "# [s] [V]"], 2, " ")
+    (['t', 'u'], ['s', 'V'])
+    """
+    units: list[str] = []
+    blanks = True
+    for comment in reversed(comments):
+        for cells in splits(comment, delimiter, blanks=blanks):
+            if not units and all(map(BRACKETED.fullmatch, cells)) and len(cells) == width:
+                units = [cell[1:-1].strip() for cell in cells]
+                break
+            if len(set(cells)) == len(cells) == width and all(map(is_name, cells)):
+                return cells, units
+        else:
+            blanks = False
+    return [], []
+
+
+def splits(comment: str, delimiter: str, *, blanks: bool) -> list[list[str]]:
+    """The cells of a comment under the table's own delimiter, then under the others."""
+    body = comment.strip().lstrip(MARKS)
+    own = [delimiter] if delimiter in DELIMITERS else []
+    cells = [next(csv.reader([body], delimiter=mark), []) for mark in dict.fromkeys([*own, *DELIMITERS])]
+    return [[cell.strip() for cell in found] for found in cells] + ([with_units(body.split())] if blanks else [])
+
+
+def with_units(words: list[str]) -> list[str]:
+    """Words with the unit in brackets that follows a name as part of it.
+
+    >>> with_units(["t", "[s]", "n", "u", "(V)"])
+    ['t [s]', 'n', 'u (V)']
+    """
+    cells: list[str] = []
+    for word in words:
+        if cells and BRACKETED.fullmatch(word) and not BRACKETED.fullmatch(cells[-1].split()[-1]):
+            cells[-1] = f"{cells[-1]} {word}"
+        else:
+            cells.append(word)
+    return cells
+
+
+def is_name(cell: str) -> bool:
+    return re.search(r"[^\W\d]", cell) is not None and not cell.endswith(":")

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, ClockKind, LivebodeError, QuantityKind, RecordingError, UsageError
 from livebode.locations import Location
-from livebode.sources.computed import computed_blocks
-from livebode.sources.expressions import Expression
+from livebode.sources.expressions import Expression, computed_blocks
 from livebode.sources.naming import NAMED_BY_FILE, explained, found_channel, resolve, without_file
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing

@@ -1,8 +1,9 @@
-"""MATLAB v5 (also v6 and v7): vectors streamed, other variables read one by one by SciPy, structs walked for paths."""
+"""MATLAB's MAT-files of version 5."""
 
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,11 +13,64 @@ from numpy.typing import NDArray
 
 from livebode.core import needing
 from livebode.sources.arrays import array_columns
-from livebode.sources.damage import oversized
+from livebode.sources.damage import damaged, oversized, truncated
 from livebode.sources.friendly import with_friendly_names
-from livebode.sources.mat5check import list_variables
-from livebode.sources.mat5stream import stream, streamable
+from livebode.sources.mat5check import (
+    COMPRESSED,
+    DIMENSIONS,
+    FLAGS,
+    TEXT,
+    UNPACKED_MAX,
+    MatlabWalk,
+    Plain,
+    Unpacked,
+    Variable,
+    list_variables,
+)
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+
+_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+LENGTH_MIN = 1024
+"""Of a vector that is streamed; the values of short ones may be inside a tag."""
+
+
+def streamable(variable: Variable) -> bool:
+    """Whether it is one long column or row: of a matrix, the samples of a channel are in several places."""
+    return max(variable.shape, default=0) >= LENGTH_MIN and sorted(variable.shape)[:-1] == [1] * (
+        len(variable.shape) - 1
+    )
+
+
+def stream(path: Path, variable: Variable, rows: int) -> Iterator[NDArray[np.generic]]:
+    """The values of a vector that `list_variables` has checked, `rows` at a time, in the type in which they are stored.
+
+    MATLAB stores numbers in the smallest type that has them all, whatever their class.
+    """
+    with path.open("rb") as file:
+        file.seek(variable.byte)
+        kind, length = struct.unpack(variable.order + "II", file.read(8))
+        source: Plain | Unpacked = Plain(file)
+        walk = MatlabWalk(source, variable.order)
+        if kind == COMPRESSED:
+            source = Unpacked(file, length)
+            walk = MatlabWalk(source, variable.order)
+            _, length = walk.tag(UNPACKED_MAX)
+        for types in (FLAGS, DIMENSIONS, TEXT):
+            _, _, length = walk.element(length, 0, types)
+        kind, length = walk.tag(length)
+        stored, count = np.dtype(variable.order + _TYPES.get(kind, "V1")), max(variable.shape)
+        if stored.kind == "V" or length != count * stored.itemsize:
+            raise damaged(
+                f"the variable {variable.name} declares {count} values, and has {length} bytes of type {kind}",
+                declared=count,
+            )
+        while length:
+            piece = source.read(min(length, rows * stored.itemsize))
+            if not piece:
+                raise truncated(f"the variable {variable.name} ends {length} bytes early", missing_bytes=length)
+            length -= len(piece)
+            yield np.frombuffer(piece, stored)
+
 
 with needing("SciPy", "analysis", "a MATLAB file"):
     from scipy.io import loadmat

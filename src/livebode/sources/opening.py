@@ -8,12 +8,11 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from livebode.core import ClockKind, QuantityKind, RecordingError, UsageError
-from livebode.locations import Location, Url, local_copy, location
+from livebode.locations import Url, location
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import explained, in_file, resolve
@@ -112,21 +111,6 @@ def open_log(
         log = log_of(recording, rate_hz, time, channels, block_samples, kinds or {}, clock)
     _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)
     return log
-
-
-def open_even_or_uneven(path: Location, names: Sequence[str], channels: Sequence[str], **reading: Any) -> Log:
-    """A Log as of `open_log`; an UnevenLog if the clock of `channels` jitters, or if `names` have other clocks."""
-    with local_copy(path):
-        try:
-            log = open_log(path, channels=channels, **reading)
-            log.check_clocks(names)
-            return log
-        except RecordingError as error:
-            if error.code not in UNEVEN or reading["time"] == "none":
-                raise
-        from livebode.sources.uneven import open_uneven  # few recordings have several clocks
-
-        return open_uneven(path, names, **reading)
 
 
 def log_of(

@@ -15,7 +15,7 @@ import numpy as np
 from livebode.core import not_installed
 from livebode.sources.damage import damaged, oversized, truncated
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
-from livebode.sources.rounding import exact_rate_hz
+from livebode.sources.steps import exact_rate_hz
 
 UNITS = "unit_string", "NI_UnitDescription", "unit"
 PERIOD = "wf_increment"

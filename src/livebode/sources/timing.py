@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.core import ClockKind, RecordingError, clock_kind_of, nearest_name
 from livebode.sources.recording import Chunk, Column
-from livebode.sources.rounding import exact_rate_hz
-from livebode.sources.steps import Gap, Steps
+from livebode.sources.steps import Gap, Steps, exact_rate_hz
 from livebode.sources.units import SECONDS, UNIT_IN_FRONT, split_unit, time_unit
 
 RATE_TOLERANCE = 1e-3

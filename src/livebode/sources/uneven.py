@@ -22,8 +22,8 @@ from livebode.sources.naming import found_channel, resolve
 from livebode.sources.opening import together
 from livebode.sources.recording import Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.resample import Resampler
-from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.stamps import Stamps, stamps_of
+from livebode.sources.steps import exact_rate_hz
 from livebode.sources.timing import Clock, find_time, rate_in_file
 from livebode.sources.units import split_unit
 

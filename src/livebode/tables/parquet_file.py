@@ -1,21 +1,208 @@
-"""Parquet files of runs: only the columns and row groups that are asked for.
-
-Plain flat columns, compressed by LZ4 or not at all: what livebode writes, and wrote with PyArrow before. Columns that
-another program wrote in another form are read by PyArrow where it is installed. A value that a file does not have is
-NaN.
-"""
+"""Parquet files: their pages, and their row groups as tables."""
 
 from __future__ import annotations
 
 import io
+import zlib
 from collections.abc import Iterator, Sequence
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
+import lz4.block
 import numpy as np
+from numpy.typing import NDArray
 
+from livebode.kernel import decode_runs
 from livebode.tables.parquet_footer import ColumnChunk, Footer, ParquetColumn, read_footer
-from livebode.tables.parquet_pages import ForeignFormError, column_of, joined
+from livebode.tables.parquet_format import (
+    BIT_PACKED,
+    CODECS,
+    DATA_PAGE,
+    DICTIONARY_PAGE,
+    FORMS,
+    INDEX_PAGE,
+    LZ4_RAW,
+    PLAIN,
+    PLAIN_DICTIONARY,
+    RLE,
+    RLE_DICTIONARY,
+    UNCOMPRESSED,
+)  # fmt: skip
 from livebode.tables.table import STRING, Column, Field, Schema, Table, Text
+from livebode.tables.thrift_compact import I32, STRUCT, Struct, decode, field
+
+_TEXT_BYTES_MAX = 1 << 26
+_WORDS_MAX = 1 << 20  # other programs limit a dictionary to 1 MiB
+_LZ4_RATIO_MAX = 255  # each byte of a block adds at most so many
+_KIND, _SIZE, _STORED, _CRC = (field(number, I32) for number in range(1, 5))
+_DATA, _DICTIONARY = field(5, STRUCT), field(7, STRUCT)
+_VALUES, _ENCODING, _LEVELS, _REPETITIONS = (field(number, I32) for number in range(1, 5))
+
+
+class ForeignFormError(ValueError):
+    """Values in a form of Parquet that livebode does not write."""
+
+
+def column_of(data: memoryview, chunk: ColumnChunk, column: ParquetColumn) -> Column:
+    """The values in the bytes of a column; a null is NaN, in a column of integers too, False or "".
+
+    Raises
+    ------
+    ForeignFormError
+        If a page has a form that livebode does not write.
+    ValueError
+        If a page is damaged.
+    """
+    if chunk.codec not in (UNCOMPRESSED, LZ4_RAW):
+        name = CODECS[chunk.codec] if 0 <= chunk.codec < len(CODECS) else chunk.codec
+        raise ForeignFormError(f"it is compressed by {name}")
+    return joined(iter(_Pages(data, chunk, column)), chunk.values)
+
+
+def joined(parts: Iterator[Column], rows: int) -> Column:
+    """The parts, one after the other, with so many rows in all, at least one; each is freed after it was copied."""
+    first = next(parts)
+    if isinstance(first, Text):
+        return Text.join([first, *(part for part in parts if isinstance(part, Text))])
+    if len(first) == rows:
+        return first
+    found, at = np.empty(rows, first.dtype), len(first)
+    found[:at] = first
+    for part in parts:
+        if isinstance(part, Text) or part.dtype != found.dtype:  # some have nulls, so all are doubles
+            found = found.astype(np.float64)
+        found[at : at + len(part)] = part
+        at += len(part)
+    return found
+
+
+class _Pages:
+    """Iterates over the values of each data page."""
+
+    def __init__(self, data: memoryview, chunk: ColumnChunk, column: ParquetColumn) -> None:
+        self._data, self._chunk, self._column = data, chunk, column
+        self._kind = column.kind or ""
+        self._dtype = FORMS[self._kind].dtype
+        self._words: NDArray[Any] | list[str] | None = None
+
+    def __iter__(self) -> Iterator[Column]:
+        at, left = 0, self._chunk.values
+        while left > 0:
+            header, begin = decode(self._data, at)
+            kind, stored = header.get(_KIND), header.get(_STORED, -1)
+            at = begin + stored
+            if not begin <= at <= len(self._data):
+                raise ValueError(f"a page declares {stored} bytes")
+            body = self._data[begin:at]
+            if _CRC in header and zlib.crc32(body) != header[_CRC] & 0xFFFFFFFF:
+                raise ValueError("the checksum of a page is wrong")
+            if kind == DICTIONARY_PAGE:
+                self._words = self._dictionary(header, body)
+            elif kind == DATA_PAGE:
+                values = self._page(header, body, left)
+                left -= len(values)
+                yield values
+            elif kind != INDEX_PAGE:
+                raise ForeignFormError(f"a page is of kind {kind}")
+
+    def _dictionary(self, header: Struct, body: memoryview) -> NDArray[Any] | list[str]:
+        about = header.get(_DICTIONARY, {})
+        words = about.get(_VALUES, -1)
+        if self._words is not None or about.get(_ENCODING) not in (PLAIN, PLAIN_DICTIONARY):
+            raise ValueError("a column has two dictionaries, or one of an unknown encoding")
+        # The words of categories are in every row group, also in one that has fewer rows.
+        if not 0 <= words <= max(self._chunk.values, _WORDS_MAX):
+            raise ValueError(f"a dictionary declares {words} words")
+        return self._plain(self._uncompressed(header, body, words), words)
+
+    def _page(self, header: Struct, body: memoryview, left: int) -> Column:
+        about = header.get(_DATA, {})
+        values = about.get(_VALUES, -1)
+        if not 0 <= values <= left:
+            raise ValueError(f"a page declares {values} values of {left}")
+        if {about.get(_LEVELS), about.get(_REPETITIONS)} - {RLE, BIT_PACKED}:
+            raise ValueError("a page declares an unknown encoding of its levels")
+        data = self._uncompressed(header, body, values)
+        known = None
+        if self._column.optional:
+            size = int.from_bytes(data[:4], "little")
+            if about[_LEVELS] != RLE or size > len(data) - 4:
+                raise ValueError(f"a page declares levels of {size} bytes")
+            known = decode_runs(data[4 : 4 + size], 1, values) != 0
+            data = data[4 + size :]
+        count = values if known is None else int(np.count_nonzero(known))
+        found = self._encoded(about.get(_ENCODING), data, count)
+        return found if known is None or count == values else _spread(found, known)
+
+    def _encoded(self, encoding: int | None, data: memoryview, count: int) -> Column:
+        if encoding == PLAIN:
+            found = self._plain(data, count)
+            return Text.of(found) if isinstance(found, list) else found
+        if encoding not in (PLAIN_DICTIONARY, RLE_DICTIONARY):
+            raise ForeignFormError(f"a page declares encoding {encoding}")
+        if self._words is None:
+            raise ValueError(f"a page declares encoding {encoding}, without a dictionary")
+        at = decode_runs(data[1:], data[0] if data else 33, count) if count else np.empty(0, np.uint32)
+        if count and at.max() >= len(self._words):
+            raise ValueError(f"a page has a word that is not among {len(self._words)}")
+        if isinstance(self._words, list):
+            return Text.of(self._words, at.astype(np.int32))
+        return self._words[at]
+
+    def _plain(self, data: memoryview, count: int) -> NDArray[Any] | list[str]:
+        if self._kind == STRING:
+            return _words_of(data, count)
+        if self._kind == "bool":
+            if 8 * len(data) < count:
+                raise ValueError("a page is cut")
+            return np.unpackbits(np.frombuffer(data, np.uint8), count=count, bitorder="little").view(np.bool_)
+        values = np.frombuffer(data, self._dtype, count) if count else np.empty(0, self._dtype)
+        return np.require(values, self._kind, "A")
+
+    def _uncompressed(self, header: Struct, body: memoryview, values: int) -> memoryview:
+        """The page; of numbers it has at most so many bytes as any encoding of them."""
+        size = header.get(_SIZE, -1)
+        limit = _TEXT_BYTES_MAX if self._kind == STRING else 64 + 16 * values
+        if not 0 <= size <= min(limit, max(len(body), 64 + _LZ4_RATIO_MAX * len(body))):
+            raise ValueError(f"a page declares {size} bytes, compressed {len(body)}")
+        if self._chunk.codec == UNCOMPRESSED:
+            if size != len(body):
+                raise ValueError(f"an uncompressed page declares {size} and {len(body)} bytes")
+            return body
+        try:
+            data = lz4.block.decompress(body, uncompressed_size=size)
+        except lz4.block.LZ4BlockError:
+            raise ValueError("a page is damaged: it cannot be uncompressed") from None
+        if len(data) != size:
+            raise ValueError(f"a page has {len(data)} bytes, and declares {size}")
+        return memoryview(data)
+
+
+def _words_of(data: memoryview, count: int) -> list[str]:
+    if 4 * count > len(data):
+        raise ValueError("a page is cut")
+    words, at, letters = [], 0, bytes(data)
+    for _ in range(count):
+        begin = at + 4
+        at = begin + int.from_bytes(letters[at:begin], "little")
+        if at > len(letters):
+            raise ValueError("a page is cut")
+        words.append(letters[begin:at].decode())
+    return words
+
+
+def _spread(values: Column, known: NDArray[np.bool_]) -> Column:
+    """The values in the rows that have one."""
+    if isinstance(values, Text):
+        at = np.full(len(known), len(values.words), dtype=np.int32)
+        at[known] = values.at
+        return Text.of([*values.words, ""], at)
+    if values.dtype == np.bool_:
+        found: NDArray[Any] = np.zeros(len(known), dtype=np.bool_)
+    else:
+        found = np.full(len(known), np.nan, dtype=values.dtype if values.dtype.kind == "f" else np.float64)
+    found[known] = values
+    return found
+
 
 _GROUP_VALUES_MAX = 1 << 27  # 1 GiB of numbers
 

@@ -9,7 +9,7 @@ import pytest
 
 from livebode.core import RecordingError
 from livebode.sources import Dialect, open_log
-from livebode.sources.tidy import Tidied
+from livebode.sources.delimited import Tidied
 from tests.support.errors import refused
 from tests.support.real_recordings import recording
 from tests.support.recordings import write_scope, write_trace

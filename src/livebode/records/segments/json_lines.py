@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Iterator
 from typing import Any
 
-from livebode.records.plain_json import to_json
+from livebode.records.json_format import to_json
 
 _KEY = ', "crc32": "'
 _END = re.compile(rb', "crc32": "[0-9a-f]{8}"\}')

@@ -12,11 +12,11 @@ from typing import Any
 
 from livebode.core import Event, RecordError
 from livebode.records.inside import read_bytes
+from livebode.records.json_format import VERSIONS, check_version, format_of
 from livebode.records.segments import journal
 from livebode.records.segments.damage import Damage, event_of
 from livebode.records.segments.journal import Journal
 from livebode.records.segments.json_lines import in_line, to_line
-from livebode.records.versions import VERSIONS, check_version, format_of
 
 NAME = "manifest.jsonl"
 TIERS = ("responses_1s", "responses_1min", "responses_1h")

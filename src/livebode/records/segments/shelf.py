@@ -13,12 +13,12 @@ from pathlib import Path
 
 from livebode.core import remove_files, sync_directory, write_whole
 from livebode.records.inside import is_folder
+from livebode.records.json_format import VERSIONS
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.manifest import Manifest, Retained, Segment
 from livebode.records.segments.merging import groups_to_merge, row_groups, rows_to_merge, unlisted
 from livebode.records.table_file import ColumnTable
-from livebode.records.versions import VERSIONS
 from livebode.tables import ParquetWriter, Table
 
 FIRST_TO_GO = "samples"

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from livebode import example_responses
 from livebode.core import Responses
 from livebode.fitting import mean_response
-from livebode.records import parameter_table
+from livebode.records import response_table
 from livebode_plant.fleet.sink_rows import RunKey, RunPart, SinkRows
 from livebode_plant.fleet.sink_tables import Closed, MeanTier
 from livebode_plant.lake.wide_responses import from_wide, to_wide
@@ -43,7 +43,7 @@ def message(number: int, lags_s: tuple[float, ...] = (0.3, 0.8)) -> SinkRows:
         "value": [float(number), np.nan], "sigma": [0.1, np.nan], "unit": ["N/m"] * 2, "status": ["ok", "weak"],
         "epsilon": [0.0, 0.0],
     }  # fmt: skip
-    fitted = pa.table(fits, schema=pa.schema(parameter_table.PARAMETER_SCHEMA))
+    fitted = pa.table(fits, schema=pa.schema(response_table.PARAMETER_SCHEMA))
     logged = [np.full(2, round(1e6 * (stored_s - lag)), np.int64) for lag in lags_s]
     return SinkRows(
         number,

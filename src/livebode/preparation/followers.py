@@ -1,14 +1,21 @@
-"""The follower of a live source, whose configuration must fit its samples, or the spectra of its drive."""
+"""The follower of an axis: of a recording, of the samples of a live source, or of the spectra of a drive."""
 
 from __future__ import annotations
 
+from livebode import estimation
 from livebode.configuration import Axis
 from livebode.core import ConfigError, Lines, SpectraLayout
-from livebode.estimation import Follower, SpectraTracker, nearest_hop
-from livebode.preparation.plan import follower_of, settings_of
+from livebode.estimation import Follower, Settings, Tracker, nearest_hop
+from livebode.preparation.plan import make_lines, settings_of
+from livebode.sources import Log
 
 LIVE_RESPONSES_PER_S = 20.0
 """Default for a live source: sufficient for display, with a tenth of the work of a hop of a twentieth of the window."""
+
+
+def make_follower(axis: Axis, log: Log) -> Follower:
+    """A Tracker for this recording, or with [motion] a MotionCorrection; LivebodeError if they do not fit."""
+    return _follower(axis, make_settings(axis, log))
 
 
 def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = None) -> Follower:
@@ -18,7 +25,7 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
     """
     if layout is not None:
         lines = check_spectra(axis, layout, rate_hz)
-        return SpectraTracker(settings_of(axis, rate_hz, lines, layout.hop), layout)
+        return estimation.SpectraTracker(settings_of(axis, rate_hz, lines, layout.hop), layout)
     frequencies, window = axis.lines.frequencies, axis.lines.window
     if frequencies == "auto" or window == "auto":
         raise ConfigError(
@@ -29,7 +36,47 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
         )
     lines = Lines.parse(frequencies, rate_hz, window, rounded=not axis.tracking.periodic)
     hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
-    return follower_of(axis, settings_of(axis, rate_hz, lines, hop))
+    return _follower(axis, settings_of(axis, rate_hz, lines, hop))
+
+
+def _follower(axis: Axis, settings: Settings) -> Follower:
+    if not settings.periodic:
+        if axis.motion is not None:
+            raise ConfigError(
+                "key-conflict",
+                f"[motion] needs an excitation that repeats, but tracking.estimator is {settings.estimator!r}",
+                "remove [motion], or choose another estimator",
+                key="motion",
+            )
+        return estimation.NonPeriodicTracker(settings)
+    if axis.motion is None:
+        return Tracker(settings)
+    # The simulation, which its model needs, is slow to import.
+    from livebode.motion import MotionCorrection
+
+    chunk_samples = round(axis.motion.chunk_s * settings.lines.rate_hz)
+    if chunk_samples < 2 * settings.lines.window:
+        raise ConfigError(
+            "value-invalid",
+            f"motion.chunk_s = {axis.motion.chunk_s:g} is {chunk_samples} samples, less than two windows of "
+            f"{settings.lines.window}",
+            "set it to the duration of a stroke",
+            key="motion.chunk_s",
+            value=axis.motion.chunk_s,
+            window=settings.lines.window,
+        )
+    return MotionCorrection(
+        settings, radius_m=axis.motion.radius_m, chunk_samples=chunk_samples, driven_by=axis.motion.driven_by
+    )
+
+
+def make_settings(axis: Axis, log: Log) -> Settings:
+    """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
+    if not axis.tracking.periodic:
+        from livebode.preparation.nonperiodic import nonperiodic_settings  # loads the method of local polynomials
+
+        return nonperiodic_settings(axis, log)
+    return settings_of(axis, log.rate_hz, make_lines(axis, log))
 
 
 def check_spectra(axis: Axis, layout: SpectraLayout, rate_hz: float) -> Lines:
