@@ -28,6 +28,7 @@ PAGE = ROOT / "docs" / "reference" / "python.md"
 FACES = [
     "livebode",
     *(f"livebode.{path.parent.name}" for path in sorted(SOURCE.glob("*/__init__.pyi"))),
+    "livebode_matrix",
     "livebode_modes",
 ]
 SHARED = {"livebode.kernel._native", "livebode.simulation._axis"}

@@ -265,7 +265,7 @@ class SingleResponse(Estimate):
         source, lines = self.run.source, self.settings.lines
         events = [] if self.detection is None else self.detection.finish()
         done = self._described(self.run.about, source.channels)
-        done |= summary.done(self.counts, lines.rate_hz, self.run.counts)
+        done |= summary.counts_and_speed(self.counts, lines.rate_hz, self.run.counts)
         self.fit = None if self.fits is None else self.fits.newest()
         seen = self.overview.responses()
         done |= summary.of_source(source) | summary.fitted(self.fits, self.fit, seen[seen.ready]) | self.monitored()
