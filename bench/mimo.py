@@ -16,7 +16,8 @@ from bench.work import side_by_side
 from livebode.core import Block, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.kernel import SlidingDFT
-from livebode.mimo import MatrixExcitation, MatrixSettings, MatrixTracker
+from livebode.mimo import MatrixExcitation
+from livebode_matrix import MatrixSettings, MatrixTracker
 
 RATE_HZ, WINDOW, HOP, SECONDS_EACH = 4000.0, 400, 20, 2.0
 LINES = Lines.parse("20:400:20", rate_hz=RATE_HZ, window=WINDOW)

@@ -19,11 +19,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Lines
-from livebode.mimo import (
-    MatrixExcitation,
+from livebode.core import Block, Lines, MatrixResponses
+from livebode.mimo import MatrixExcitation
+from livebode.simulation import CoreXY, CoreXYLoop, Gantry, GantryLoop, MotorLoop
+from livebode_matrix import (
     MatrixModes,
-    MatrixResponses,
     MatrixSettings,
     MatrixTracker,
     compare_gantries,
@@ -31,9 +31,8 @@ from livebode.mimo import (
     fit_gantry,
     fit_matrix,
 )
-from livebode.mimo.gantry_change import CART_PLACE
-from livebode.mimo.gantry_fit import PARAMETERS, parameters_of
-from livebode.simulation import CoreXY, CoreXYLoop, Gantry, GantryLoop, MotorLoop
+from livebode_matrix.gantry_change import CART_PLACE
+from livebode_matrix.gantry_fit import PARAMETERS, parameters_of
 from studies.result import Verdict
 
 RUNS, AT_ONCE, SEARCHED = 200, 25, 20

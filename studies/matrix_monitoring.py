@@ -17,9 +17,10 @@ import numpy as np
 from scipy.signal import lfilter
 
 from livebode.core import Event, MatrixResponses
-from livebode.mimo import MatrixMonitor, MatrixTracker, mean_matrix
-from livebode.mimo.line_correlation import RowSteps
+from livebode.mimo import mean_matrix
 from livebode.simulation import Gantry, GantryLoop
+from livebode_matrix import MatrixMonitor, MatrixTracker
+from livebode_matrix.line_correlation import RowSteps
 from studies.matrix_change import EXCITATION, GANTRY, NOISE_RAD_PER_S, RATE_HZ, SETTINGS
 from studies.result import Verdict
 

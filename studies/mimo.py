@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import PID, Block, Lines
-from livebode.mimo import MatrixExcitation, MatrixLoop, MatrixResponses, MatrixSettings, MatrixTracker
+from livebode.core import PID, Block, Lines, MatrixResponses
+from livebode.mimo import MatrixExcitation, MatrixLoop
 from livebode.simulation import Gantry, GantryLoop
 from livebode.simulation.gantry import CHANNELS
+from livebode_matrix import MatrixSettings, MatrixTracker
 from studies.result import Verdict
 
 RUNS, AT_ONCE = 4000, 50

@@ -12,17 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block
-from livebode.mimo import (
-    MatrixDesign,
-    MatrixLimits,
-    MatrixSettings,
-    MatrixSpec,
-    MatrixTracker,
-    MechanismMachine,
-    choose_matrix,
-)
+from livebode.mimo import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
 from livebode.mimo.design.spec import KINDS
 from livebode.simulation import CoreXYLoop, GantryLoop
+from livebode_matrix import MatrixSettings, MatrixTracker
 
 RECORDINGS, TIME_S = 100, 10.0
 MACHINES = {

@@ -9,13 +9,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from livebode.core import ConfigError
-from livebode.plugins import loaded, named
+from livebode.plugins import loaded, named, wings_left_out
 
 RESPONSE = "response"
 """The kind of a run whose run.json names none of the others."""
+MATRIX = "matrix"
+_BELONGS = {MATRIX: "a list of channels in [signals]", "output_only": "the section [output_only]"}
+"""What names the kinds of livebode's wings in a configuration."""
 
 ESTIMATES: Mapping[str, Mapping[str, str]] = {
     RESPONSE: {
+        "check": "livebode.configuration.matrix:check_no_matrix",
+        "baseline": "livebode.monitoring:Baseline",
         "estimate": "livebode.runtime.single_response:SingleResponse",
         "recording": "livebode.runtime.recordings:examined_recordings",
         "draw": "livebode.cli.pictures:drawing_of",
@@ -23,21 +28,13 @@ ESTIMATES: Mapping[str, Mapping[str, str]] = {
         "page": "livebode.dashboard.matrix_view:views_of_response",
         "export": "livebode.cli.export_command:responses",
     },
-    "matrix": {
-        "estimate": "livebode.runtime.response_matrix:ResponseMatrix",
-        "recording": "livebode.runtime.response_matrix:examined_matrix",
-        "draw": "livebode.cli.matrix:drawing_matrix",
-        "show": "livebode.cli.matrix:show_matrix",
-        "page": "livebode.dashboard.matrix_view:views_of_matrix",
-        "export": "livebode.cli.export_command:matrices",
-    },
 }
 """Rules by kind; run.json of each but a response has the name of its kind as a key that is true."""
 
 
 def kind_of(summary: Mapping[str, Any]) -> str:
     """The kind of a run with this run.json."""
-    return next((kind for kind in named("estimates") if summary.get(kind) is True), RESPONSE)
+    return next((kind for kind in {**named("estimates"), **_BELONGS} if summary.get(kind) is True), RESPONSE)
 
 
 def rule(kind: str, name: str) -> Any:
@@ -46,8 +43,8 @@ def rule(kind: str, name: str) -> Any:
     if rules is None:
         raise ConfigError(
             "value-invalid",
-            f"the section [{kind}] belongs to a kind of estimate that is not installed",
-            "install the wing modes of livebode, or remove the section",
+            f"{_BELONGS[kind]} belongs to a kind of estimate that is not installed",
+            f"install the wing {' or '.join(wings_left_out('estimates'))} of livebode, or remove it",
             key=kind,
             value=kind,
             allowed=list(named("estimates")),

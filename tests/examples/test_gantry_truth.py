@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bench.mcu_matrix import DWELL, EXCITATION, HOP, LINES, REPETITIONS, SETTLE, play, recording
-from livebode.core import Block
-from livebode.mimo import MatrixResponses, MatrixSettings, MatrixTracker
+from livebode.core import Block, MatrixResponses
+from livebode_matrix import MatrixSettings, MatrixTracker
 from tests.support.targets import need_tools
 from tools.firmware import M4F, M7, Core
 

@@ -194,6 +194,17 @@ def test_without_the_wing_design_its_commands_and_its_function_name_the_wing(tmp
     )
 
 
+def test_without_the_wing_matrix_a_list_of_channels_is_refused_by_one_sentence(tmp_path: Path) -> None:
+    log = write_parquet(tmp_path / "log.parquet", signals())
+    given = ["--input", "u", "--input", "w", "--output", "y", "--lines", "50,100", "--window", "100"]
+    done = without("matrix", "run", log, *given, "--out", tmp_path / "run")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "a list of channels in [signals] belongs to a kind of estimate that is not installed" in done.stderr
+    assert "install the wing matrix of livebode" in done.stderr
+    assert not (tmp_path / "run").exists()
+    assert "a gantry" not in without("matrix", "example").stdout
+
+
 def test_without_the_wing_of_many_machines_its_commands_and_examples_do_not_exist() -> None:
     commands = ("--help", "example", "fleet status", "schema archive", "schema axis")
     answers = {words: without("plant", *words.split()) for words in commands}

@@ -29,6 +29,7 @@ FACES = [
     "livebode",
     *(f"livebode.{path.parent.name}" for path in sorted(SOURCE.glob("*/__init__.pyi"))),
     "livebode_design",
+    "livebode_matrix",
     "livebode_modes",
 ]
 SHARED = {"livebode.kernel._native", "livebode.simulation._axis"}

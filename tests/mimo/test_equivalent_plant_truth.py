@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines, MatrixResponses, Model, as_model
-from livebode.mimo import MatrixLoop, equivalent_plant, example_matrix_responses
+from livebode.mimo import MatrixLoop, equivalent_plant
+from livebode_matrix import example_matrix_responses
 
 LINES = Lines.parse("2:60:2", rate_hz=4000, window=2000)
 TRIALS = 4000

@@ -10,20 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from livebode.core import Block, DesignError, UsageError
-from livebode.mimo import (
-    MatrixDesign,
-    MatrixLimits,
-    MatrixResponses,
-    MatrixSettings,
-    MatrixSpec,
-    MatrixTracker,
-    MechanismMachine,
-    choose_matrix,
-)
+from livebode.core import Block, DesignError, MatrixResponses, UsageError
+from livebode.mimo import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
 from livebode.mimo.design.amplitude import best_amplitudes
 from livebode.mimo.design.candidate import RESERVE
 from livebode.simulation import CoreXYLoop, GantryLoop
+from livebode_matrix import MatrixSettings, MatrixTracker
 
 GANTRY = MechanismMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001), torque_constant_n_m_per_a=0.5)
 COREXY = MechanismMachine(loop=CoreXYLoop(), noise=(0.05, 0.05, 0.0005, 0.0005))

@@ -10,8 +10,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from livebode.core import MatrixResponses
-from livebode.mimo import example_matrix_responses
 from livebode.pictures import matrix_figure, save_matrix_pictures, singular_values_figure
+from livebode_matrix import example_matrix_responses
 
 NEWEST = example_matrix_responses()[-1:]
 

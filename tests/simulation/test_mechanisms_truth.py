@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from livebode.core import Lines, UsageError
-from livebode.mimo import MatrixExcitation, MatrixSettings, MatrixTracker
+from livebode.mimo import MatrixExcitation
 from livebode.simulation import CoreXY, CoreXYLoop, Gantry, GantryLoop, ModalLoop, ModalMachine, MotorLoop
+from livebode_matrix import MatrixSettings, MatrixTracker
 
 Floats = NDArray[np.float64]
 Forces = Callable[[Floats, Floats, Floats], Floats]

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.analysis import read_gantry
 from livebode.core import FitError, GridError, Lines, MatrixResponses, UsageError
 from livebode.fitting import outputs_of, solve
-from livebode.mimo import (
+from livebode.mimo import mean_matrix
+from livebode.simulation import GantryLoop
+from livebode_matrix import (
     MatrixModes,
     MatrixMonitor,
     MatrixSettings,
@@ -20,14 +21,13 @@ from livebode.mimo import (
     compare_matrices,
     fit_gantry,
     fit_matrix,
-    mean_matrix,
+    read_gantry,
 )
-from livebode.mimo.change import tail
-from livebode.mimo.gantry_fit import parameters_of
-from livebode.mimo.mode_choice import chosen
-from livebode.mimo.row_scatter import row_scatter
-from livebode.mimo.whitening import Weighted
-from livebode.simulation import GantryLoop
+from livebode_matrix.change import tail
+from livebode_matrix.gantry_fit import parameters_of
+from livebode_matrix.mode_choice import chosen
+from livebode_matrix.row_scatter import row_scatter
+from livebode_matrix.whitening import Weighted
 from studies.matrix_change import EXCITATION, GANTRY, LINES, PERIODS, RATE_HZ, begun, matrices, true_modes
 
 RUNS = 12

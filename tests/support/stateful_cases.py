@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from livebode.configuration import FitSection, ReadyCondition
-from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
+from livebode.core import Block, Channel, Event, Lines, MatrixResponses, Responses, Spectra, SpectraLayout
 from livebode.estimation import (
     NonPeriodicTracker,
     RippleOrder,
@@ -23,14 +23,7 @@ from livebode.estimation import (
 )
 from livebode.excitation import multisine
 from livebode.fitting import DriftTest, EvaluationGrid, Fitter, TwoMass
-from livebode.mimo import (
-    MatrixExcitation,
-    MatrixMonitor,
-    MatrixResponses,
-    MatrixSettings,
-    MatrixTracker,
-    example_matrix_responses,
-)
+from livebode.mimo import MatrixExcitation
 from livebode.monitoring import (
     Baseline,
     Monitor,
@@ -44,13 +37,14 @@ from livebode.motion import MotionCorrection
 from livebode.preparation import ChannelCheck
 from livebode.runtime import ChangeDetection, Fits
 from livebode.runtime.continuing import StreamPosition
-from livebode.runtime.matrix_columns import MatrixColumns
-from livebode.runtime.matrix_detection import MatrixDetection
 from livebode.runtime.readiness import Readiness
 from livebode.runtime.run_counts import RunCounts
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
 from livebode.sources.live import Batch, LiveBlock, Origin, Sequencer, SourceEvents
 from livebode.sources.live.kernel_drive import KernelDrive
+from livebode_matrix import MatrixMonitor, MatrixSettings, MatrixTracker, example_matrix_responses
+from livebode_matrix.columns import MatrixColumns
+from livebode_matrix.detection import MatrixDetection
 from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.message import write_message
 from tests.support.axes import LINES as AXIS_LINES

@@ -17,8 +17,6 @@ from livebode.analysis.learning import reads_recordings as reads_recordings
 from livebode.analysis.line_validation import validate_run_at_lines as validate_run_at_lines
 from livebode.analysis.loop_verdict import CheckedLoop as CheckedLoop
 from livebode.analysis.loop_verdict import checked_loop as checked_loop
-from livebode.analysis.matrices import fit_matrix_run as fit_matrix_run
-from livebode.analysis.matrices import read_gantry as read_gantry
 from livebode.analysis.place_fits import by_place as by_place
 from livebode.analysis.place_fits import lpv_model as lpv_model
 from livebode.analysis.place_fits import modes_by_place as modes_by_place

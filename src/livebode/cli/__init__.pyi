@@ -18,6 +18,8 @@ from livebode.cli.options import To as To
 from livebode.cli.picture_support import can_draw as can_draw
 from livebode.cli.picture_support import tell_how_to_draw as tell_how_to_draw
 from livebode.cli.pictures import one_drawing_at_a_time as one_drawing_at_a_time
+from livebode.cli.pictures import show_monitoring as show_monitoring
+from livebode.cli.pictures import tracked_amount as tracked_amount
 from livebode.cli.query_result import Csv as Csv
 from livebode.cli.query_result import RowsMax as RowsMax
 from livebode.cli.query_result import check_form as check_form

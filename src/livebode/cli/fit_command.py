@@ -10,6 +10,7 @@ import typer
 from livebode.cli.band import parsed_band
 from livebode.cli.options import Json
 from livebode.core import UsageError
+from livebode.estimates import kind_of, rule
 from livebode.locations import location
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ def fit_command(
     (rational by default). Defaults are from the run's \\[fit] section. Exit code 3 if no model fits.
     """
     from livebode.fitting import POLE_MODELS, Kind
+    from livebode.records import RunRecord
 
     given: dict[str, Any] = {
         "model": model,
@@ -86,8 +88,12 @@ def fit_command(
         "hold": hold,
     }
     specified = {name: value for name, value in given.items() if value is not None}
-    if not entry and (model is None or model in POLE_MODELS) and (matrix := _matrix(directories)) is not None:
-        _fit_matrix(matrix, cast(Kind, model or "rational"), specified, order, as_json)
+    if not entry and (model is None or model in POLE_MODELS) and (fit := _fit_rule(directories)) is not None:
+        run = RunRecord.open(directories[0], matrix=True)
+        _check_options(kind := cast(Kind, model or "rational"), specified)
+        section = _section(run.path, {name: specified[name] for name in specified if name != "model"})
+        found, remarks = fit(run, kind, section, order)
+        _show_poles(found, remarks, as_json)
         return
     runs = _opened(directories, entry or [])
     if model in POLE_MODELS:
@@ -96,14 +102,11 @@ def fit_command(
         _fit_physical(runs, specified, order, as_json)
 
 
-def _matrix(directories: list[Path]) -> RunRecord | None:
-    """The matrix run, if it is one."""
-    from livebode.records import RunRecord
+def _fit_rule(directories: list[Path]) -> Any:
+    """What fits a whole run of its kind; None where each response is fitted."""
+    from livebode.records import read_summary
 
-    if len(directories) > 1:
-        return None
-    run = RunRecord.open(directories[0], matrix=True)
-    return run if run.is_matrix else None
+    return rule(kind_of(read_summary(directories[0])[0]), "fit") if len(directories) == 1 else None
 
 
 def _opened(directories: list[Path], entries: list[str]) -> list[RunRecord]:
@@ -163,16 +166,6 @@ def _fit_poles(
     kept = {name: own[name] for name in ("band_hz", "hold") if name in own}
     section = _section(runs[0].path, kept | {name: specified[name] for name in specified if name != "model"})
     _show_poles(*fit_poles(runs, model, section, order), as_json)
-
-
-def _fit_matrix(
-    run: RunRecord, model: Kind, specified: dict[str, Any], order: int | None, as_json: bool
-) -> None:  # fmt: skip
-    from livebode.analysis import fit_matrix_run
-
-    _check_options(model, specified)
-    section = _section(run.path, {name: specified[name] for name in specified if name != "model"})
-    _show_poles(*fit_matrix_run(run, model, section, order), as_json)
 
 
 def _check_options(model: Kind, specified: dict[str, Any]) -> None:

@@ -11,6 +11,7 @@ from livebode.configuration.axis import Axis as Axis
 from livebode.configuration.axis import nearest as nearest
 from livebode.configuration.axis import read_loop as read_loop
 from livebode.configuration.axis import read_serve_section as read_serve_section
+from livebode.configuration.experiments_section import ExperimentsSection as ExperimentsSection
 from livebode.configuration.file_kinds import FileKind as FileKind
 from livebode.configuration.file_kinds import kind_of_file as kind_of_file
 from livebode.configuration.fit_section import FitSection as FitSection
@@ -19,9 +20,7 @@ from livebode.configuration.loop_section import LoopSection as LoopSection
 from livebode.configuration.loop_section import PIDSection as PIDSection
 from livebode.configuration.machine_section import MachineSection as MachineSection
 from livebode.configuration.matrix import check_controllers as check_controllers
-from livebode.configuration.matrix import matrix_lines as matrix_lines
 from livebode.configuration.matrix import matrix_loop as matrix_loop
-from livebode.configuration.matrix import matrix_settings as matrix_settings
 from livebode.configuration.message_template import filled as filled
 from livebode.configuration.monitoring_section import MonitoringSection as MonitoringSection
 from livebode.configuration.orders_section import OrdersSection as OrdersSection

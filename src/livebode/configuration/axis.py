@@ -13,7 +13,6 @@ from livebode.configuration.fit_section import FitSection
 from livebode.configuration.lines_section import LinesSection
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.machine_section import MachineSection
-from livebode.configuration.matrix import check_matrix, check_no_matrix
 from livebode.configuration.monitoring_section import MonitoringSection
 from livebode.configuration.motion_section import MotionSection
 from livebode.configuration.orders_section import OrdersSection
@@ -29,6 +28,7 @@ from livebode.configuration.signals_section import SignalsSection
 from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.configuration.tracking_section import TrackingSection
 from livebode.core import ConfigError, nearest_name
+from livebode.estimates import MATRIX, RESPONSE, rule
 from livebode.sources.live import SourceSettings, check_keys, checked_address
 
 NOT_RECORDED = {"serve", "publish"}
@@ -137,7 +137,7 @@ class Axis(ConfigurationSection):
         if axis.source.replay is not None:
             check_keys(axis.source, "replay")
         try:
-            (check_matrix if axis.signals.is_matrix else check_no_matrix)(axis)
+            rule(MATRIX if axis.signals.is_matrix else RESPONSE, "check")(axis)
         except ConfigError as error:
             raise error.at(origin) from None
         if axis.output_only is not None:
@@ -151,7 +151,7 @@ class Axis(ConfigurationSection):
     @property
     def kind(self) -> str:
         """The kind of its estimate, a key of `livebode.estimates.ESTIMATES`."""
-        return "output_only" if self.output_only is not None else "matrix" if self.signals.is_matrix else "response"
+        return "output_only" if self.output_only is not None else MATRIX if self.signals.is_matrix else RESPONSE
 
     @property
     def entries(self) -> list[tuple[str, str]]:

@@ -69,7 +69,7 @@ class MatrixResponses(RowArrays):
 
     Examples
     --------
-    >>> from livebode.mimo import example_matrix_responses
+    >>> from livebode_matrix import example_matrix_responses
     >>> responses = example_matrix_responses()
     >>> responses.value.shape, responses.covariance.shape
     ((3, 7, 2, 2), (3, 7, 2, 2, 2, 2))
@@ -202,7 +202,7 @@ class MatrixResponses(RowArrays):
 
         Examples
         --------
-        >>> from livebode.mimo import example_matrix_responses
+        >>> from livebode_matrix import example_matrix_responses
         >>> example_matrix_responses().sel(output="velocity2", frequency_hz=slice(20, 30))
         <MatrixResponses: 3 rows, 3 lines, 1 outputs × 2 inputs>
         """
@@ -279,7 +279,7 @@ class MatrixResponses(RowArrays):
         --------
         The beam of a gantry as its mean and its difference, per mean torque and per difference:
 
-        >>> from livebode.mimo import example_matrix_responses
+        >>> from livebode_matrix import example_matrix_responses
         >>> half = [[0.5, 0.5], [1.0, -1.0]]
         >>> beam = example_matrix_responses().transformed(half, [[1.0, 0.5], [1.0, -0.5]], (("y", "dy"), ("u", "du")))
         >>> beam.outputs, beam.value.shape
@@ -340,7 +340,7 @@ class MatrixResponses(RowArrays):
 
         Examples
         --------
-        >>> from livebode.mimo import example_matrix_responses
+        >>> from livebode_matrix import example_matrix_responses
         >>> axes = example_matrix_responses().plot()
         >>> axes.shape, axes[0, 1].get_title()
         ((4, 2), 'u2 → velocity1')
@@ -364,7 +364,7 @@ class MatrixResponses(RowArrays):
         Examples
         --------
         >>> import numpy as np
-        >>> from livebode.mimo import example_matrix_responses
+        >>> from livebode_matrix import example_matrix_responses
         >>> responses = example_matrix_responses()[-1:]
         >>> dataset = responses.to_xarray()
         >>> covariance = (dataset.noise * dataset.spread).transpose(

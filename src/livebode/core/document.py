@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from livebode.core.errors.extra import ExtraError
+from livebode.core.errors.inputs import ExtraError
 from livebode.language import Message
 from livebode.plugins import loaded, named
 

@@ -15,6 +15,7 @@ from livebode.configuration import FitSection, chosen_model, recorded_configurat
 from livebode.core import Lines, LivebodeError, Quantity, Responses
 from livebode.dashboard.quantities import Quantities
 from livebode.dashboard.trends import Trends
+from livebode.estimates import MATRIX, rule
 from livebode.fitting import EvaluationGrid, PhysicalModel
 from livebode.language import Message
 
@@ -132,9 +133,7 @@ class HealthyEntry:
     @classmethod
     def of(cls, path: Path, output: str, input: str) -> HealthyEntry:
         """Read the run that is the baseline; LivebodeError if it cannot be read."""
-        from livebode.runtime import MatrixBaseline
-
-        return cls(MatrixBaseline.load(path).mean.entry(output, input))
+        return cls(rule(MATRIX, "baseline").load(path).mean.entry(output, input))
 
     def response(self, beside: Responses, before: float) -> Responses | None:  # noqa: ARG002 - as of `Healthy`
         """The response of the healthy machine, with sigma, at the lines of the response `beside` (one row)."""

@@ -17,6 +17,7 @@ from livebode.configuration import (
     recorded_configuration,
 )
 from livebode.core import LivebodeError, UsageError
+from livebode.estimates import rule
 from livebode.plugins import loaded
 from livebode.preparation import live_follower
 from livebode.records import RunRecord
@@ -113,24 +114,11 @@ def _problem_of(axis: Axis) -> LivebodeError | None:
     """Why it could not begin: its lines, loop or baseline; None where nothing is found, or it takes samples to tell."""
     try:
         if axis.monitoring.baseline is not None:
-            _check_baseline(axis, axis.monitoring.baseline)
+            rule(axis.kind, "baseline").load(axis.monitoring.baseline)
+        if axis.monitoring.gantry is not None:
+            rule(axis.kind, "machine")(axis.monitoring.gantry)
         if axis.source.url is not None and axis.source.rate_hz is not None:
             live_follower(axis, axis.source.rate_hz)
     except LivebodeError as error:
         return error
     return None
-
-
-def _check_baseline(axis: Axis, path: Path) -> None:
-    """Whether it can be read, with the description of a gantry; imported here, because both need the simulation."""
-    if not axis.signals.is_matrix:
-        from livebode.monitoring import Baseline
-
-        Baseline.load(path)
-        return
-    from livebode.analysis import read_gantry
-    from livebode.runtime import MatrixBaseline
-
-    MatrixBaseline.load(path)
-    if axis.monitoring.gantry is not None:
-        read_gantry(axis.monitoring.gantry)

@@ -5,4 +5,5 @@ from livebode.interface._experiment import design as design
 from livebode.interface._run import Run as Run
 from livebode.interface.example_recordings import EXAMPLES as EXAMPLES
 from livebode.interface.example_recordings import Example as Example
+from livebode.interface.example_recordings import table_of as table_of
 from livebode.interface.example_recordings import write_examples as write_examples

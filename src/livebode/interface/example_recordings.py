@@ -18,14 +18,11 @@ import numpy as np
 from livebode.core import Block, Lines, OutputError, remove_empty, whole_directory, whole_files, writing
 from livebode.excitation import chirp, multisine
 from livebode.export import write_columns, write_header
-from livebode.mimo import MatrixExcitation
 from livebode.plugins import named
 from livebode.simulation import (
     BeltAxis,
     Drive,
     Friction,
-    Gantry,
-    GantryLoop,
     Mechanics,
     Sensor,
     SimulatedAxis,
@@ -72,12 +69,13 @@ class Example:
 def _simulated(names: tuple[str, ...], **settings: Any) -> Callable[[], Table]:
     def simulate() -> Table:
         block, _ = SimulatedAxis(BeltAxis(sensor=_SENSOR, **settings)).run()
-        return _table(block, names)
+        return table_of(block, names)
 
     return simulate
 
 
-def _table(block: Block, names: tuple[str, ...]) -> Table:
+def table_of(block: Block, names: tuple[str, ...]) -> Table:
+    """Time and these channels, with their units in the names of the columns."""
     units = {channel.name: channel.unit for channel in block.channels}
     columns = {f"{name} [{units[name]}]": block[name] for name in names}
     return Table.of({"t [s]": np.arange(len(block)) / block.rate_hz} | columns)
@@ -115,7 +113,7 @@ def _single_chirp() -> Table:
 def _quiet() -> Table:
     """An axis at standstill without excitation; the measured torque has a hum."""
     block, _ = SimulatedAxis(BeltAxis(sensor=_SENSOR, motion=_HELD, seconds=3.0, seed=7)).run()
-    table = _table(block, ("u", "velocity"))
+    table = table_of(block, ("u", "velocity"))
     hum = _HUM_N_M * np.sin(2 * np.pi * _HUM_HZ * np.arange(len(block)) / block.rate_hz)
     return Table.of(dict(zip(table.column_names, table.columns)) | {table.column_names[1]: block["u"] + hum})
 
@@ -137,23 +135,7 @@ def _strokes() -> Table:
         seed=9,
     )  # fmt: skip
     block, _ = SimulatedAxis(axis).run()
-    return _table(block, ("u", "velocity", "position"))
-
-
-def _gantry(
-    seed: int, cart_m: float = 0.2, frequencies: str = "6:90:4", amplitude_n_m: float = 0.2, settle: int = 3
-) -> Callable[[], Table]:
-    """A gantry in closed loop, whose two motors have orthogonal multisines, with noise of the encoders."""
-
-    def simulate() -> Table:
-        lines = Lines.parse(frequencies, _RATE_HZ, 2000)
-        excitation = MatrixExcitation.orthogonal(lines, 2, amplitude=amplitude_n_m, dwell=4, settle=settle)
-        w = np.tile(excitation.samples, 4)
-        noise = 0.02 * np.random.default_rng(seed).standard_normal((3, w.shape[1]))
-        block = GantryLoop(gantry=Gantry(cart_m=cart_m)).simulate(w, noise=noise)
-        return _table(block, ("w1", "w2", "u1", "u2", "velocity1", "velocity2"))
-
-    return simulate
+    return table_of(block, ("u", "velocity", "position"))
 
 
 EXAMPLES = {
@@ -232,27 +214,6 @@ EXAMPLES = {
         {"strokes.parquet": _strokes},
         ("strokes.toml",),
         ("livebode friction strokes.toml", "livebode orders strokes.toml"),
-    ),
-    "matrix": Example(
-        "a gantry with two motors that move each other, with its cart at two places",
-        {"gantry.parquet": _gantry(10, 0.2), "gantry-2.parquet": _gantry(11, 0.25)},
-        ("gantry.toml", "gantry-2.toml"),
-        (
-            "livebode run gantry.toml",
-            "livebode fit runs/gantry --entry velocity1/u1 --entry velocity2/u1 --model modal",
-            "livebode run gantry-2.toml",
-            "livebode compare runs/gantry runs/gantry-2",
-        ),
-    ),
-    "matrix-tune": Example(
-        "the gantry excited to beyond its resonances, with its two controllers described",
-        {"gantry-tune.parquet": _gantry(12, frequencies="4:100:2, 104:400:8", amplitude_n_m=0.1, settle=1)},
-        ("gantry-tune.toml",),
-        (
-            "livebode run gantry-tune.toml",
-            "livebode check-loop runs/gantry-tune",
-            "livebode tune runs/gantry-tune --entry velocity1/u1",
-        ),
     ),
 }
 """livebode's own examples by name; those of plug-ins are of the same form (the group `examples`)."""

@@ -105,7 +105,7 @@ class MatrixRows(NamedTuple):
     ----------
     value, noise, spread
         Shape (rows, lines, outputs, inputs), (rows, lines, outputs, outputs) and (rows, lines, inputs, inputs), as in
-        `livebode.mimo.MatrixResponses`.
+        `livebode.core.MatrixResponses`.
     coherence
         Shape (rows, lines, outputs).
     condition

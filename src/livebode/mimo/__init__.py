@@ -1,4 +1,4 @@
-"""Several inputs and outputs: excitations that separate the inputs, matrices of responses, their modes and changes."""
+"""Several inputs and outputs: excitations that separate the inputs, and their design; the loop, the mean matrix."""
 
 from livebode.on_first_use import on_first_use
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from livebode.core import MatrixResponses, Responses
-from livebode.mimo.settings import MatrixLoop
+from livebode.mimo.loop import MatrixLoop
 
 
 def equivalent_plant(responses: MatrixResponses, loop: MatrixLoop, output: str, input: str) -> Responses:
@@ -43,7 +43,8 @@ def equivalent_plant(responses: MatrixResponses, loop: MatrixLoop, output: str, 
     Examples
     --------
     >>> from livebode import PID
-    >>> from livebode.mimo import MatrixLoop, example_matrix_responses
+    >>> from livebode.mimo import MatrixLoop
+    >>> from livebode_matrix import example_matrix_responses
     >>> velocity = PID(gain=0.3, integral_time_s=0.05, rate_hz=4000)
     >>> loop = MatrixLoop(feedback=[[velocity, None], [None, velocity]])
     >>> equivalent_plant(example_matrix_responses(), loop, "velocity1", "u1").value.shape

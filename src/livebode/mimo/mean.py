@@ -23,7 +23,7 @@ def mean_matrix(responses: MatrixResponses) -> MatrixResponses:
 
     Examples
     --------
-    >>> from livebode.mimo import example_matrix_responses
+    >>> from livebode_matrix import example_matrix_responses
     >>> mean_matrix(example_matrix_responses())
     <MatrixResponses: 1 rows, 7 lines, 2 outputs × 2 inputs>
     """

@@ -12,7 +12,7 @@ from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
 from livebode.excitation import each
 from livebode.mimo.excitation import MatrixExcitation
-from livebode.mimo.settings import MatrixLoop
+from livebode.mimo.loop import MatrixLoop
 
 Plant = Callable[[Floats], Complex]
 """Response matrix (lines, outputs, inputs) at frequencies in Hz."""

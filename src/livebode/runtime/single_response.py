@@ -274,7 +274,7 @@ class SingleResponse(Estimate):
         feed, lines = self.run.feed, self.settings.lines
         events = [] if self.detection is None else self.detection.finish()
         done = self._described(self.run.about, feed.source.channels)
-        done |= summary.done(self.counts, lines.rate_hz, self.run.counts)
+        done |= summary.counts_and_speed(self.counts, lines.rate_hz, self.run.counts)
         self.fit = None if self.fits is None else self.fits.newest()
         seen = self.overview.responses()
         fitted = {} if self.fits is None else self.fits.entries(self.fit, seen[seen.ready])

@@ -118,7 +118,7 @@ def versions() -> dict[str, str | int]:
     }
 
 
-def done(tracked: Mapping[str, int], rate_hz: float, run: RunCounts) -> dict[str, Any]:
+def counts_and_speed(tracked: Mapping[str, int], rate_hz: float, run: RunCounts) -> dict[str, Any]:
     """Entries at the end: counts and speed; `tracked` are the counts of the tracker."""
     counts, run_s = run.counts(tracked), run.run_s
     recorded_s = counts["samples"] / rate_hz

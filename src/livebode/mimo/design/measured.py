@@ -12,7 +12,7 @@ from livebode.arrays import Complex, Floats
 from livebode.core import Lines, UsageError
 from livebode.mimo.design.machine import MatrixMachine
 from livebode.mimo.excitation import MatrixExcitation
-from livebode.mimo.settings import MatrixLoop
+from livebode.mimo.loop import MatrixLoop
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,7 +12,7 @@ from livebode.arrays import Complex, Floats
 from livebode.core import CHANNELS_MAX, UsageError, counted
 from livebode.mimo.design.machine import MatrixMachine, each_of
 from livebode.mimo.excitation import MatrixExcitation
-from livebode.mimo.settings import MatrixLoop
+from livebode.mimo.loop import MatrixLoop
 from livebode.simulation import MotorLoop
 
 _REPETITIONS = 2  # that are simulated from rest; later ones repeat the second

@@ -116,7 +116,7 @@ def _one_response() -> UsageError:
 
 def _described(gantry: Path | None, cart: str | None) -> dict[str, Any]:
     """The gantry, and places of its cart."""
-    from livebode.analysis import read_gantry
+    from livebode.estimates import MATRIX, rule
 
     if gantry is None:
         if cart is not None:
@@ -124,7 +124,7 @@ def _described(gantry: Path | None, cart: str | None) -> dict[str, Any]:
                              argument="gantry")  # fmt: skip
         return {}
     if cart is None:
-        return {"gantry": read_gantry(gantry)}
+        return {"gantry": rule(MATRIX, "machine")(gantry)}
     try:
         before, after = (float(part) for part in cart.split(":"))
     except ValueError:
@@ -135,7 +135,7 @@ def _described(gantry: Path | None, cart: str | None) -> dict[str, Any]:
             argument="cart",
             value=cart,
         ) from None
-    return {"gantry": read_gantry(gantry), "cart_m": (before, after)}
+    return {"gantry": rule(MATRIX, "machine")(gantry), "cart_m": (before, after)}
 
 
 def _needs_out() -> UsageError:

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from livebode.configuration import ReportSection
-from livebode.core import Document, Finding, FitError, GridError, MatrixResponses, Section, Tone
+from livebode.core import Document, Finding, GridError, Section, Tone
+from livebode.estimates import MATRIX, rule
 from livebode.language import tr, worded
-from livebode.mimo import compare_gantries, compare_matrices
 from livebode.records import RunRecord
 from livebode.simulation import Gantry
 from livebode_reports import first_page
@@ -67,7 +67,7 @@ class MatrixComparison:
                 name: Comparison.between(*pair, ignore_below=ignore_below, together=together)
                 for name, pair in pairs.items()
             },
-            _whole(before.matrix(), after.matrix(), gantry, cart_m),
+            rule(MATRIX, "changes")(before.matrix(), after.matrix(), gantry, cart_m),
         )
 
     @property
@@ -152,17 +152,3 @@ def _section(name: str, one: Comparison) -> Section:
     seen = detectable(one.found.overall)
     least = (pairs([(tr("smallest detectable change"), seen)]),) if seen else ()
     return Section(_arrow(name), (one.picture(), *least, *one.response().parts))
-
-
-def _whole(
-    before: MatrixResponses, after: MatrixResponses, gantry: Gantry | None, cart_m: tuple[float, float] | None
-) -> tuple[str, ...]:
-    try:
-        if gantry is None:
-            return (f"all entries: {compare_matrices(before, after).sentence}",)
-        found = compare_gantries(before, after, gantry, cart_m=cart_m)
-        return tuple(f"gantry: {sentence}" for sentence in found.sentences)
-    except (FitError, GridError) as error:
-        if gantry is not None:
-            raise
-        return (f"all entries: not compared together: {error}",)

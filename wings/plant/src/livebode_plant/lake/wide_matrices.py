@@ -48,7 +48,7 @@ def covariance_schema(lines: int) -> pa.Schema:
 def entries_to_wide(responses: MatrixResponses) -> pa.Table:
     """A row for each entry of each matrix, rounded to float32.
 
-    >>> from livebode.mimo import example_matrix_responses
+    >>> from livebode_matrix import example_matrix_responses
     >>> entries_to_wide(example_matrix_responses()).num_rows
     12
     """
@@ -73,7 +73,7 @@ def entries_to_wide(responses: MatrixResponses) -> pa.Table:
 def covariance_to_wide(responses: MatrixResponses) -> pa.Table:
     """A row for each element of the two factors of the covariance of each matrix, rounded to float32.
 
-    >>> from livebode.mimo import example_matrix_responses
+    >>> from livebode_matrix import example_matrix_responses
     >>> covariance_to_wide(example_matrix_responses()).num_rows
     24
     """

@@ -1,0 +1,67 @@
+"""Pictures and printed results of a matrix run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from livebode.cli import can_draw, one_drawing_at_a_time, show_monitoring, tell_how_to_draw, tracked_amount
+from livebode.configuration import Axis
+from livebode.core import MatrixResponses
+from livebode.locations import original
+from livebode.runtime import Draw, Outcome
+
+if TYPE_CHECKING:
+    from livebode_matrix.response_matrix import ResponseMatrix
+
+
+def drawing_matrix(axis: Axis) -> Draw:
+    """A function that draws the bode.png and singular-values.png of a matrix run, if Matplotlib is installed."""
+
+    def draw(estimate: ResponseMatrix, into: Path) -> None:
+        responses = estimate.drawn or estimate.newest
+        if responses is None or not can_draw():
+            return
+        from livebode.pictures import save_matrix_pictures
+
+        with one_drawing_at_a_time():
+            save_matrix_pictures(responses, into, title=axis.source.title)
+
+    return draw
+
+
+def show_matrix(outcome: Outcome) -> None:
+    """Print the entries of the newest matrix, its condition, and why columns are invalid."""
+    newest = outcome.matrix
+    assert newest is not None
+    print(tracked_amount(outcome.summary))
+    print(f"{original(str(outcome.directory))}/")
+    for line in matrix_lines(newest):
+        print(line)
+    if (condition := outcome.summary.get("condition")) is not None:
+        print(f"inputs: condition number at most {condition['worst']:.3g} (at {condition['frequency_hz']:g} Hz)")
+    for sentence in newest.why():
+        print(sentence)
+    if not newest.valid.any():
+        print("if the inputs move, compare [experiments] with the recording: dwell_periods, settle_periods, start")
+    show_monitoring(outcome.summary["monitoring"])
+    tell_how_to_draw()
+
+
+def matrix_lines(newest: MatrixResponses) -> list[str]:
+    """One line for each entry of the newest matrix: its valid lines, and its largest magnitude with the bound there."""
+    lines, width = [], max(len(f"{o}/{i}") for o in newest.outputs for i in newest.inputs)
+    for output in newest.outputs:
+        for input in newest.inputs:
+            entry = newest.entry(output, input)
+            name, valid = f"{output}/{input}".ljust(width), entry.valid[-1]
+            if not valid.any():
+                lines.append(f"{name}  not valid at any line")
+                continue
+            size = abs(entry.value[-1, valid])
+            at = int(size.argmax())
+            bound = entry.bound(2.0)[-1, valid][at]
+            around = f" ± {bound:.2g}" if bound == bound else ", bound not known yet"
+            peak = f"largest {size[at]:.4g}{around} at {entry.lines.frequency_hz[valid][at]:g} Hz"
+            lines.append(f"{name}  valid at {valid.sum()} of {valid.size} lines, {peak}")
+    return lines
