@@ -29,6 +29,4 @@ from livebode.report.terminal import terminal_bode as terminal_bode
 from livebode.report.tracking import spread as spread
 from livebode.report.tracking import tracking_figure as tracking_figure
 from livebode.report.tracking import with_holes as with_holes
-from livebode.report.validation import save_validation_picture as save_validation_picture
-from livebode.report.validation import validation_figure as validation_figure
 from livebode.report.words import clock as clock

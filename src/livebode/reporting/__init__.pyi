@@ -1,5 +1,4 @@
 from livebode.reporting.compare_report import Comparison as Comparison
 from livebode.reporting.compare_report import comparison_of as comparison_of
 from livebode.reporting.first_page import trusted as trusted
-from livebode.reporting.report_data import Judged as Judged
 from livebode.reporting.wording import with_bound as with_bound

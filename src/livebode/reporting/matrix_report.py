@@ -5,20 +5,19 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from livebode.analysis import Accepted
+from livebode.analysis import Accepted, ModelTest
 from livebode.configuration import ReportSection
 from livebode.core import Document, Paragraph, Section
 from livebode.language import tr
 from livebode.reporting import first_page, matrix_sections, sections
 from livebode.reporting.matrix_data import read_matrix
-from livebode.reporting.report_data import Judged
 from livebode.reporting.run_report import facts, not_judged, record_appendix
 from livebode.reporting.verdict import about_record, by_urgency
 
 
 def matrix_report(
     directory: Path,
-    judged: Judged | None = None,  # noqa: ARG001 - a matrix has no model
+    judged: ModelTest | None = None,  # noqa: ARG001 - a matrix has no model
     *,
     made: datetime,
     header: ReportSection | None = None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from livebode.analysis import (
     Averaged,
     LimitEvidence,
     LoopReport,
+    ModelTest,
     Track,
     accepted,
     averaged,
@@ -29,18 +30,6 @@ from livebode.fitting import Fit
 from livebode.language import listed, tr, worded
 from livebode.records import RunRecord
 from livebode.reporting.event_summary import EventSummary
-
-if TYPE_CHECKING:
-    from livebode.validation import Validation
-
-
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """Validation of the model: name of the recording, verdicts and notes."""
-
-    on: str
-    found: tuple[Validation, ...]
-    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -116,7 +105,7 @@ class ReportData(RunData):
     tracks
         Parameters and margins over the run, by model.
     judged
-        The validation, if requested.
+        The test of the model on independent data, if requested.
     """
 
     of: Averaged
@@ -125,7 +114,7 @@ class ReportData(RunData):
     loop: LoopReport | None
     loop_words: str
     tracks: dict[str, Track]
-    judged: Judged | None = None
+    judged: ModelTest | None = None
 
     @property
     def entry(self) -> str:
@@ -146,7 +135,7 @@ class ReportData(RunData):
 
 
 def read(
-    directory: Path, judged: Judged | None = None, header: ReportSection | None = None, entry: str | None = None
+    directory: Path, judged: ModelTest | None = None, header: ReportSection | None = None, entry: str | None = None
 ) -> ReportData:
     """Read the run, or an entry of a matrix run; `header` replaces the [report] with which it was recorded.
 

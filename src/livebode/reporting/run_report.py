@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from livebode.analysis import Accepted
+from livebode.analysis import Accepted, ModelTest
 from livebode.configuration import ReportSection
 from livebode.core import Document, Paragraph, Section
 from livebode.language import tr
@@ -15,7 +15,7 @@ from livebode.reporting import first_page, sections
 from livebode.reporting.distortion import distortion
 from livebode.reporting.limits import limits
 from livebode.reporting.measured import details, how
-from livebode.reporting.report_data import Judged, ReportData, RunData, entry_title, read, recordings, written
+from livebode.reporting.report_data import ReportData, RunData, entry_title, read, recordings, written
 from livebode.reporting.verdict import verdict
 from livebode.reporting.wording import duration
 
@@ -28,7 +28,7 @@ _APPENDIX = (details, sections.source_state, sections.settings, sections.version
 
 def run_report(
     directory: Path,
-    judged: Judged | None = None,
+    judged: ModelTest | None = None,
     *,
     made: datetime,
     header: ReportSection | None = None,
@@ -43,7 +43,7 @@ def run_report(
     directory
         Run directory, in one piece or in segments, finished or not.
     judged
-        Validation of its model on independent data.
+        Test of its model on independent data.
     made
         Time of the report, for the title block.
     header
@@ -63,7 +63,7 @@ def run_report(
 
 def accepted_report(
     directory: Path,
-    judged: Judged | None = None,
+    judged: ModelTest | None = None,
     *,
     made: datetime,
     header: ReportSection | None = None,
