@@ -12,7 +12,7 @@ from livebode import Block, Lines, Response, Settings, Tracker, multisine
 from livebode.fitting import Fit, fit
 from livebode.simulation import TwoMassLoop, TwoMassPlant
 from livebode.simulation.two_mass_loop import RATE_HZ
-from livebode.validation import Validation, validate
+from livebode_control.validation.validation import Validation, validate
 from studies.common import SIGMA, Floats
 from studies.drawing import LIGHT, figure_of
 from studies.result import Result, Study, Table, Verdict
@@ -158,7 +158,7 @@ def draw(result: Result) -> Figure:
 
 
 def _panel(axes: Axes, c: object, title: str) -> None:
-    from livebode.validation import Correlation
+    from livebode_control.validation.correlation import Correlation
 
     assert isinstance(c, Correlation)
     axes.fill_between(c.lags, -c.limit, c.limit, color=LIGHT.run, alpha=0.2, linewidth=0)

@@ -147,6 +147,9 @@ main()
     assert (done.returncode, done.stderr) == (0, "")
     assert "the wing control is not installed" in done.stdout
     assert "No such command 'tune'" in without("tune", tmp_path / "run").stderr
+    done = without("report", tmp_path / "run", "--on", log)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "a model is tested by the wing control, which is not installed; install this wing too" in done.stderr
 
 
 @pytest.mark.parametrize("kind", [format_.reader.partition(":")[0].rpartition(".")[2] for format_ in FORMATS])

@@ -8,13 +8,13 @@ from livebode.analysis._loop_report import loop_of_run as loop_of_run
 from livebode.analysis._loop_report import loop_report as loop_report
 from livebode.analysis.fits import fit_averaged as fit_averaged
 from livebode.analysis.fits import fit_remarks as fit_remarks
+from livebode.analysis.fits import fit_run as fit_run
 from livebode.analysis.fits import plain_fit as plain_fit
 from livebode.analysis.learning import check_no_matrix as check_no_matrix
 from livebode.analysis.learning import learn as learn
 from livebode.analysis.learning import learn_from as learn_from
 from livebode.analysis.learning import learnable_axis as learnable_axis
 from livebode.analysis.learning import reads_recordings as reads_recordings
-from livebode.analysis.line_validation import validate_run_at_lines as validate_run_at_lines
 from livebode.analysis.loop_verdict import CheckedLoop as CheckedLoop
 from livebode.analysis.loop_verdict import checked_loop as checked_loop
 from livebode.analysis.place_fits import by_place as by_place
@@ -29,5 +29,5 @@ from livebode.analysis.run_trend import alarms_of as alarms_of
 from livebode.analysis.run_trend import fitted_rows as fitted_rows
 from livebode.analysis.run_trend import trend_points as trend_points
 from livebode.analysis.table import Analysis as Analysis
-from livebode.analysis.validation import clean_stretch as clean_stretch
-from livebode.analysis.validation import validate_run as validate_run
+from livebode.analysis.table import ModelTest as ModelTest
+from livebode.analysis.table import model_test as model_test

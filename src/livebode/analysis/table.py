@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from livebode.core import Finding, Section, UsageError
+from livebode.plugins import loaded, named
 
 
 class Analysis(NamedTuple):
@@ -15,10 +20,44 @@ class Analysis(NamedTuple):
     section
         Section of the report, from the file that the analysis left in the run directory. Called with the directory and,
         of a matrix run, the entry; returns a `Section`, or the reason why there is none. Empty: not in the report.
+    test
+        Test of the run's model on independent data, for `livebode report --on`. Called with the run directory and the
+        recording; returns a `ModelTest`.
     trial
         Class whose objects answer the page where a person tries other gains (`livebode.dashboard.LoopTrialAnswers`).
     """
 
     function: str
     section: str = ""
+    test: str = ""
     trial: str = ""
+
+
+class ModelTest(Protocol):
+    """Result of the test of a model on independent data, worded in the language in use."""
+
+    def findings(self) -> Sequence[Finding]:
+        """The findings of the report's first page."""
+
+    def section(self) -> Section:
+        """The section of the report."""
+
+
+def model_test(directory: Path, on: Path) -> ModelTest:
+    """The model of a run tested on another recording, by the first analysis that tests models.
+
+    Raises
+    ------
+    UsageError
+        If none does.
+    """
+    for analysis in named("analyses").values():
+        if analysis.test:
+            found: ModelTest = loaded(analysis.test)(directory, on)
+            return found
+    raise UsageError(
+        "missing",
+        "a model is tested by the wing control, which is not installed",
+        "install this wing too, or leave out --on",
+        argument="--on",
+    )

@@ -71,10 +71,6 @@ COMMANDS: Mapping[str, Command] = {
         "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.",
         "livebode.cli.margins_command:margins_command",
     ),
-    "validate": Command(
-        "Simulate the fitted model with another recording and test whether the residual correlates with the signals.",
-        "livebode.cli.validate_command:validate_command",
-    ),
     "learn": Command(
         "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",
         "livebode.cli.learn_command:learn_command",

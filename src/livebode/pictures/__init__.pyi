@@ -49,8 +49,6 @@ from livebode.pictures.ticks import linear_ticks as linear_ticks
 from livebode.pictures.tracking import spread as spread
 from livebode.pictures.tracking import tracking_figure as tracking_figure
 from livebode.pictures.tracking import with_holes as with_holes
-from livebode.pictures.validation import save_validation_picture as save_validation_picture
-from livebode.pictures.validation import validation_figure as validation_figure
 from livebode.pictures.words import clock as clock
 from livebode.pictures.words import decibel_label as decibel_label
 from livebode.pictures.words import labelled as labelled

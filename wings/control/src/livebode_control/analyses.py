@@ -13,6 +13,10 @@ ANALYSES: Mapping[str, Analysis] = {
         section="livebode_control.proposal.section:proposed_controller",
         trial="livebode_control.trial.loop_trials:LoopTrials",
     ),
+    "validation": Analysis(
+        "livebode_control.run_analyses:validation",
+        test="livebode_control.validation.section:validation_report",
+    ),
     "friction": Analysis("livebode_control.run_analyses:friction"),
     "orders": Analysis("livebode_control.run_analyses:orders"),
 }

@@ -19,6 +19,10 @@ COMMANDS: Mapping[str, Command] = {
         "Propose input shapers for a mode of the fitted model, over its bounds at every place of the run.",
         "livebode_control.proposal.shaper_command:shaper_command",
     ),
+    "validate": Command(
+        "Simulate the fitted model with another recording and test whether the residual correlates with the signals.",
+        "livebode_control.validation.validate_command:validate_command",
+    ),
     "friction": Command(
         "Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with bounds.",
         "livebode_control.strokes.friction_command:friction_command",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from livebode.configuration import OrdersSection
@@ -12,6 +13,7 @@ from livebode_control.strokes.friction import FrictionReport, friction_of
 from livebode_control.strokes.motion_samples import read_strokes
 from livebode_control.strokes.orders import OrderReport, orders_of
 from livebode_control.tuning import ControllerProposal, LoopSpecification
+from livebode_control.validation.section import ValidationReport, validation_report
 
 if TYPE_CHECKING:
     from livebode import Run
@@ -27,6 +29,11 @@ def proposal(
 ) -> ControllerProposal:
     """Controller and filters for the described loop; see `tune_run`."""
     return tune_run(run.path, specification or LoopSpecification(), loop_checked=loop_checked, entry=entry)
+
+
+def validation(run: Run, on: str | Path) -> ValidationReport:
+    """The model of the run's [fit] tested on another recording, which the run does not contain."""
+    return validation_report(Path(run.path), Path(on))
 
 
 def friction(run: Run, **options: Any) -> FrictionReport:

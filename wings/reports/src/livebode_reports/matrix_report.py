@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.analysis import ModelTest
 from livebode.configuration import ReportSection, recorded_configuration, recorded_report
 from livebode.core import (
     REASONS,
@@ -32,7 +33,7 @@ from livebode_reports import first_page, sections
 from livebode_reports.acceptance import Accepted
 from livebode_reports.events import EventSummary
 from livebode_reports.measured import about_bounds, grid_rows, matrix_in_words, signal_rows
-from livebode_reports.report_data import Extent, Judged, RunData
+from livebode_reports.report_data import Extent, RunData
 from livebode_reports.run_report import facts, not_judged, record_appendix
 from livebode_reports.verdict import about_record, by_urgency
 from livebode_reports.wording import BOUND_95, line_table, lines_of, pairs, polar, share
@@ -230,7 +231,7 @@ def about_responses(of: MatrixReportData) -> Finding:
 
 def matrix_report(
     directory: Path,
-    judged: Judged | None = None,  # noqa: ARG001 - a matrix has no model
+    judged: ModelTest | None = None,  # noqa: ARG001 - a matrix has no model
     *,
     made: datetime,
     header: ReportSection | None = None,

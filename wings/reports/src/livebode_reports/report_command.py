@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -26,9 +26,6 @@ from livebode_reports.report_options import (
     Template,
     header,
 )
-
-if TYPE_CHECKING:
-    from livebode_reports.report_data import Judged
 
 _NOT_ALL_MET = 4
 
@@ -75,6 +72,7 @@ def report_command(
     `pdf`. Without --check the exit code does not depend on the limits. The report of a matrix run shows all entries;
     with --entry it is that of one response, with its limits.
     """
+    from livebode.analysis import model_test
     from livebode.configuration import recorded_report
     from livebode.core import moments_by
     from livebode.language import in_language
@@ -94,7 +92,7 @@ def report_command(
         raise _not_on_an_entry()
     if check and run.is_matrix:
         raise entry_missing(str(directory), run.summary)
-    judged = None if on is None else _judged(directory, on)
+    judged = None if on is None else model_test(directory, on)
     with moments_by(run.clock), in_language(language or first.language or "en"):
         document, accepted = rule_of(kind_of(run.summary), "report")(
             directory, judged, made=datetime.now(UTC), header=first, appendix=appendix, entry=entry
@@ -139,14 +137,3 @@ def _not_on_an_entry() -> Exception:
         "compare the entry with another run by `livebode validate RUN --entry OUTPUT/INPUT --on RUN`",
         options=["--on", "--entry"],
     )
-
-
-def _judged(directory: Path, on: Path) -> Judged:
-    from livebode.analysis import validate_run
-    from livebode.configuration import FitSection, recorded_configuration
-    from livebode.records import RunRecord
-    from livebode_reports.report_data import Judged
-
-    section = FitSection.model_validate(recorded_configuration(RunRecord.open(directory).summary).get("fit", {}))
-    found, notes = validate_run(directory, on, [section])
-    return Judged(on.name, tuple(found), tuple(notes))

@@ -5,11 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from livebode.analysis import MARGINS, Averaged, LoopReport, averaged, checked_loop, fit_averaged, loop_report
+from livebode.analysis import (
+    MARGINS,
+    Averaged,
+    LoopReport,
+    ModelTest,
+    averaged,
+    checked_loop,
+    fit_averaged,
+    loop_report,
+)
 from livebode.configuration import FitSection, LoopSection, ReportSection, recorded_configuration, recorded_report
 from livebode.core import LivebodeError, Responses, date_and_time
 from livebode.fitting import Fit
@@ -18,18 +27,6 @@ from livebode.records import RunRecord
 from livebode_reports.acceptance import Accepted, LimitEvidence, accepted
 from livebode_reports.events import EventSummary
 from livebode_reports.parameter_track import Track, tracks
-
-if TYPE_CHECKING:
-    from livebode.validation import Validation
-
-
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """Validation of the model: name of the recording, verdicts and notes."""
-
-    on: str
-    found: tuple[Validation, ...]
-    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,7 @@ class ReportData(RunData):
     tracks
         Parameters and margins over the run, by model.
     judged
-        The validation, if requested.
+        The test of the model on independent data, if requested.
     """
 
     of: Averaged
@@ -114,7 +111,7 @@ class ReportData(RunData):
     loop: LoopReport | None
     loop_words: str
     tracks: dict[str, Track]
-    judged: Judged | None = None
+    judged: ModelTest | None = None
 
     @property
     def entry(self) -> str:
@@ -135,7 +132,7 @@ class ReportData(RunData):
 
 
 def read(
-    directory: Path, judged: Judged | None = None, header: ReportSection | None = None, entry: str | None = None
+    directory: Path, judged: ModelTest | None = None, header: ReportSection | None = None, entry: str | None = None
 ) -> ReportData:
     """Read the run, or an entry of a matrix run; `header` replaces the [report] with which it was recorded.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
+from livebode.analysis import ModelTest
 from livebode.configuration import ReportSection
 from livebode.core import Document, Paragraph, Section
 from livebode.language import tr
@@ -14,7 +15,7 @@ from livebode_reports import first_page, sections
 from livebode_reports.acceptance import Accepted
 from livebode_reports.limits import limits
 from livebode_reports.measured import details, distortion, how
-from livebode_reports.report_data import Judged, ReportData, RunData, entry_title, read, recordings, written
+from livebode_reports.report_data import ReportData, RunData, entry_title, read, recordings, written
 from livebode_reports.verdict import verdict
 from livebode_reports.wording import duration
 
@@ -27,7 +28,7 @@ _APPENDIX = (details, sections.source_state, sections.settings, sections.version
 
 def run_report(
     directory: Path,
-    judged: Judged | None = None,
+    judged: ModelTest | None = None,
     *,
     made: datetime,
     header: ReportSection | None = None,
@@ -42,7 +43,7 @@ def run_report(
     directory
         Run directory, in one piece or in segments, finished or not.
     judged
-        Validation of its model on independent data.
+        Test of its model on independent data.
     made
         Time of the report, for the title block.
     header
@@ -62,7 +63,7 @@ def run_report(
 
 def accepted_report(
     directory: Path,
-    judged: Judged | None = None,
+    judged: ModelTest | None = None,
     *,
     made: datetime,
     header: ReportSection | None = None,

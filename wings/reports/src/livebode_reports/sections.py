@@ -251,23 +251,7 @@ def validation(of: ReportData) -> Section | str:
     """Validation of the model on independent data, or why there is none."""
     if of.judged is None:
         return tr("No validation: the model was not tested on independent data. Use `livebode report RUN --on LOG`.")
-    parts: list[Part] = [Paragraph(f"{worded(v.sentence)}.") for v in of.judged.found]
-    rows = tuple(
-        (
-            worded(v.model), c.name, f"{number(100 * c.share, '.0f')} %", number(c.largest, ".3g"),
-            number(c.p, ".2g"), tr("yes") if c.name in v.judged_by else tr("no"),
-        )
-        for v in of.judged.found
-        for c in v.correlations
-    )  # fmt: skip
-    headings = (tr("model"), tr("ε with"), tr("lags inside"), tr("largest"), tr("joint p"), tr("counts"))
-    parts.append(PrintedTable(headings, rows, (2, 3, 4), " ".join(f"{worded(n)}." for n in of.judged.notes)))
-    caption = tr(
-        "On {recording}: measured and simulated output, and the residual's correlations with their limits.",
-        recording=of.judged.on,
-    )
-    parts.append(Picture("validation", {"found": of.judged.found, "folded": True}, caption))
-    return Section(tr("Validation"), tuple(parts))
+    return of.judged.section()
 
 
 def settings(of: RunData) -> Section:

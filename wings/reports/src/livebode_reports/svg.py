@@ -96,7 +96,6 @@ _FIGURES: Mapping[str, tuple[str, str, bool]] = {
     "tracking": ("livebode.pictures:tracking_figure", Message("Magnitude over time"), True),
     "parameters": ("livebode_reports.parameters:parameters_figure", "", False),
     "loop": ("livebode.pictures:loop_figure", Message("Open loop"), True),
-    "validation": ("livebode.pictures:validation_figure", Message("Measured and simulated"), False),
     "matrix": ("livebode.pictures:matrix_figure", Message("Matrix of responses"), True),
     "singular values": ("livebode.pictures:singular_values_figure", Message("Singular values"), False),
     "comparison": ("livebode_reports.comparison:comparison_figure", "", False),

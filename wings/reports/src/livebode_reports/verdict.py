@@ -20,7 +20,6 @@ _INVALID_MANY = 0.05
 _EPSILON_LARGE = 0.1
 # Usual limits in motion control; a loop beyond them rings.
 _PHASE_MIN_DEG, _MS_MAX = 30.0, 2.0
-_TRUSTED: dict[str, Tone] = {"passes": "ok", "small error": "ok", "fails": "check", "cannot be judged": "open"}
 
 
 def verdict(of: ReportData) -> tuple[Finding, ...]:
@@ -184,8 +183,4 @@ def _validated(of: ReportData) -> list[Finding]:
     if of.judged is None:
         text = tr("The model was not validated on independent data.")
         return [Finding("open", text)] if of.fit is not None else []
-    on = of.judged.on
-    return [
-        Finding(_TRUSTED[v.verdict], tr("On {recording}: {sentence}.", recording=on, sentence=worded(v.sentence)))
-        for v in of.judged.found
-    ]
+    return list(of.judged.findings())

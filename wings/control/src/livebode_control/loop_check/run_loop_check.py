@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.analysis import clean_stretch
 from livebode.configuration import Axis, LoopSection, recorded_configuration, recorded_loop
 from livebode.core import Block, Channel, RecordError, SignalError, UsageError
 from livebode.records import RunRecord, channels_of, write_loop_check
 from livebode.sources import open_log
+from livebode_control.clean_stretch import clean_stretch
 from livebode_control.loop_check.loop_check import LoopCheck, check_loop
 from livebode_control.loop_check.loop_equation import LoopSignals
 

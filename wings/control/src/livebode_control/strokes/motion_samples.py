@@ -10,13 +10,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.analysis import clean_stretch
 from livebode.configuration import Axis, recorded_configuration
 from livebode.core import Block, Lines, RecordError, UsageError
 from livebode.locations import Location
 from livebode.motion import OutputKind
 from livebode.records import RunRecord
 from livebode.sources import Log, open_log
+from livebode_control.clean_stretch import clean_stretch
 
 ChoosePart = Callable[[Axis | None, Log], Log]
 """The part to use of a recording, of which the configuration is known or not."""

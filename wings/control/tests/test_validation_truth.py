@@ -14,10 +14,9 @@ from livebode.excitation import multisine
 from livebode.fitting import Fit, Transfer, fit
 from livebode.simulation import TwoMassLoop, TwoMassPlant
 from livebode.simulation.two_mass_loop import RATE_HZ
-from livebode.validation import validate
-from livebode.validation.chain import respond
-from livebode.validation.correlation import correlation, own_correlation
-from livebode.validation.simulate import simulate
+from livebode_control.validation.correlation import correlation, own_correlation
+from livebode_control.validation.simulation import respond, simulate
+from livebode_control.validation.validation import validate
 from tests.support.errors import refused
 
 LINES = Lines.parse("20:140:5", RATE_HZ, 800)

@@ -11,8 +11,9 @@ import pytest
 from livebode.core import Block, Responses
 from livebode.fitting import EvaluationGrid, Fit, fit
 from livebode.margins import Margins, OpenLoop, margins
-from livebode.pictures import save_loop_picture, save_validation_picture
-from livebode.validation import validate
+from livebode.pictures import save_loop_picture
+from livebode_control.validation.validation import validate
+from livebode_control.validation.validation_picture import save_validation_picture
 from tests.support.belt_loops import LINES, responses_of
 from tools.loops import BELT, MODEL, Case, parameters
 

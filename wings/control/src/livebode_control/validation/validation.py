@@ -11,8 +11,8 @@ from livebode.arrays import Floats
 from livebode.core import Block, Loop, SignalError, same_rate
 from livebode.fitting import Fit
 from livebode.language import Message
-from livebode.validation.correlation import SMALL, Correlation, correlation, own_correlation
-from livebode.validation.simulate import Simulated, simulate
+from livebode_control.validation.correlation import SMALL, Correlation, correlation, own_correlation
+from livebode_control.validation.simulation import Simulated, simulate
 
 Verdict = Literal["passes", "small error", "fails", "cannot be judged"]
 

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.options import Entry, Excitation, Json, Output
-from livebode.cli.remote import results_directory
+from livebode.cli import Entry, Excitation, Json, Output, results_directory
 from livebode.core import LivebodeError, RecordError, writing
 from livebode.locations import location
 
 if TYPE_CHECKING:
     from livebode.configuration import Axis, FitSection
-    from livebode.validation import LineValidation, Validation
+    from livebode_control.validation.line_validation import LineValidation
+    from livebode_control.validation.validation import Validation
 
 Channels = dict[str, str | None]
 
@@ -56,10 +56,10 @@ def validate_command(
     not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was. So is
     an entry of a matrix run.
     """
-    from livebode.analysis import validate_run
-    from livebode.cli.picture_support import tell_how_to_draw
+    from livebode.cli import tell_how_to_draw
     from livebode.configuration import FitSection, recorded_configuration
     from livebode.records import RunRecord, to_json
+    from livebode_control.validation.run_validation import validate_run
 
     base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {}) | (
         {} if radius is None else {"radius_m": radius}
@@ -109,11 +109,11 @@ def _reason(section: FitSection, on: Path, at_lines: bool, entry: str | None) ->
 
 
 def _picture(found: list[Validation], directory: Path, on: Path) -> Path | None:
-    from livebode.cli.picture_support import can_draw
+    from livebode.cli import can_draw
 
     if not can_draw():
         return None
-    from livebode.pictures import save_validation_picture
+    from livebode_control.validation.validation_picture import save_validation_picture
 
     into = results_directory(directory)
     with writing(into, RecordError):
@@ -131,8 +131,8 @@ def _at_lines(
     """On another run; a recording is tracked as the run was, in a directory that is removed."""
     from tempfile import TemporaryDirectory
 
-    from livebode.analysis import validate_run_at_lines
     from livebode.runtime import Destination, run
+    from livebode_control.validation.line_validation import validate_run_at_lines
 
     if (on / "run.json").exists():
         return validate_run_at_lines(directory, on, sections, drifting, entry)

@@ -13,8 +13,8 @@ from livebode.core import Lines, Response, SignalError
 from livebode.excitation import multisine
 from livebode.fitting import Fit, fit
 from livebode.simulation import BeltAxis
-from livebode.validation import fitted_model, validate_at_lines
-from livebode.validation._validate import Verdict
+from livebode_control.validation.line_validation import fitted_model, validate_at_lines
+from livebode_control.validation.validation import Verdict
 from tests.support.command import livebode, write_parquet
 
 LINES = Lines.parse("20:120:5", rate_hz=4000, window=800)

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.language import tr, worded
-from livebode.pictures._style import Style, drawing, heading, new_figure, plain, shortened, style
-from livebode.pictures.png import save
+from livebode.pictures import Style, drawing, heading, new_figure, plain, save, shortened, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.gridspec import GridSpec
 
-    from livebode.validation import Correlation, Validation
+    from livebode_control.validation.correlation import Correlation
+    from livebode_control.validation.validation import Validation
 
 _SHOWN = 600  # samples of the output
 _CLIPPED = 4.0  # times the limit: larger correlations are clipped at the edge, with a mark
@@ -32,20 +32,21 @@ def save_validation_picture(
 
 
 def validation_figure(
-    found: Sequence[Validation], *, title: str = "", dark: bool = False, folded: bool = False
+    found: Sequence[Validation], *, title: str = "", dark: bool = False, width_in: float | None = None
 ) -> Figure:
     """A row for each model: the last samples of the output, and the correlations over the lags.
 
-    `folded` puts the correlations below the output, for a narrow page.
+    With the width of a page the correlations are below the output.
 
     The band contains 97 % of random correlations at a lag; the dashed lines are ±2.17/√L. Lags that cannot detect a
     wrong model are thin; a triangle at the edge marks a correlation beyond it.
     """
     look = style(dark)
     columns = max(len(v.correlations) for v in found)
+    folded = width_in is not None
     with drawing(look):
-        if folded:
-            figure, grid = _grid(9.0, 2 * len(found), columns, [1.0] * columns)
+        if width_in is not None:
+            figure, grid = _grid(width_in, 2 * len(found), columns, [1.0] * columns)
         else:
             figure, grid = _grid(3.4 * (columns + 1) + 1.2, len(found), columns + 1, [1.5, *[1.0] * columns])
         facts = tr(

@@ -1,5 +1,0 @@
-"""Validation of fitted models on independent data."""
-
-from livebode.on_first_use import on_first_use
-
-__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)

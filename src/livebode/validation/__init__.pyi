@@ -1,9 +1,0 @@
-from livebode.validation._validate import Validation as Validation
-from livebode.validation._validate import validate as validate
-from livebode.validation.correlation import LIMIT as LIMIT
-from livebode.validation.correlation import SMALL as SMALL
-from livebode.validation.correlation import Correlation as Correlation
-from livebode.validation.lines import FittedModel as FittedModel
-from livebode.validation.lines import LineValidation as LineValidation
-from livebode.validation.lines import fitted_model as fitted_model
-from livebode.validation.lines import validate_at_lines as validate_at_lines

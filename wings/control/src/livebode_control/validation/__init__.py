@@ -1,0 +1,1 @@
+"""Fitted models tested on data that they were not fitted to."""
