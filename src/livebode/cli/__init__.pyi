@@ -1,3 +1,8 @@
+from livebode.cli.commands import COMPARE as COMPARE
+from livebode.cli.commands import CONTROL as CONTROL
+from livebode.cli.commands import MANY as MANY
+from livebode.cli.commands import MEASURE as MEASURE
+from livebode.cli.commands import RESULTS as RESULTS
 from livebode.cli.commands import Command as Command
 from livebode.cli.documents import write_documents as write_documents
 from livebode.cli.learned_baseline import baseline_text as baseline_text

@@ -10,6 +10,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+MEASURE, RESULTS, COMPARE, CONTROL = "Measure", "Results", "Compare", "Control"
+PANELS = (MEASURE, RESULTS, COMPARE, CONTROL, MANY := "Many machines")
+"""Titles under which the help lists the commands, in its order; a plug-in may have another one."""
+
 
 class Command(NamedTuple):
     """A command, or a group of them.
@@ -28,6 +32,8 @@ class Command(NamedTuple):
     schema
         "module:name" of the function with the JSON Schema of the file NAME.toml that a command or a group reads, for
         `livebode schema NAME`.
+    panel
+        Title under which the help lists the command.
     """
 
     summary: str
@@ -35,82 +41,110 @@ class Command(NamedTuple):
     commands: Mapping[str, Command] = MappingProxyType({})
     extra: str = ""
     schema: str = ""
+    panel: str = "Commands"
+
+
+def panels(commands: Mapping[str, Command]) -> dict[str, list[tuple[str, str]]]:
+    """Names and summaries of commands by panel."""
+    titles = dict.fromkeys([*PANELS, *(command.panel for command in commands.values())])
+    rows = {title: [(n, c.summary) for n, c in commands.items() if c.panel == title] for title in titles}
+    return {title: found for title, found in rows.items() if found}
 
 
 COMMANDS: Mapping[str, Command] = {
     "run": Command(
         "Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.",
         "livebode.cli.run_command:run_command",
+        panel=MEASURE,
     ),
     "fit": Command(
         "Fit a model to the response of a run, and print its parameters with bounds.",
         "livebode.cli.fit_command:fit_command",
+        panel=RESULTS,
     ),
     "inspect": Command(
         "List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and SNR.",
         "livebode.cli.inspect_command:inspect_command",
+        panel=MEASURE,
     ),
     "demo": Command(
         "Track a simulated belt axis during its strokes, live; halfway, the belt loses 10 % of its stiffness.",
         "livebode.cli.demo_command:demo_command",
+        panel=MEASURE,
     ),
     "example": Command(
         "Write recordings of simulated axes and their configurations, which the documentation uses; or list them.",
         "livebode.cli.example_command:example_command",
+        panel=MEASURE,
     ),
     "new": Command(
         "Write the configuration of a recording: list its channels, propose their roles, ask, and "
         "find lines and window.",
         "livebode.cli.new_command:new_command",
+        panel=MEASURE,
     ),
     "design": Command(
         "Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml.",
         "livebode.cli.design_command:design_command",
+        panel=MEASURE,
     ),
     "measure": Command(
         "Design an excitation, play it on the controller, record, and track the response; Ctrl-C ramps it down.",
         "livebode.cli.measure_command:measure_command",
+        panel=MEASURE,
     ),
-    "query": Command("Query the tables of a run with SQL (DuckDB).", "livebode.cli.query_command:query_command"),
+    "query": Command(
+        "Query the tables of a run with SQL (DuckDB).", "livebode.cli.query_command:query_command", panel=RESULTS
+    ),
     "export": Command(
         "Write the responses, the fitted parameters or the model over the position in a format of other programs.",
         "livebode.cli.export_command:export_command",
+        panel=RESULTS,
     ),
     "margins": Command(
         "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.",
         "livebode.cli.margins_command:margins_command",
+        panel=CONTROL,
     ),
     "validate": Command(
         "Simulate the fitted model with another recording and test whether the residual correlates with the signals.",
         "livebode.cli.validate_command:validate_command",
+        panel=COMPARE,
     ),
     "learn": Command(
         "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",
         "livebode.cli.learn_command:learn_command",
+        panel=COMPARE,
     ),
     "report": Command(
         "Write the measurement and its results as report.html and report.pdf, with the verdict on page 1.",
         "livebode.cli.report_command:report_command",
+        panel=RESULTS,
     ),
     "compare": Command(
         "Find the lines, parameters and margins that differ between two runs, with amounts and bounds.",
         "livebode.cli.compare_command:compare_command",
+        panel=COMPARE,
     ),
     "view": Command(
         "Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still recording.",
         "livebode.cli.view_command:view_command",
+        panel=RESULTS,
     ),
     "publish": Command(
         "List the receivers of events and results in a configuration; --test sends a message to each.",
         "livebode.cli.publish_command:publish_command",
+        panel=MEASURE,
     ),
     "doctor": Command(
         "Check this computer, a configuration and whether its machine can be reached.",
         "livebode.cli.doctor_command:doctor_command",
+        panel=MEASURE,
     ),
     "schema": Command(
         "Print the JSON Schema of axis.toml, experiment.toml or archive.toml: an editor uses it to "
         "complete and check the keys.",
         "livebode.cli.schema_command:schema_command",
+        panel=MEASURE,
     ),
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from livebode.cli import Command
+from livebode.cli import MANY, Command
 
 _ARCHIVE: Mapping[str, Command] = {
     "run": Command(
@@ -97,10 +97,12 @@ COMMANDS: Mapping[str, Command] = {
         commands=_ARCHIVE,
         extra="archive",
         schema="livebode_plant.archive.settings:archive_schema",
+        panel=MANY,
     ),
     "fleet": Command(
         "Track the axes of a fleet from a log on several workers: every result once, also when a worker dies.",
         commands=_FLEET,
         extra="fleet",
+        panel=MANY,
     ),
 }
