@@ -86,7 +86,7 @@ def same(there: Result, here: Result) -> None:
 
 def test_a_command_on_a_run_prints_the_same(desk: Path) -> None:
     sql = "select count(*), sum(re) from responses"
-    same(livebode("query", RUN, sql), livebode("query", desk / "monday", sql))
+    same(livebode("export", RUN, "--sql", sql), livebode("export", desk / "monday", "--sql", sql))
 
 
 def test_inspect_prints_the_same(desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:

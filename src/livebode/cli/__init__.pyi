@@ -24,7 +24,7 @@ from livebode.cli.picture_support import tell_how_to_draw as tell_how_to_draw
 from livebode.cli.pictures import one_drawing_at_a_time as one_drawing_at_a_time
 from livebode.cli.query_result import Csv as Csv
 from livebode.cli.query_result import RowsMax as RowsMax
-from livebode.cli.query_result import check_form as check_form
+from livebode.cli.query_result import check_query as check_query
 from livebode.cli.query_result import print_result as print_result
 from livebode.cli.remote import results_directory as results_directory
 from livebode.cli.report_options import ReportLanguage as ReportLanguage

@@ -93,11 +93,8 @@ COMMANDS: Mapping[str, Command] = {
         "livebode.cli.measure_command:measure_command",
         panel=MEASURE,
     ),
-    "query": Command(
-        "Query the tables of a run with SQL (DuckDB).", "livebode.cli.query_command:query_command", panel=RESULTS
-    ),
     "export": Command(
-        "Write the responses, the fitted parameters or the model over the position in a format of other programs.",
+        "Write the responses, the fitted parameters or the model in a format of other programs, or query with SQL.",
         "livebode.cli.export_command:export_command",
         panel=RESULTS,
     ),
