@@ -117,7 +117,7 @@ def commands(made: Path, work: Path, folder: Path) -> dict[str, Callable[[], Any
         "report": command("report", work, "--out", work / "report.html", "--force"),
         "export": command("export", work, "--to", "csv", "--out", work / "a.csv", "--force"),
         "new": command("new", made / "log.csv", "--yes", "--out", work / "axis.toml", "--force"),
-        "schema": command("schema", "axis", "--out", work / "axis.schema.json", "--force"),
+        "schema": command("doctor", "--schema", "axis", "--out", work / "axis.schema.json", "--force"),
         "publish": lambda: _outbox(work / "outbox.sqlite"),
     }
 

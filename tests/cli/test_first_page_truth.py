@@ -85,7 +85,7 @@ def test_a_page_that_cannot_be_printed_is_reported() -> None:
 
 @pytest.mark.parametrize(
     ("typed", "wanted"),
-    [("livebode ", set(named("commands"))), ("livebode schema --js", {"--json"})],
+    [("livebode ", set(named("commands"))), ("livebode doctor --js", {"--json"})],
 )
 def test_a_shell_completes_commands_and_their_options(typed: str, wanted: set[str]) -> None:
     asked = {"_LIVEBODE_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}

@@ -58,7 +58,7 @@ def test_a_comparison_without_a_fit_says_why_it_has_no_parameters(log: Path) -> 
     assert "learn from a run with tracking.average = false, or compare two averaged runs" in refused.err
 
 
-@pytest.mark.parametrize("name", ["", "inspect", "schema"])
+@pytest.mark.parametrize("name", ["", "inspect", "doctor"])
 def test_the_help_has_a_short_option(name: str) -> None:
     short, long = (livebode(*filter(None, [name]), option) for option in ("-h", "--help"))
     assert (short.code, short.out) == (0, long.out)

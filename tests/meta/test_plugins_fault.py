@@ -120,7 +120,7 @@ def without(wing: str, *words: object) -> subprocess.CompletedProcess[str]:
 def test_a_wing_that_was_left_out_is_no_fault(tmp_path: Path) -> None:
     axis = tmp_path / "axis.toml"
     axis.write_text('source.log = "log.csv"\nsignals = {input = "u", output = "y"}\n[[publish]]\nkind = "webhook"\n')
-    done = without("connect", "publish", axis)
+    done = without("connect", "doctor", axis, "--receivers", "list")
     assert done.returncode == 2
     assert "publish.kind is 'webhook', which is not supported; install the wing connect of livebode" in done.stderr
     assert "cannot be loaded" not in done.stderr
@@ -180,7 +180,7 @@ def test_without_the_wing_modes_its_section_is_refused_by_one_sentence(tmp_path:
 
 
 def test_without_the_wing_of_many_machines_its_commands_and_examples_do_not_exist() -> None:
-    commands = ("--help", "example", "fleet status", "schema archive", "schema axis")
+    commands = ("--help", "example", "fleet status", "doctor --schema archive", "doctor --schema axis")
     answers = {words: without("plant", *words.split()) for words in commands}
     assert [done.returncode for done in answers.values()] == [0, 0, 2, 2, 0]
     assert not any("cannot be loaded" in done.stderr for done in answers.values())
@@ -188,4 +188,4 @@ def test_without_the_wing_of_many_machines_its_commands_and_examples_do_not_exis
     assert "standstill" in answers["example"].stdout
     assert "hall" not in answers["example"].stdout
     assert "No such command 'fleet'" in answers["fleet status"].stderr
-    assert "choose axis or experiment or matrix-experiment" in answers["schema archive"].stderr
+    assert "choose axis or experiment or matrix-experiment" in answers["doctor --schema archive"].stderr

@@ -31,7 +31,7 @@ class Command(NamedTuple):
         Extra of livebode with PyArrow, which the modules of a group import.
     schema
         "module:name" of the function with the JSON Schema of the file NAME.toml that a command or a group reads, for
-        `livebode schema NAME`.
+        `livebode doctor --schema NAME`.
     panel
         Title under which the help lists the command.
     """
@@ -128,20 +128,9 @@ COMMANDS: Mapping[str, Command] = {
         "livebode.cli.view_command:view_command",
         panel=RESULTS,
     ),
-    "publish": Command(
-        "List the receivers of events and results in a configuration; --test sends a message to each.",
-        "livebode.cli.publish_command:publish_command",
-        panel=MEASURE,
-    ),
     "doctor": Command(
-        "Check this computer, a configuration and whether its machine can be reached.",
+        "Check this computer, a configuration and whether its machine can be reached; its receivers, its schema.",
         "livebode.cli.doctor_command:doctor_command",
-        panel=MEASURE,
-    ),
-    "schema": Command(
-        "Print the JSON Schema of axis.toml, experiment.toml or archive.toml: an editor uses it to "
-        "complete and check the keys.",
-        "livebode.cli.schema_command:schema_command",
         panel=MEASURE,
     ),
 }

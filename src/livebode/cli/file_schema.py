@@ -1,13 +1,9 @@
-"""`livebode schema`: JSON Schema of the files that livebode reads, for editors."""
+"""JSON Schema of the files that livebode reads, for editors: `livebode doctor --schema`."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from livebode.cli.options import Json
 from livebode.core import UsageError
 
 _FILES = {
@@ -17,25 +13,8 @@ _FILES = {
 }
 
 
-def schema_command(
-    file: Annotated[
-        str,
-        typer.Argument(
-            metavar="axis|experiment|matrix-experiment|archive",
-            help="The file: axis.toml, experiment.toml, that of a machine with several motors, or archive.toml.",
-        ),
-    ],
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="File to write. \\[default: standard output]")
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
-    as_json: Json = False,
-) -> None:
-    """Print the JSON Schema of axis.toml, experiment.toml or archive.toml: an editor uses it to complete and check
-    the keys.
-
-    The first line of the TOML file names the schema for the editor: `#:schema ./axis.schema.json`.
-    """
+def print_schema(file: str, out: Path | None, *, force: bool, as_json: bool) -> None:
+    """Print or write the schema of a file; UsageError if there is none of it."""
     from livebode import export
     from livebode.plugins import loaded, named
     from livebode.records import to_json
@@ -46,7 +25,7 @@ def schema_command(
             "not-one-of",
             f"there is no schema of {file!r}",
             f"choose {' or '.join(files)}",
-            argument="file",
+            argument="schema",
             value=file,
             allowed=list(files),
         )
