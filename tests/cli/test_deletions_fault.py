@@ -116,7 +116,7 @@ def commands(made: Path, work: Path, folder: Path) -> dict[str, Callable[[], Any
         "example": command("example", "standstill", "--out", work, "--force"),
         "report": command("report", work, "--out", work / "report.html", "--force"),
         "export": command("export", work, "--to", "csv", "--out", work / "a.csv", "--force"),
-        "new": command("new", made / "log.csv", "--yes", "--out", work / "axis.toml", "--force"),
+        "configuration": command("inspect", made / "log.csv", "--yes", "--out", work / "axis.toml", "--force"),
         "schema": command("doctor", "--schema", "axis", "--out", work / "axis.schema.json", "--force"),
         "publish": lambda: _outbox(work / "outbox.sqlite"),
     }

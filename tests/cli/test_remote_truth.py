@@ -110,7 +110,7 @@ def test_several_recordings_and_a_configuration_name_their_urls(desk: Path, here
 
 @pytest.mark.usefixtures("desk")
 def test_a_proposed_configuration_names_the_url() -> None:
-    assert livebode("new", f"{ROOT}/site/log.csv", "--yes").err == ""
+    assert livebode("inspect", f"{ROOT}/site/log.csv", "--out", "axis.toml", "--yes").err == ""
     assert f'log = "{ROOT}/site/log.csv"' in Path("axis.toml").read_text()
 
 

@@ -63,7 +63,7 @@ COMMANDS: Mapping[str, Command] = {
         panel=RESULTS,
     ),
     "inspect": Command(
-        "List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and SNR.",
+        "List channels, rate, gaps and samples that are not finite; with --out propose and write axis.toml.",
         "livebode.cli.inspect_command:inspect_command",
         panel=MEASURE,
     ),
@@ -75,12 +75,6 @@ COMMANDS: Mapping[str, Command] = {
     "example": Command(
         "Write recordings of simulated axes and their configurations, which the documentation uses; or list them.",
         "livebode.cli.example_command:example_command",
-        panel=MEASURE,
-    ),
-    "new": Command(
-        "Write the configuration of a recording: list its channels, propose their roles, ask, and "
-        "find lines and window.",
-        "livebode.cli.new_command:new_command",
         panel=MEASURE,
     ),
     "design": Command(
