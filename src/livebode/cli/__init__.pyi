@@ -11,14 +11,10 @@ from livebode.cli.learned_baseline import write_baseline as write_baseline
 from livebode.cli.log_output import warnings_shown as warnings_shown
 from livebode.cli.options import Entry as Entry
 from livebode.cli.options import Excitation as Excitation
-from livebode.cli.options import From as From
 from livebode.cli.options import Json as Json
 from livebode.cli.options import Output as Output
 from livebode.cli.options import Port as Port
-from livebode.cli.options import Rate as Rate
 from livebode.cli.options import ServeFile as ServeFile
-from livebode.cli.options import Time as Time
-from livebode.cli.options import To as To
 from livebode.cli.picture_support import can_draw as can_draw
 from livebode.cli.picture_support import tell_how_to_draw as tell_how_to_draw
 from livebode.cli.pictures import one_drawing_at_a_time as one_drawing_at_a_time
@@ -26,6 +22,10 @@ from livebode.cli.query_result import Csv as Csv
 from livebode.cli.query_result import RowsMax as RowsMax
 from livebode.cli.query_result import check_query as check_query
 from livebode.cli.query_result import print_result as print_result
+from livebode.cli.recording_options import From as From
+from livebode.cli.recording_options import Rate as Rate
+from livebode.cli.recording_options import Time as Time
+from livebode.cli.recording_options import To as To
 from livebode.cli.remote import results_directory as results_directory
 from livebode.cli.report_options import ReportLanguage as ReportLanguage
 from livebode.cli.serving import dashboard_of as dashboard_of

@@ -9,7 +9,8 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.configuration_dialog import write_configuration
-from livebode.cli.options import Dbc, Excitation, From, Json, Output, Rate, SkipPeriods, Time, To
+from livebode.cli.options import Excitation, Json, Output
+from livebode.cli.recording_options import Dbc, From, Rate, SkipPeriods, Time, To
 from livebode.core import UsageError, counted
 from livebode.locations import location
 

@@ -11,6 +11,7 @@ from livebode.configuration.axis import Axis as Axis
 from livebode.configuration.axis import nearest as nearest
 from livebode.configuration.axis import read_loop as read_loop
 from livebode.configuration.axis import read_serve_section as read_serve_section
+from livebode.configuration.descriptions import documented as documented
 from livebode.configuration.fit_section import FitSection as FitSection
 from livebode.configuration.loop_section import ControllerSection as ControllerSection
 from livebode.configuration.loop_section import LoopSection as LoopSection
