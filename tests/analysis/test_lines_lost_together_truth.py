@@ -60,7 +60,10 @@ def test_a_run_and_its_export_have_no_average_either(tmp_path: Path) -> None:
     done = livebode("export", run, "--to", "csv", "--mean", "--out", tmp_path / "mean.csv")
     assert done.code == 2
     assert "repeat with the excitation" in done.err
-    assert livebode("query", run, "SELECT DISTINCT distortion FROM responses WHERE NOT valid", "--json").code == 0
+    assert (
+        livebode("export", run, "--sql", "SELECT DISTINCT distortion FROM responses WHERE NOT valid", "--json").code
+        == 0
+    )
 
 
 @pytest.mark.parametrize("average", [False, True])

@@ -107,28 +107,32 @@ ADVICE = [
     ("run log.csv", "livebode inspect lists the channels", "inspect log.csv"),
     (
         "run log.csv",
-        "livebode new proposes their roles",
-        "new log.csv --yes --out roles.toml",
+        "with --out axis.toml it proposes their roles",
+        "inspect log.csv --yes --out roles.toml",
         "run roles.toml --out r",
     ),
     ("run log.csv", "give --output CHANNEL", "run log.csv --output y --input u --estimator direct --out r"),
-    ("new log.csv --out n.toml", "take the proposals with --yes", "new log.csv --yes --out n.toml"),
+    ("inspect log.csv --out n.toml", "take the proposals with --yes", "inspect log.csv --yes --out n.toml"),
     (
-        "new other.csv --out n.toml",
+        "inspect other.csv --out n.toml",
         "name the channels that you know by --excitation, --input and --output",
-        "new other.csv --yes --excitation a --input b --output c --out n.toml",
+        "inspect other.csv --yes --excitation a --input b --output c --out n.toml",
     ),
     (
-        "new other.csv --yes --output c --out n.toml",
+        "inspect other.csv --yes --output c --out n.toml",
         "give --input CHANNEL",
-        "new other.csv --yes --output c --input b --out n.toml",
+        "inspect other.csv --yes --output c --input b --out n.toml",
     ),
-    ("new log.csv --yes --out one.toml", "replace it with --force", "new log.csv --yes --out one.toml --force"),
+    ("inspect log.csv --yes --out one.toml", "replace it with --force", "inspect log.csv --yes --out one.toml --force"),
     (
         "run log.csv --output y --band 20:200 --out r",
         "add --output-only",
         "run log.csv --output y --band 20:200 --output-only --out r",
     ),
+    ("inspect log.csv --yes", "give --out axis.toml too", "inspect log.csv --yes --out n.toml"),
+    ("export one", "give --to FORMAT", "export one --to csv --out one.csv"),
+    ("export one", "or --sql QUERY to print rows", "export one --sql SELECT(1)"),
+    ("export one --csv", "give --sql QUERY too", "export one --csv --sql SELECT(1)"),
     ("inspect log.csv --output y", "give --excitation", "inspect log.csv --output y --excitation w"),
     ("inspect log.csv --output y", "or --lines and --window", "inspect log.csv --output y --lines 50 --window 100"),
     ("inspect log.csv --lines 50 --window 100", "give --output", "inspect log.csv --lines 50 --window 100 --output y"),
@@ -191,7 +195,11 @@ ADVICE = [
 OF_SENTENCES = [
     (f"run spike.csv {ROLES} --out r", "--all-periods includes them", f"run spike.csv {ROLES} --all-periods --out r"),
     (f"run log.csv {ROLES} --out r", "`livebode learn` creates one from healthy runs", "learn r --out new.json"),
-    ("compare one one", "`livebode new --fit auto` writes one", "new log.csv --yes --fit auto --out n.toml"),
+    (
+        "compare one one",
+        "`livebode inspect --out axis.toml --fit auto` writes one",
+        "inspect log.csv --yes --fit auto --out n.toml",
+    ),
 ]
 
 
@@ -220,7 +228,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "run noise.csv --input w --output y --estimator lpm --out noise",
             "run noise.csv --input w --output y2 --estimator lpm --out beside",
             "learn one --out healthy.json",
-            "new log.csv --yes --out one.toml",
+            "inspect log.csv --yes --out one.toml",
         ):
             assert livebode(*command.split()).code == 0, command
     return folder
@@ -279,7 +287,7 @@ def test_lpm_is_not_proposed_where_it_finds_nothing_and_says_why(
     seen = livebode("inspect", "log.csv", "--excitation", "u").out
     assert "The excitation is not recognised" in seen
     assert "--estimator lpm (for" not in seen
-    written = livebode("new", "log.csv", "--yes", "--input", "u", "--output", "y", "--out", "n.toml")
+    written = livebode("inspect", "log.csv", "--yes", "--input", "u", "--output", "y", "--out", "n.toml")
     assert (written.code, Path("n.toml").exists()) == (2, False)
     found = livebode(*RUN_LPM)
     assert found.code == 2
@@ -301,7 +309,7 @@ def test_lpm_is_proposed_where_it_finds_responses(
     }
     excited(signal[excitation])
     assert "--estimator lpm (for" in livebode("inspect", "log.csv", "--excitation", "u").out
-    assert livebode("new", "log.csv", "--yes", "--input", "u", "--output", "y", "--out", "n.toml").code == 0
+    assert livebode("inspect", "log.csv", "--yes", "--input", "u", "--output", "y", "--out", "n.toml").code == 0
     assert 'estimator = "lpm"' in Path("n.toml").read_text()
     assert livebode(*RUN_LPM).code == 0
 

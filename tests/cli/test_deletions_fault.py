@@ -75,7 +75,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lake = loop(archive, str(made / "lake"))
     for name in TABLES:  # one that was joined, so that there is something to remove
         lake.created(name)
-    livebode("archive", "compact", archive)
+    livebode("archive", "run", archive, "--compact")
     shutil.copytree(made / "piece", made / "lake" / "runs" / "monday")
     return made
 
@@ -103,7 +103,7 @@ def commands(made: Path, work: Path, folder: Path) -> dict[str, Callable[[], Any
         return call
 
     return {
-        "archive compact": command("archive", "compact", archive),
+        "archive run --compact": command("archive", "run", archive, "--compact"),
         "archive run": coordinator(archive).run,
         "fleet sink": lambda: SinkTables(SinkSection(lake=str(work), full_rate_days=1.0)).resume(0.0),
         "run": command("run", axis, "--out", work, "--force"),
@@ -116,8 +116,8 @@ def commands(made: Path, work: Path, folder: Path) -> dict[str, Callable[[], Any
         "example": command("example", "standstill", "--out", work, "--force"),
         "report": command("report", work, "--out", work / "report.html", "--force"),
         "export": command("export", work, "--to", "csv", "--out", work / "a.csv", "--force"),
-        "new": command("new", made / "log.csv", "--yes", "--out", work / "axis.toml", "--force"),
-        "schema": command("schema", "axis", "--out", work / "axis.schema.json", "--force"),
+        "configuration": command("inspect", made / "log.csv", "--yes", "--out", work / "axis.toml", "--force"),
+        "schema": command("doctor", "--schema", "axis", "--out", work / "axis.schema.json", "--force"),
         "publish": lambda: _outbox(work / "outbox.sqlite"),
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import typer
 
 import livebode as package
 from livebode.cli.app import app
+from livebode.cli.commands import PANELS, panels
 from livebode.cli.first_page import ABOUT, OPTIONS, first_page
 from livebode.plugins import named
 from tests.support.command import livebode
@@ -48,6 +50,16 @@ def test_the_page_fits_the_terminal_and_loses_no_word(width: int) -> None:
     assert sorted(set(wanted) - set(page.replace("│", " ").split())) == []
 
 
+def test_the_page_has_five_panels_with_every_command_of_livebode_in_one() -> None:
+    by_panel = panels(COMMANDS)
+    assert tuple(by_panel) == PANELS
+    assert sorted(name for rows in by_panel.values() for name, _ in rows) == sorted(COMMANDS)
+    page = first_page(80, colours=False)
+    assert re.findall("─ ([^─]+) ─", page) == ["Options", *PANELS]
+    asked = livebode("--log-level", "info", "--help").out
+    assert re.findall("[-─] ([A-Z][^-─]+) [-─]", asked) == ["Options", *PANELS]
+
+
 def test_colours_add_nothing_but_colours() -> None:
     coloured = first_page(80, colours=True)
     for style in ("\x1b[1m", "\x1b[2m", "\x1b[1;33m", "\x1b[1;36m", "\x1b[0m"):
@@ -73,7 +85,7 @@ def test_a_page_that_cannot_be_printed_is_reported() -> None:
 
 @pytest.mark.parametrize(
     ("typed", "wanted"),
-    [("livebode ", set(named("commands"))), ("livebode schema --js", {"--json"})],
+    [("livebode ", set(named("commands"))), ("livebode doctor --js", {"--json"})],
 )
 def test_a_shell_completes_commands_and_their_options(typed: str, wanted: set[str]) -> None:
     asked = {"_LIVEBODE_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}

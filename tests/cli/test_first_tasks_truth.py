@@ -31,7 +31,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_reference_of_the_torque_is_the_input_and_a_velocity_goes_before_a_position(log: Path) -> None:
     out = log.with_name("Achse Z.toml")
-    written = livebode("new", log, "--yes", "--out", out)
+    written = livebode("inspect", log, "--yes", "--out", out)
     assert written.code == 0, written.err
     assert [line.split(" (")[0] for line in written.out.splitlines()[:3]] == [
         "excitation: M_stoer", "input: M_soll", "output: n_ist",
@@ -43,7 +43,7 @@ def test_the_reference_of_the_torque_is_the_input_and_a_velocity_goes_before_a_p
 def test_an_input_that_is_not_recognised_is_asked_for_among_the_channels(tmp_path: Path) -> None:
     given = signals()
     write_csv(tmp_path / "log.csv", {"t": given["t"], "w": given["w"], "b": given["u"], "y": given["y"]})
-    refused = livebode("new", tmp_path / "log.csv", "--yes", "--out", tmp_path / "axis.toml")
+    refused = livebode("inspect", tmp_path / "log.csv", "--yes", "--out", tmp_path / "axis.toml")
     assert refused.code == 2
     assert "the input channel is not recognised among t, w, b, y; give --input CHANNEL" in refused.err
 
@@ -53,12 +53,12 @@ def test_a_comparison_without_a_fit_says_why_it_has_no_parameters(log: Path) -> 
     assert livebode("run", log, *ROLES, "--average", "--out", run).code == 0
     compared = livebode("compare", run, run)
     assert compared.code == 0
-    assert "neither run has a [fit] section (`livebode new --fit auto` writes one)" in compared.out
+    assert "neither run has a [fit] section (`livebode inspect --out axis.toml --fit auto` writes one)" in compared.out
     refused = livebode("learn", run, "--out", log.with_name("healthy.json"))
     assert "learn from a run with tracking.average = false, or compare two averaged runs" in refused.err
 
 
-@pytest.mark.parametrize("name", ["", "inspect", "schema"])
+@pytest.mark.parametrize("name", ["", "inspect", "doctor"])
 def test_the_help_has_a_short_option(name: str) -> None:
     short, long = (livebode(*filter(None, [name]), option) for option in ("-h", "--help"))
     assert (short.code, short.out) == (0, long.out)

@@ -86,7 +86,7 @@ def same(there: Result, here: Result) -> None:
 
 def test_a_command_on_a_run_prints_the_same(desk: Path) -> None:
     sql = "select count(*), sum(re) from responses"
-    same(livebode("query", RUN, sql), livebode("query", desk / "monday", sql))
+    same(livebode("export", RUN, "--sql", sql), livebode("export", desk / "monday", "--sql", sql))
 
 
 def test_inspect_prints_the_same(desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,7 +110,7 @@ def test_several_recordings_and_a_configuration_name_their_urls(desk: Path, here
 
 @pytest.mark.usefixtures("desk")
 def test_a_proposed_configuration_names_the_url() -> None:
-    assert livebode("new", f"{ROOT}/site/log.csv", "--yes").err == ""
+    assert livebode("inspect", f"{ROOT}/site/log.csv", "--out", "axis.toml", "--yes").err == ""
     assert f'log = "{ROOT}/site/log.csv"' in Path("axis.toml").read_text()
 
 

@@ -60,15 +60,15 @@ def test_a_recordings_names_do_not_command_the_terminal(evil: Path, tracked: tup
 def test_events_of_a_stored_run_do_not_command_the_terminal(tracked: tuple[Path, str]) -> None:
     event = {"kind": "gap", "sample": 1, "time_s": 0.1, "message": EVIL, "details": {}}
     (tracked[0] / "events.jsonl").write_text(json.dumps(event) + "\n")
-    text = shown("query", tracked[0], f"select message, 'x{EVIL}' as x from events")
+    text = shown("export", tracked[0], "--sql", f"select message, 'x{EVIL}' as x from events")
     assert is_harmless(text)
 
 
 def test_the_help_has_colours_on_a_terminal_and_nowhere_else() -> None:
-    text = shown("query", "--help")
+    text = shown("export", "--help")
     assert is_harmless(text)
     assert "\x1b[1;33mUsage: " in text
-    assert "\x1b" not in livebode("query", "--help").out
+    assert "\x1b" not in livebode("export", "--help").out
 
 
 @given(st.text())

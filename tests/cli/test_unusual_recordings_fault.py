@@ -104,9 +104,9 @@ def recipes(draw: st.DrawFn) -> Recipe:
 READING = (
     "inspect LOG", "inspect LOG --excitation w --output y --input u", "inspect LOG --excitation y --json",
     "inspect LOG --lines 20:200:20 --window 50", "inspect LOG --lines 20:200:20",
-    "inspect LOG --excitation w --from 3periods", "new LOG --yes --out x.toml",
-    "new LOG --yes --out x.toml --excitation w --input u --output y",
-    "new LOG --yes --out x.toml --excitation - --input u --output y --schedule w",
+    "inspect LOG --excitation w --from 3periods", "inspect LOG --yes --out x.toml",
+    "inspect LOG --yes --out x.toml --excitation w --input u --output y",
+    "inspect LOG --yes --out x.toml --excitation - --input u --output y --schedule w",
     "friction LOG --velocity y --input u", "friction LOG --position s --velocity y --input u --json",
     "friction LOG --position y --input u", "orders LOG --position s --input u",
     "orders LOG --velocity y --angle s --input u",
@@ -177,7 +177,7 @@ def test_each_run_and_each_command_that_reads_it_has_a_result_or_a_sentence(
 @pytest.mark.parametrize(("column", "time"), [("supply", "even"), ("drift", "jitter"), ("flag", "even")])
 def test_new_proposes_the_roles_beside_a_channel_without_lines(column: str, time: str, tmp_path: Path) -> None:
     Recipe(1500, USUAL | {"s": column}, time, ".csv", 1).write(tmp_path)
-    result = called(tmp_path, "new LOG --yes --out x.toml")
+    result = called(tmp_path, "inspect LOG --yes --out x.toml")
     assert result.code == 0, result.err
     assert 'output = "y"' in (tmp_path / "x.toml").read_text()
 

@@ -75,10 +75,10 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
         "csv": ["run", "example/standstill.csv", *CHIRP.split(), "--out", run + "3"],
         "foreign": ["inspect", str(folder / "foreign.parquet")],
         "arrow": ["inspect", str(folder / "foreign.arrow")],
-        "query": ["query", run, "SELECT 1"],
+        "query": ["export", run, "--sql", "SELECT 1"],
         "lake": ["archive", "list", str(folder)],
         "archive": ["archive", "run", "example/archive.toml"],
-        "fleet": ["fleet", "demo"],
+        "fleet": ["fleet", "run", "--demo"],
         "output-only": ["run", str(folder / "log.parquet"), "--output-only", "--output", "y", "--out", run + "2"],
     }
     code = PROGRAM.format(absent=ABSENT, commands=list(commands.values()))

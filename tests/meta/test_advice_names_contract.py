@@ -32,7 +32,7 @@ PROSE = {"after", "and", "can", "cannot", "computed", "could", "did", "first", "
 ELSEWHERE = {
     ("cli/inspect_command.py", "--estimator"): "the sentence is about the run that follows",
     ("cli/inspect_command.py", "--output-only"): "of run, friction and orders, which the sentence names",
-    ("cli/new_command.py", "--output-only"): "of the command line of run that is composed of it",
+    ("cli/configuration_dialog.py", "--output-only"): "of the command line of run that is composed of it",
     ("core/installing.py", "--editable"): "of pip",
 }
 """Options that do not belong to the command whose module names them, and why."""

@@ -120,7 +120,7 @@ def without(wing: str, *words: object) -> subprocess.CompletedProcess[str]:
 def test_a_wing_that_was_left_out_is_no_fault(tmp_path: Path) -> None:
     axis = tmp_path / "axis.toml"
     axis.write_text('source.log = "log.csv"\nsignals = {input = "u", output = "y"}\n[[publish]]\nkind = "webhook"\n')
-    done = without("connect", "publish", axis)
+    done = without("connect", "doctor", axis, "--receivers", "list")
     assert done.returncode == 2
     assert "publish.kind is 'webhook', which is not supported; install the wing connect of livebode" in done.stderr
     assert "cannot be loaded" not in done.stderr
@@ -188,7 +188,7 @@ def test_without_the_wing_design_its_commands_and_its_function_name_the_wing(tmp
         sentence = " ".join(done.stderr.replace("│", " ").split())
         assert done.returncode == 2
         assert f"No such command '{name}'. Its wing may be missing: install the wing design of livebode." in sentence
-    assert "choose axis or archive" in without("design", "schema", "experiment").stderr
+    assert "choose axis or archive" in without("design", "doctor", "--schema", "experiment").stderr
     code = "import sys; sys.modules['livebode_design'] = None; import livebode; livebode.design({})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stderr.splitlines()[-1] == (
@@ -209,7 +209,7 @@ def test_without_the_wing_matrix_a_list_of_channels_is_refused_by_one_sentence(t
 
 
 def test_without_the_wing_of_many_machines_its_commands_and_examples_do_not_exist() -> None:
-    commands = ("--help", "example", "fleet status", "schema archive", "schema axis")
+    commands = ("--help", "example", "fleet status", "doctor --schema archive", "doctor --schema axis")
     answers = {words: without("plant", *words.split()) for words in commands}
     assert [done.returncode for done in answers.values()] == [0, 0, 2, 2, 0]
     assert not any("cannot be loaded" in done.stderr for done in answers.values())
@@ -217,7 +217,7 @@ def test_without_the_wing_of_many_machines_its_commands_and_examples_do_not_exis
     assert "standstill" in answers["example"].stdout
     assert "hall" not in answers["example"].stdout
     assert "No such command 'fleet'" in answers["fleet status"].stderr
-    assert "choose axis or experiment or matrix-experiment" in answers["schema archive"].stderr
+    assert "choose axis or experiment or matrix-experiment" in answers["doctor --schema archive"].stderr
 
 
 def test_without_the_wing_reports_its_commands_and_the_page_say_what_to_install(tmp_path: Path) -> None:
@@ -228,10 +228,7 @@ def test_without_the_wing_reports_its_commands_and_the_page_say_what_to_install(
     for command in ("report", "compare"):
         done = without("reports", command, tmp_path / "run")
         assert done.returncode == 2
-        sentence = (
-            f"No such command '{command}'. If it belongs to a wing of livebode that is not installed (reports), "
-            "install that wing."
-        )
+        sentence = f"No such command '{command}'. Its wing may be missing: install the wing reports of livebode."
         assert sentence in " ".join(done.stderr.replace("│", " ").split())
     code = """
 import sys

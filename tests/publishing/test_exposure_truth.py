@@ -48,5 +48,5 @@ def test_it_is_said_at_the_start_of_a_run_and_by_the_list_of_receivers(tmp_path:
     measured = '[source]\nlog = "log.parquet"\n[signals]\noutput = "y"\n'
     published = f'[[publish]]\nkind = "prometheus"\nurl = "http://0.0.0.0:{port}"\n'
     (tmp_path / "axis.toml").write_text(measured + published)
-    listed = livebode("publish", str(tmp_path / "axis.toml"))
+    listed = livebode("doctor", str(tmp_path / "axis.toml"), "--receivers", "list")
     assert f"whoever reaches 0.0.0.0:{port}" in listed.out

@@ -75,8 +75,11 @@ def test_the_command_lists_and_tests_each_section_in_one_line(tmp_path: Path) ->
             '[[publish]]\nname = "chat"\nkind = "webhook"\nurl_file = "url"\n'
             f'[[publish]]\nname = "absent"\nkind = "webhook"\nurl = "http://127.0.0.1:9/{SECRET}"\n'
         )
-        listed, tested = livebode("publish", file), livebode("publish", "--test", file)
-        as_json = livebode("publish", "--test", file, "--json")
+        listed, tested = (
+            livebode("doctor", file, "--receivers", "list"),
+            livebode("doctor", file, "--receivers", "test"),
+        )
+        as_json = livebode("doctor", file, "--receivers", "test", "--json")
     assert listed.out == "chat: events (alarms)\nabsent: events (alarms)\n"
     assert listed.code == 0
     chat, absent = tested.out.splitlines()
@@ -87,4 +90,4 @@ def test_the_command_lists_and_tests_each_section_in_one_line(tmp_path: Path) ->
     assert receiver.posted[0][0] == f"/services/{SECRET}"
     assert SECRET not in listed.out + tested.out + tested.err + as_json.out + as_json.err
     file.write_text('[source]\nlog = "a.csv"\n[signals]\noutput = "y"\n')
-    assert "has no [[publish]] section" in livebode("publish", file).err
+    assert "has no [[publish]] section" in livebode("doctor", file, "--receivers", "list").err

@@ -238,7 +238,7 @@ def test_a_broken_summary_ends_in_a_sentence(tmp_path: Path, runs: dict[str, Pat
     del whole["crc32"]
     texts = [b'{"found": ' * 100_000, b"[" * 1_000_000, b'{"a": ' + b"9" * 50_000 + b"}", b"\xff\xfe", b"null", b""]
     arguments: list[tuple[object, ...]] = [
-        ("query", run, "SELECT count(*) FROM responses"), ("fit", run), ("margins", run),
+        ("export", run, "--sql", "SELECT count(*) FROM responses"), ("fit", run), ("margins", run),
         ("export", run, "--to", "csv", "--out", tmp_path / "a.csv", "--force"), ("report", run),
     ]  # fmt: skip
     documents = [to_document(_broken(json.loads(json.dumps(whole)), rng)) for _ in range(RUNS // 2)]

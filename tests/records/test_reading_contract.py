@@ -257,7 +257,7 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
     due = due[: int(np.count_nonzero(due.sample < held))]
 
     def ask(sql: str, *options: object) -> dict[str, object]:
-        done = livebode("query", tmp_path / "run", sql, "--json", *options)
+        done = livebode("export", tmp_path / "run", "--sql", sql, "--json", *options)
         assert done.code == 0, done.err
         return json.loads(done.out)
 
@@ -272,7 +272,7 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
     first = ask("FROM responses ORDER BY sample, frequency_hz", "--rows", 2)
     assert (first["more"], len(first["rows"]), first["columns"][0]) == (True, 2, "first")
     assert ask("SELECT count(*) FROM events WHERE kind = 'non-finite'")["rows"] == [[int(held > SAMPLES // 3)]]
-    text = livebode("query", tmp_path / "run", "SELECT sample, valid FROM responses LIMIT 1", "--csv").out
+    text = livebode("export", tmp_path / "run", "--sql", "SELECT sample, valid FROM responses LIMIT 1", "--csv").out
     assert text == f"sample,valid\n{due.sample[0]},False\n"
 
 
@@ -292,7 +292,7 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
 def test_a_query_that_cannot_be_run_is_refused(tmp_path: Path, sql: str, message: str) -> None:
     record_until(1200, tmp_path / "run")
     before = sorted(os.listdir(tmp_path / "run"))
-    done = livebode("query", tmp_path / "run", sql.format(run=tmp_path / "run"))
+    done = livebode("export", tmp_path / "run", "--sql", sql.format(run=tmp_path / "run"))
     assert done.code == 2
     assert message in done.err
     assert sorted(os.listdir(tmp_path / "run")) == before
@@ -310,10 +310,10 @@ def test_a_constant_excitation_is_reported_and_the_run_is_finished(tmp_path: Pat
 def test_an_empty_or_interrupted_query_ends_in_a_sentence(tmp_path: Path) -> None:
     record_machine(machine(SAMPLES), tmp_path / "run")
     for sql in ("", "  ;", "/* nothing */"):
-        done = livebode("query", tmp_path / "run", sql)
+        done = livebode("export", tmp_path / "run", "--sql", sql)
         assert (done.code, done.out) == (2, "")
         assert "the query is empty; write SQL on events, single_events, responses, samples" in done.err
-    command = [str(Path(sys.executable).with_name("livebode")), "query", str(tmp_path / "run")]
+    command = [str(Path(sys.executable).with_name("livebode")), "export", str(tmp_path / "run"), "--sql"]
     # What runs the tests may ignore the signal, and what it starts with it.
     process = subprocess.Popen(
         [*command, "SELECT 1; SELECT count(*) FROM range(100000000) a, range(100000) b WHERE a.range * b.range = 3"],

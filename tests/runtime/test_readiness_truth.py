@@ -216,7 +216,7 @@ def test_what_is_not_ready_is_recorded_with_its_flag_and_used_by_nothing(tmp_pat
     assert livebode("export", record.path, "--to", "csv", "--out", out).code == 0
     table = np.genfromtxt(out, delimiter=",", skip_header=1)
     assert np.array_equal(table[:: len(found.lines), -1] == 1, found.ready)
-    query = livebode("query", record.path, "SELECT count(*) AS n FROM responses WHERE NOT ready")
+    query = livebode("export", record.path, "--sql", "SELECT count(*) AS n FROM responses WHERE NOT ready")
     assert str(np.count_nonzero(~found.ready) * len(found.lines)) in query.out
 
 

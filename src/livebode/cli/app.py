@@ -123,21 +123,21 @@ class _Group(_Light, TyperGroup):
     def __init__(self, command: Command | None = None, **options: Any) -> None:
         super().__init__(**options)
         self.extra = command.extra if command else ""
-        self._table: Mapping[str, Command] = command.commands if command else named("commands")
-        self.commands = _Commands(self._table)  # type: ignore[assignment]
+        self.table: Mapping[str, Command] = command.commands if command else named("commands")
+        self.commands = _Commands(self.table)  # type: ignore[assignment]
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
         """The names in the order of the help."""
-        return list(self._table)
+        return list(self.table)
 
     def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:  # noqa: ARG002
         """A command as a list of commands shows it; its options are not needed for that, nor is its module."""
-        command = self._table.get(cmd_name)
+        command = self.table.get(cmd_name)
         return TyperCommand(name=cmd_name, help=command.summary) if command else None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the arguments begin with, to be run or completed."""
-        if f"--{args[0]}" in _OPTIONS and args[0] not in self._table:
+        if f"--{args[0]}" in _OPTIONS and args[0] not in self.table:
             ctx.fail(f"No such command {args[0]!r}. Did you mean 'livebode --{args[0]}'?")
         try:
             name, listed, rest = super().resolve_command(ctx, args)

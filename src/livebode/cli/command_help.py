@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from livebode.cli.commands import panels
 from livebode.cli.frames import DIM, RED, frame, paragraph, styled, table, usage
 
 
@@ -38,9 +39,7 @@ def _tables(command: Any, context: Any) -> Iterator[tuple[str, list[tuple[str, s
         found = [one.get_help_record(context) for one in command.get_params(context) if one.param_type_name == kind]
         if rows := [(names, " ".join(_plain(text).split())) for names, text in filter(None, found)]:
             yield title, rows
-    if hasattr(command, "list_commands"):
-        names = command.list_commands(context)
-        yield "Commands", [(name, _plain(command.get_command(context, name).help)) for name in names]
+    yield from panels(getattr(command, "table", {})).items()
 
 
 def _plain(text: str) -> str:

@@ -10,6 +10,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+MEASURE, RESULTS, COMPARE, CONTROL, MANY = "Measure", "Results", "Compare", "Control", "Many machines"
+PANELS = (MEASURE, RESULTS, COMPARE, CONTROL, MANY)
+"""Titles under which the help lists the commands, in its order; a plug-in may have another one."""
+
 
 class Command(NamedTuple):
     """A command, or a group of them.
@@ -27,6 +31,8 @@ class Command(NamedTuple):
         "module:name" of the function that a name of the package `livebode` calls to do the same.
     extra
         Extra of livebode with PyArrow, which the modules of a group import.
+    panel
+        Title under which the help lists the command.
     """
 
     summary: str
@@ -34,62 +40,65 @@ class Command(NamedTuple):
     commands: Mapping[str, Command] = MappingProxyType({})
     extra: str = ""
     python: str = ""
+    panel: str = "Commands"
+
+
+def panels(commands: Mapping[str, Command]) -> dict[str, list[tuple[str, str]]]:
+    """Names and summaries of commands by panel."""
+    titles = dict.fromkeys([*PANELS, *(command.panel for command in commands.values())])
+    rows = {title: [(n, c.summary) for n, c in commands.items() if c.panel == title] for title in titles}
+    return {title: found for title, found in rows.items() if found}
 
 
 COMMANDS: Mapping[str, Command] = {
     "run": Command(
         "Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.",
         "livebode.cli.run_command:run_command",
+        panel=MEASURE,
     ),
     "fit": Command(
         "Fit a model to the response of a run, and print its parameters with bounds.",
         "livebode.cli.fit_command:fit_command",
+        panel=RESULTS,
     ),
     "inspect": Command(
-        "List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and SNR.",
+        "List channels, rate, gaps and samples that are not finite; with --out propose and write axis.toml.",
         "livebode.cli.inspect_command:inspect_command",
+        panel=MEASURE,
     ),
     "demo": Command(
         "Track a simulated belt axis during its strokes, live; halfway, the belt loses 10 % of its stiffness.",
         "livebode.cli.demo_command:demo_command",
+        panel=MEASURE,
     ),
     "example": Command(
         "Write recordings of simulated axes and their configurations, which the documentation uses; or list them.",
         "livebode.cli.example_command:example_command",
+        panel=MEASURE,
     ),
-    "new": Command(
-        "Write the configuration of a recording: list its channels, propose their roles, ask, and "
-        "find lines and window.",
-        "livebode.cli.new_command:new_command",
-    ),
-    "query": Command("Query the tables of a run with SQL (DuckDB).", "livebode.cli.query_command:query_command"),
     "export": Command(
-        "Write the responses, the fitted parameters or the model over the position in a format of other programs.",
+        "Write the responses, the fitted parameters or the model in a format of other programs, or query with SQL.",
         "livebode.cli.export_command:export_command",
+        panel=RESULTS,
     ),
     "margins": Command(
         "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.",
         "livebode.cli.margins_command:margins_command",
+        panel=CONTROL,
     ),
     "learn": Command(
         "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",
         "livebode.cli.learn_command:learn_command",
+        panel=COMPARE,
     ),
     "view": Command(
         "Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still recording.",
         "livebode.cli.view_command:view_command",
-    ),
-    "publish": Command(
-        "List the receivers of events and results in a configuration; --test sends a message to each.",
-        "livebode.cli.publish_command:publish_command",
+        panel=RESULTS,
     ),
     "doctor": Command(
-        "Check this computer, a configuration and whether its machine can be reached.",
+        "Check this computer, a configuration and whether its machine can be reached; its receivers, its schema.",
         "livebode.cli.doctor_command:doctor_command",
-    ),
-    "schema": Command(
-        "Print the JSON Schema of axis.toml, experiment.toml or archive.toml: an editor uses it to "
-        "complete and check the keys.",
-        "livebode.cli.schema_command:schema_command",
+        panel=MEASURE,
     ),
 }

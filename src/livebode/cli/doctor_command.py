@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from livebode.cli import terminal
+from livebode.cli.file_schema import print_schema
 from livebode.cli.options import Json
+from livebode.cli.receivers import show_receivers
 
 if TYPE_CHECKING:
     from livebode.doctor import Check
@@ -28,17 +30,45 @@ def doctor_command(
     runs: Annotated[Path, typer.Option(metavar="DIR", help="Where runs are written: its disk is checked.")] = Path(
         "runs"
     ),
-    force: Annotated[bool, typer.Option("--force", help="Replace an earlier bundle.")] = False,
+    receivers: Annotated[
+        Literal["list", "test"] | None,
+        typer.Option(
+            help="Print what is sent to each receiver (\\[\\[publish]]) of AXIS.toml instead, or send a test message."
+        ),
+    ] = None,
+    schema: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Print the JSON Schema of NAME.toml instead, by which an editor completes and checks the keys: axis, "
+            "experiment, matrix-experiment (several motors) or archive.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="File for --schema. \\[default: standard output]")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an earlier bundle or schema.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Check this computer, a configuration and whether its machine can be reached.
+    """Check this computer, a configuration and whether its machine can be reached; its receivers, its schema.
 
-    Exit code 2 where a check failed. No data is changed; a connection is opened and closed.
+    Exit code 2 where a check or a test message failed. No data is changed; a connection is opened and closed. The first
+    line of a TOML file names the schema for the editor: `#:schema ./axis.schema.json`.
     """
+    if schema is not None:
+        print_schema(schema, out, force=force, as_json=as_json)
+    elif receivers is not None:
+        files = [path for path in targets or [] if path.suffix.lower() == ".toml"]
+        show_receivers(files[0] if files else Path("axis.toml"), test=receivers == "test", as_json=as_json)
+    else:
+        _check(targets or [], bundle, runs, force=force, as_json=as_json)
+
+
+def _check(targets: list[Path], bundle: Path | None, runs: Path, *, force: bool, as_json: bool) -> None:
     from livebode.doctor import Subject, examine, worst, write_bundle  # with the dashboard and the simulation
     from livebode.records import to_json
 
-    subject = Subject.of(targets or [])
+    subject = Subject.of(targets)
     checks = examine(subject, runs)
     verdict = worst(check.verdict for check in checks)
     files = None if bundle is None else write_bundle(bundle, subject, checks, force=force)

@@ -1,4 +1,4 @@
-"""`livebode export`: write a run in a format of other programs."""
+"""`livebode export`: write a run in a format of other programs, or the rows of a query."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from livebode.cli.options import Entry, Json
+from livebode.cli.query_result import Csv, RowsMax, check_query, print_result
 from livebode.cli.remote import beside
 from livebode.core import UsageError, counted
 from livebode.estimates import kind_of, rule
@@ -30,8 +31,9 @@ _IN_PYTHON = {
 def export_command(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
     to: Annotated[
-        str, typer.Option(metavar="FORMAT", help="Format: csv, mat, netcdf or uff; of --lpv json, mat, netcdf or c.")
-    ],
+        str | None,
+        typer.Option(metavar="FORMAT", help="Format: csv, mat, netcdf or uff; of --lpv json, mat, netcdf or c."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="File to write. \\[default: RUN with the format's suffix]")
     ] = None,
@@ -46,18 +48,40 @@ def export_command(
         bool, typer.Option("--lpv", help="The model over the schedule, with covariance: two masses fitted at places.")
     ] = False,
     entry: Entry = None,
+    sql: Annotated[
+        str | None,
+        typer.Option(
+            metavar="QUERY",
+            help="Print the rows of an SQL query (DuckDB) instead; tables: responses, parameters, samples, events.",
+        ),
+    ] = None,
+    rows: RowsMax = 1000,
+    as_csv: Csv = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Write the responses, the fitted parameters or the model over the position in a format of other programs.
+    """Write the responses, the fitted parameters or the model in a format of other programs, or query with SQL.
 
-    Of a matrix run all entries are written, or one of them with --entry, as of an ordinary run.
+    Of a matrix run all entries are written, or one of them with --entry, as of an ordinary run. A query may be of a run
+    that is still recording, and has no access to files. DuckDB, pandas and Polars can also read the Parquet files
+    directly. `livebode archive list --sql` is the same for all runs of a lake.
     """
+    chosen = {"--at": at is not None, "--mean": mean, "--parameters": parameters, "--lpv": lpv}
+    check_query(sql, as_csv=as_csv, as_json=as_json, others={"--to": to, "--out": out, "--entry": entry} | chosen)
+    if sql is not None:
+        _print_rows(run, sql, rows, as_csv=as_csv, as_json=as_json)
+        return
+    if to is None:
+        raise UsageError(
+            "missing",
+            "the format is not named",
+            "give --to FORMAT, or --sql QUERY to print rows",
+            options=["--to", "--sql"],
+        )
     from livebode import export
     from livebode.records import RunRecord, to_json
 
     formats = export.writers("model" if lpv else "parameters" if parameters else "responses")
-    chosen = {"--at": at is not None, "--mean": mean, "--parameters": parameters, "--lpv": lpv}
     chosen["--entry"] = lpv and entry is not None
     _check(to, chosen, tuple(formats))
     record = RunRecord.open(run, output_only=parameters, matrix=not lpv, entry=entry)
@@ -86,6 +110,16 @@ def export_command(
         return
     left_out = f"; {written.left_out} with fewer than two valid lines left out" if written.left_out else ""
     print(f"{path}: {counted(written.rows)} at {counted(len(record.lines), 'line')}{left_out}")
+
+
+def _print_rows(run: Path, sql: str, rows_max: int, *, as_csv: bool, as_json: bool) -> None:
+    from livebode.records import (
+        RunRecord,
+        query,  # with Arrow's data sets
+    )
+
+    found = query(RunRecord.open(run, output_only=True, matrix=True), sql, rows_max)
+    print_result(found, rows_max, as_csv=as_csv, as_json=as_json)
 
 
 def responses(record: RunRecord, at: float | None, mean: bool) -> Iterator[Responses]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from livebode.cli.commands import panels
 from livebode.cli.frames import MINIMUM_WIDTH, paragraph, table, usage
 from livebode.plugins import named
 
@@ -26,7 +27,8 @@ def first_page(width: int, *, colours: bool) -> str:
     Usage: livebode [OPTIONS] COMMAND [ARGS]...
     """
     width = max(width, MINIMUM_WIDTH)
-    summaries = {name: command.summary for name, command in named("commands").items()}
+    by_panel = panels(named("commands")).items()
+    commands = [line for title, rows in by_panel for line in table(title, rows, width, colours=colours)]
     lines = [
         "",
         usage("livebode [OPTIONS] COMMAND [ARGS]...", colours=colours),
@@ -34,7 +36,7 @@ def first_page(width: int, *, colours: bool) -> str:
         *paragraph(ABOUT, width),
         "",
         *table("Options", OPTIONS.items(), width, colours=colours),
-        *table("Commands", summaries.items(), width, colours=colours),
+        *commands,
         "",
     ]
     return "\n".join(lines) + "\n"

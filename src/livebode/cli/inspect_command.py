@@ -1,13 +1,16 @@
-"""`livebode inspect`: the contents of a recording."""
+"""`livebode inspect`: the contents of a recording, and its configuration."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from livebode.cli import terminal
-from livebode.cli.options import Dbc, Excitation, From, Json, Output, Rate, SkipPeriods, Time, To
+from livebode.cli.configuration_dialog import write_configuration
+from livebode.cli.options import Excitation, Json, Output
+from livebode.cli.recording_options import Dbc, From, Rate, SkipPeriods, Time, To
 from livebode.core import UsageError, counted
 from livebode.locations import location
 
@@ -27,11 +30,34 @@ _WIDTH_MAX = 4096
 
 def inspect_command(
     log: Annotated[str, typer.Argument(metavar="LOG", help="A recording.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the configuration, such as axis.toml: propose the role of each channel, and ask.",
+        ),
+    ] = None,
     excitation: Excitation = None,
-    output: Output = None,
     input_: Annotated[
         str | None, typer.Option("--input", metavar="CHANNEL", help="Channel of the plant input u.")
     ] = None,
+    output: Output = None,
+    schedule: Annotated[
+        str | None, typer.Option(metavar="CHANNEL", help="Channel that the responses depend on, such as the position.")
+    ] = None,
+    estimator: Annotated[
+        str | None, typer.Option(help="For --out: joint, direct, lpm or welch. \\[default: by the excitation]")
+    ] = None,
+    average: Annotated[
+        bool | None,
+        typer.Option(help="For --out: average over the previous periods. \\[default: without a schedule]"),
+    ] = None,
+    fit: Annotated[
+        str | None,
+        typer.Option(metavar="MODEL", help="For --out: model to fit: auto, two-mass, …; or none. \\[default: none]"),
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="For --out: accept every proposal without asking.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     lines: Annotated[
         str | None,
         typer.Option(metavar="HZ", help="Lines that you plan to measure, as in run: search for mains hum near them."),
@@ -47,14 +73,27 @@ def inspect_command(
     dbc: Dbc = None,
     as_json: Json = False,
 ) -> None:
-    """List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and SNR.
+    """List channels, rate, gaps and samples that are not finite; with --out propose and write axis.toml.
 
-    With --lines, search for mains hum in a recording without excitation, or in its longest pause.
+    With --excitation, also print period, lines and SNR. With --lines, search for mains hum in a recording without
+    excitation, or in its longest pause. With --out, propose the role of each channel by its unit, its name and its
+    values, ask, find lines and window, and write the configuration. What an option gives is not asked for; "-" means no
+    channel.
     """
+    part = {"--lines": lines, "--window": window, "--from": from_, "--to": to, "--skip-periods": skip_periods}
+    chosen = {"--schedule": schedule, "--estimator": estimator, "--average": average, "--fit": fit}
+    _check_out(out, part, chosen | {"--yes": yes or None, "--force": force or None})
+    if out is not None:
+        given = {"excitation": excitation, "input": input_, "output": output, "schedule": schedule}
+        write_configuration(
+            log, out, given, estimator=estimator, average=average, fit=fit, rate=rate, time=time, dbc=dbc,
+            yes=yes, force=force, as_json=as_json,
+        )  # fmt: skip
+        return
+    _check(excitation, output, input_, lines, window)
     from livebode.preparation import inspect  # with its statistics half a second to import
     from livebode.records import to_json
 
-    _check(excitation, output, input_, lines, window)
     of_lines = None if lines is None or window is None else (lines, window)
     found = inspect(
         location(log),
@@ -82,6 +121,22 @@ def inspect_command(
         console.print(f"The excitation is not recognised: {found.unrecognised}", soft_wrap=True)
     if found.estimator:
         console.print(f"estimator of a run: --estimator {found.estimator} ({_SUITS[found.estimator]})", soft_wrap=True)
+
+
+def _check_out(out: Path | None, without: dict[str, object], needing: dict[str, object]) -> None:
+    """UsageError for an option that belongs to the list of channels, or to the configuration."""
+    given = [option for option, value in (needing if out is None else without).items() if value is not None]
+    if given and out is None:
+        raise UsageError(
+            "missing",
+            f"{given[0]} is for the configuration of the recording",
+            "give --out axis.toml too",
+            options=[given[0], "--out"],
+        )
+    if given:
+        raise UsageError(
+            "conflict", f"{given[0]} and --out exclude each other", "give one of them", options=[given[0], "--out"]
+        )
 
 
 def _check(

@@ -19,38 +19,6 @@ Output = Annotated[
         metavar="CHANNEL", help="Channel of the measured output y, or an expression: -y, pos + 0.35*angle, diff(pos)."
     ),
 ]
-Outputs = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--output",
-        metavar="CHANNEL",
-        help="Channel of the measured output y, or an expression: -y, pos + 0.35*angle, diff(pos); repeat for several.",
-    ),
-]
-Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Sample rate, if the recording does not contain it.")]
-Time = Annotated[
-    str | None,
-    typer.Option(
-        metavar="COLUMN",
-        help="Time column, if it is not detected by its name; unit in brackets behind the name. none: no time column.",
-    ),
-]
-From = Annotated[
-    str | None,
-    typer.Option(
-        "--from",
-        metavar="MOMENT",
-        help="Beginning of the part to use: seconds in the time of the recording, '5000 samples' or '3 periods'.",
-    ),
-]
-To = Annotated[str | None, typer.Option("--to", metavar="MOMENT", help="End of the part to use, in the same form.")]
-SkipPeriods = Annotated[
-    int | None,
-    typer.Option(metavar="N", min=0, help="Leave out N periods at the beginning of the excitation."),
-]
-Dbc = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="DBC file that defines the signals of a recording of CAN frames.")
-]
 Entry = Annotated[
     str | None,
     typer.Option(metavar="OUTPUT/INPUT", help="Entry of a matrix run, such as velocity2/u1."),

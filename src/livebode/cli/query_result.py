@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -14,12 +15,23 @@ from livebode.core import UsageError
 if TYPE_CHECKING:
     from livebode.records import QueryResult
 
-RowsMax = Annotated[int, typer.Option("--rows", min=1, max=10_000_000, help="Maximum number of rows to print.")]
-Csv = Annotated[bool, typer.Option("--csv", help="Print the result as CSV.")]
+RowsMax = Annotated[
+    int, typer.Option("--rows", min=1, max=10_000_000, help="Maximum number of rows of --sql to print.")
+]
+Csv = Annotated[bool, typer.Option("--csv", help="Print the rows of --sql as CSV.")]
 
 
-def check_form(*, as_csv: bool, as_json: bool) -> None:
-    """UsageError if both forms are chosen."""
+def check_query(sql: str | None, *, as_csv: bool, as_json: bool, others: Mapping[str, object]) -> None:
+    """UsageError if a query has two forms or another option of the command, or --csv has no query."""
+    given = [option for option, value in others.items() if value]
+    if sql is not None and given:
+        raise UsageError(
+            "conflict", f"--sql and {given[0]} exclude each other", "give one of them", options=["--sql", given[0]]
+        )
+    if as_csv and sql is None:
+        raise UsageError(
+            "missing", "--csv is for the rows of a query", "give --sql QUERY too", options=["--csv", "--sql"]
+        )
     if as_csv and as_json:
         raise UsageError(
             "conflict",

@@ -2,27 +2,65 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from livebode.cli.band import Band
-from livebode.cli.options import Dbc, From, Json, Outputs, Port, Rate, Serve, SkipPeriods, Time, To
+from livebode.cli.options import Json, Port, Serve
+from livebode.cli.section_options import with_keys
 from livebode.core import UsageError
 from livebode.locations import location
 
 
+@with_keys(
+    source={
+        "rate_hz": ("--rate", "HZ"),
+        "time": ("--time", "COLUMN"),
+        "from": ("--from", "MOMENT"),
+        "to": ("--to", "MOMENT"),
+        "skip_periods": ("--skip-periods", "N"),
+        "dbc": ("--dbc", "FILE"),
+    },
+    signals={"schedule": ("--schedule", "CHANNEL")},
+    lines={"frequencies": ("--lines", "HZ"), "window": ("--window", "SAMPLES")},
+    tracking={
+        "estimator": ("--estimator", ""),
+        "quantity": ("--quantity", ""),
+        "hop": ("--hop", "SAMPLES"),
+        "average": ("--average", ""),
+        "forgetting": ("--forgetting", ""),
+        "noise": ("--noise", ""),
+        "differenced": ("--difference", "CHANNEL"),
+        "spikes": ("--spikes", "CHANNEL"),
+        "hann": ("--hann", ""),
+        "accept_roles": ("--accept-roles", ""),
+        "all_periods": ("--all-periods", ""),
+    },
+    monitoring={
+        "baseline": ("--baseline", "BASELINE"),
+        "false_alarm_interval_days": ("--false-alarm-interval", "DAYS"),
+        "covariates": ("--covariate", "CHANNEL"),
+    },
+)
 def run_command(
     targets: Annotated[
         list[str],
         typer.Argument(metavar="LOG|AXIS.toml", help="A recording, or several that are averaged, or a configuration."),
     ],
+    *,
     excitation: Annotated[
         list[str] | None,
         typer.Option(metavar="CHANNEL", help="Channel of the excitation w, or an expression; repeat for a matrix."),
     ] = None,
-    output: Outputs = None,
+    output: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="CHANNEL",
+            help="Channel of the measured output y, or an expression: -y, pos + 0.35*angle, diff(pos); repeat for "
+            "several.",
+        ),
+    ] = None,
     input: Annotated[
         list[str] | None,
         typer.Option(metavar="CHANNEL", help="Channel of the plant input u; repeat for a matrix of responses."),
@@ -31,82 +69,16 @@ def run_command(
         bool,
         typer.Option("--matrix", help="One run with the responses of all --output, instead of a run for each."),
     ] = False,
-    schedule: Annotated[
-        str | None, typer.Option(metavar="CHANNEL", help="Channel that the responses depend on, such as the position.")
-    ] = None,
-    rate: Rate = None,
-    time: Time = None,
-    from_: From = None,
-    to: To = None,
-    skip_periods: SkipPeriods = None,
-    dbc: Dbc = None,
-    lines: Annotated[
-        str | None,
-        typer.Option(
-            metavar="HZ", help="Lines as start:stop:step or single frequencies, separated by commas; or auto."
-        ),
-    ] = None,
-    window: Annotated[str | None, typer.Option(metavar="SAMPLES", help="Window in samples, or auto.")] = None,
-    hop: Annotated[int | None, typer.Option(metavar="SAMPLES", help="Samples between responses.")] = None,
-    estimator: Annotated[
-        str | None,
-        typer.Option(help="direct, joint or indirect; for noise and chirps lpm or welch. \\[default: joint]"),
-    ] = None,
-    quantity: Annotated[
-        str | None, typer.Option(help="plant, 'open loop', 'closed loop' or sensitivity. \\[default: plant]")
-    ] = None,
-    average: Annotated[bool | None, typer.Option(help="Average over the previous periods.")] = None,
-    forgetting: Annotated[
-        float | None, typer.Option(help="Weight of a period relative to the next one, 0 … 1. \\[default: 0.8]")
-    ] = None,
-    noise: Annotated[
-        str | None,
-        typer.Option(
-            help="Noise of the bounds: auto, periods (scatter between periods) or quiet (bins). \\[default: auto]"
-        ),
-    ] = None,
-    difference: Annotated[
-        list[str] | None,
-        typer.Option(metavar="CHANNEL", help="Use differences of this channel, such as a position that drifts."),
-    ] = None,
-    spikes: Annotated[
-        list[str] | None, typer.Option(metavar="CHANNEL", help="Exclude windows in which this channel has a spike.")
-    ] = None,
-    hann: Annotated[
-        bool | None, typer.Option(help="Use a Hann window, from three bins; for an axis in motion.")
-    ] = None,
+    sections: dict[str, dict[str, Any]],
     output_only: Annotated[
         bool,
         typer.Option("--output-only", help="Track frequencies and dampings of the modes from the output alone."),
     ] = False,
     band: Band = None,
-    baseline: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="BASELINE",
-            help="Detect changes from this baseline, a file of `livebode learn`; of matrices a healthy run.",
-        ),
-    ] = None,
-    false_alarm_interval: Annotated[
-        float | None,
-        typer.Option(metavar="DAYS", help="Mean time between false alarms, in days of judged motion. \\[default: 30]"),
-    ] = None,
-    covariate: Annotated[
-        list[str] | None,
-        typer.Option(metavar="CHANNEL", help="Channel that a baseline may depend on, such as a temperature."),
-    ] = None,
     out: Annotated[
         str | None, typer.Option(metavar="DIR", help="Run directory, or its URL. \\[default: runs/<name>]")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run in that directory.")] = False,
-    accept_roles: Annotated[
-        bool,
-        typer.Option("--accept-roles", help="Use the channels as specified, even if the recording contradicts."),
-    ] = False,
-    all_periods: Annotated[
-        bool,
-        typer.Option("--all-periods", help="Use all periods, also a transient at the beginning and outlying ones."),
-    ] = False,
     go_on: Annotated[
         bool,
         typer.Option("--continue", help="Record in segments that survive a kill; continue an existing run in --out."),
@@ -122,43 +94,17 @@ def run_command(
     has a matrix of responses from all inputs to all outputs, and singular-values.png instead of tracking.png.
     """
     as_matrix = matrix or any(len(names or []) > 1 for names in (input, excitation))
-    given: dict[str, dict[str, Any]] = {
-        "source": {
-            "rate_hz": rate,
-            "time": time,
-            "from": from_,
-            "to": to,
-            "skip_periods": skip_periods,
-            "dbc": dbc,
-        },
-        "signals": {
-            "output": (output if as_matrix else output[0]) if output else None,
-            "input": input or None,
-            "excitation": excitation or None,
-            "schedule": schedule,
-        },
-        "lines": {"frequencies": lines, "window": _window(window)},
-        "tracking": {
-            "estimator": estimator,
-            "quantity": quantity,
-            "hop": hop,
-            "average": average,
-            "forgetting": forgetting,
-            "noise": noise,
-            "differenced": difference or None,
-            "spikes": spikes or None,
-            "hann": hann,
-            "accept_roles": accept_roles or None,
-            "all_periods": all_periods or None,
-        },
-        "monitoring": {
-            "baseline": None if baseline is None else baseline.absolute(),
-            "false_alarm_interval_days": false_alarm_interval,
-            "covariates": covariate or None,
-        },
+    named = {
+        "output": (output if as_matrix else output[0]) if output else None,
+        "input": input or None,
+        "excitation": excitation or None,
     }
-    specified = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
-    over = {section: values for section, values in specified.items() if values} | ({"record": {}} if go_on else {})
+    signals = {role: channels for role, channels in named.items() if channels} | sections.get("signals", {})
+    over = sections | ({"signals": signals} if signals else {}) | ({"record": {}} if go_on else {})
+    if "window" in over.get("lines", {}):
+        over["lines"]["window"] = _window(over["lines"]["window"])
+    if "baseline" in over.get("monitoring", {}):
+        over["monitoring"]["baseline"] = over["monitoring"]["baseline"].absolute()
     from livebode.cli.running import run_targets  # with all that measures
 
     run_targets(
@@ -167,8 +113,8 @@ def run_command(
     )  # fmt: skip
 
 
-def _window(text: str | None) -> int | str | None:
-    if text is None or text == "auto":
+def _window(text: str) -> int | str:
+    if text == "auto":
         return text
     try:
         return int(text)

@@ -166,7 +166,7 @@ def _axis(recordings: list[Location], specified: dict[str, dict[str, Any]]) -> A
         raise UsageError(
             "missing",
             "the output channel is not named",
-            "give --output CHANNEL (livebode inspect lists the channels, livebode new proposes their roles)",
+            "give --output CHANNEL (livebode inspect lists the channels, with --out axis.toml it proposes their roles)",
             argument="output",
         )
     log = recordings if len(recordings) > 1 else recordings[0]

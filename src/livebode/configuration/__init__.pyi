@@ -11,6 +11,7 @@ from livebode.configuration.axis import Axis as Axis
 from livebode.configuration.axis import nearest as nearest
 from livebode.configuration.axis import read_loop as read_loop
 from livebode.configuration.axis import read_serve_section as read_serve_section
+from livebode.configuration.descriptions import documented as documented
 from livebode.configuration.experiments_section import ExperimentsSection as ExperimentsSection
 from livebode.configuration.file_kinds import FileKind as FileKind
 from livebode.configuration.file_kinds import kind_of_file as kind_of_file

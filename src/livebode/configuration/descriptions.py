@@ -31,7 +31,14 @@ def descriptions(kind: type) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     for base in reversed(kind.__mro__):
-        section = _PARAMETERS.search(inspect.cleandoc(base.__doc__ or ""))
-        for names, text in _PARAMETER.findall(section[1]) if section else ():
-            found |= dict.fromkeys(names.split(", "), " ".join(text.split()))
+        found |= documented(inspect.cleandoc(base.__doc__ or ""))
+    return found
+
+
+def documented(docstring: str) -> dict[str, str]:
+    """Description of each parameter in a docstring (numpydoc) without its indentation, on one line."""
+    found: dict[str, str] = {}
+    section = _PARAMETERS.search(docstring)
+    for names, text in _PARAMETER.findall(section[1]) if section else ():
+        found |= dict.fromkeys(names.split(", "), " ".join(text.split()))
     return found

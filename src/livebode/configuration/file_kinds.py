@@ -1,4 +1,4 @@
-"""Kinds of TOML files: those of which `livebode schema` prints the schema, and how a file shows that it is of one."""
+"""Kinds of TOML files: `livebode doctor --schema` prints the schema of each, and its tables show that a file is of it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class FileKind(NamedTuple):
     Attributes
     ----------
     schema
-        "module:name" of the function with the JSON Schema of the file NAME.toml, for `livebode schema NAME`.
+        "module:name" of the function with the JSON Schema of the file NAME.toml, for `livebode doctor --schema NAME`.
     title
         What the file describes, as "an experiment".
     tables

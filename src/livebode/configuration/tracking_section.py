@@ -20,7 +20,8 @@ class TrackingSection(ConfigurationSection):
         controllers in [loop]. For noise and single chirps, which do not repeat: "lpm" (local polynomial method) or
         "welch".
     quantity
-        The response that is estimated. All but "plant" need the controllers in [loop].
+        The response that is estimated: "plant", "open loop", "closed loop" or "sensitivity". All but "plant" need the
+        controllers in [loop].
     hop
         Samples between responses. Default: for a recording a twentieth of the window, for a live source 20 responses
         per second; the nearest divisor of the window.
@@ -34,7 +35,7 @@ class TrackingSection(ConfigurationSection):
     differenced
         Channels that are differenced before the DFT: a position that drifts.
     hann
-        Use a Hann window, from three bins.
+        Use a Hann window, from three bins; for an axis in motion.
     spikes
         Channels that are checked for spikes; windows with a spike are excluded.
     dtype

@@ -33,7 +33,7 @@ class Settled:
 
     def text(self, recording: str) -> str:
         """The configuration as TOML, with its comments."""
-        lines = [f"# Written by `livebode new` from {recording}."]
+        lines = [f"# Written by `livebode inspect` from {recording}."]
         for section, table in self.tables.items():
             lines += ["", f"[{section}]"]
             for key, value in table.items():

@@ -138,14 +138,16 @@ def test_a_model_is_validated_at_the_lines_of_another_run(folder: Path) -> None:
 
 def test_a_query_sees_the_columns(folder: Path) -> None:
     sql = "SELECT output, input, count(*) FROM responses WHERE reason = '' GROUP BY ALL ORDER BY ALL"
-    rows = json.loads(livebode("query", folder / "before", sql, "--json").out)["rows"]
+    rows = json.loads(livebode("export", folder / "before", "--sql", sql, "--json").out)["rows"]
     assert [row[:2] for row in rows] == [
         ["velocity1", "u1"],
         ["velocity1", "u2"],
         ["velocity2", "u1"],
         ["velocity2", "u2"],
     ]
-    factors = json.loads(livebode("query", folder / "before", "SELECT DISTINCT factor FROM covariance", "--json").out)
+    factors = json.loads(
+        livebode("export", folder / "before", "--sql", "SELECT DISTINCT factor FROM covariance", "--json").out
+    )
     assert sorted(row[0] for row in factors["rows"]) == ["noise", "spread"]
 
 

@@ -72,7 +72,7 @@ def test_no_sentence_calls_the_result_a_plant_or_a_response(run: tuple[Path, str
 def test_query_and_export_have_the_rows_of_the_modes(run: tuple[Path, str]) -> None:
     out, _ = run
     sql = "SELECT avg(value) FROM parameters WHERE model = 'mode 2' AND name = 'frequency' AND status = 'ok'"
-    assert json.loads(livebode("query", out, sql, "--json").out)["rows"][0][0] == pytest.approx(47.0, abs=0.5)
+    assert json.loads(livebode("export", out, "--sql", sql, "--json").out)["rows"][0][0] == pytest.approx(47.0, abs=0.5)
     done = livebode("export", out, "--to", "csv", "--parameters")
     assert (done.code, done.err) == (0, "")
 

@@ -4,31 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from livebode.cli import Command
+from livebode.cli import COMPARE, CONTROL, Command
 
 COMMANDS: Mapping[str, Command] = {
     "check-loop": Command(
         "Compare the described controllers with the recorded signals: as described, or the change that explains them.",
         "livebode_control.loop_check.check_loop_command:check_loop_command",
+        panel=CONTROL,
     ),
     "tune": Command(
         "Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.",
         "livebode_control.proposal.tune_command:tune_command",
+        panel=CONTROL,
     ),
     "shaper": Command(
         "Propose input shapers for a mode of the fitted model, over its bounds at every place of the run.",
         "livebode_control.proposal.shaper_command:shaper_command",
+        panel=CONTROL,
     ),
     "validate": Command(
         "Simulate the fitted model with another recording and test whether the residual correlates with the signals.",
         "livebode_control.validation.validate_command:validate_command",
+        panel=COMPARE,
     ),
     "friction": Command(
         "Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with bounds.",
         "livebode_control.strokes.friction_command:friction_command",
+        panel=CONTROL,
     ),
     "orders": Command(
         "Find torque that repeats with the angle: cogging, eccentricity, gears; write a feedforward table.",
         "livebode_control.strokes.orders_command:orders_command",
+        panel=CONTROL,
     ),
 }

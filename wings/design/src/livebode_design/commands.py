@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from livebode.cli import Command
+from livebode.cli import MEASURE, Command
 from livebode.configuration import FileKind
 
 COMMANDS: Mapping[str, Command] = {
@@ -12,10 +12,12 @@ COMMANDS: Mapping[str, Command] = {
         "Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml.",
         "livebode_design.design_command:design_command",
         python="livebode_design.designing:design_described",
+        panel=MEASURE,
     ),
     "measure": Command(
         "Design an excitation, play it on the controller, record, and track the response; Ctrl-C ramps it down.",
         "livebode_design.measure_command:measure_command",
+        panel=MEASURE,
     ),
 }
 

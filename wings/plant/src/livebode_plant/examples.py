@@ -108,7 +108,7 @@ PLANT_EXAMPLES = {
         "a year of a hall with eight axes, as the lake of an archive",
         {},
         (),
-        ("livebode archive trend hall Keff", "livebode archive report hall"),
+        ("livebode archive trend hall Keff", "livebode archive trend hall"),
         {"hall": write_hall},
     ),
 }

@@ -122,7 +122,7 @@ def test_each_machine_is_judged_by_its_own_baseline_and_alarms_are_not_learned(t
         for one in json.loads(command("archive", "list", archive, "--json").out)["machines"]
     }
     assert rows == {"press-1": (4, 1, 0), "press-2": (4, 1, 1)}
-    report = command("archive", "report", archive, "--out", tmp_path / "hall", "--language", "de", "--json")
+    report = command("archive", "trend", archive, "--out", tmp_path / "hall", "--language", "de", "--json")
     alarms = json.loads(report.out)["alarms"]
     assert {alarm["axis"] for alarm in alarms} == {"press-2"}
     assert "1 Lauf hat einen Alarm gegenüber der Referenz seiner Maschine: press-2." in (

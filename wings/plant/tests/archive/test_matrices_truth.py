@@ -107,7 +107,7 @@ def test_a_query_knows_outputs_and_inputs_and_single_responses_beside_them(folde
         "SELECT machine, output, input, count(*) AS n, max(list_max(re)) FROM responses JOIN runs "
         "USING (content, recipe) WHERE machine = 'left' AND list_bool_and(valid) GROUP BY ALL ORDER BY ALL"
     )
-    found = command("archive", "query", folder / "archive.toml", sql, "--json")
+    found = command("archive", "list", folder / "archive.toml", "--sql", sql, "--json")
     assert (found.code, found.err) == (0, "")
     rows = json.loads(found.out)["rows"]
     names = [(output, input) for output in NAMES[4:] for input in NAMES[2:4]]
@@ -118,6 +118,11 @@ def test_a_query_knows_outputs_and_inputs_and_single_responses_beside_them(folde
         responses = whole.entry(output, input)
         assert row[3] == len(responses)
         assert row[4] == pytest.approx(responses.value.real.max(), rel=1e-6)
-    factors = command("archive", "query", folder / "lake", "SELECT DISTINCT factor FROM covariance ORDER BY 1", "--csv")
+    factors = command(
+        "archive", "list", folder / "lake", "--sql", "SELECT DISTINCT factor FROM covariance ORDER BY 1", "--csv"
+    )
     assert factors.out == "factor\nnoise\nspread\n"
-    assert "query the tables of this lake: runs, files" in command("archive", "query", folder / "lake", "SELECT x").err
+    assert (
+        "query the tables of this lake: runs, files"
+        in command("archive", "list", folder / "lake", "--sql", "SELECT x").err
+    )

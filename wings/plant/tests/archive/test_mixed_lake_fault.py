@@ -60,7 +60,7 @@ def test_list_trend_and_report_have_the_machines_of_both_kinds(lake: Path, tmp_p
     for quantity, machine in (("J", "milling 1"), ("mode 1:frequency", "spindles 1")):
         trend = livebode("archive", "trend", lake, quantity)
         assert (trend.code, machine in trend.out) == (0, True), trend.err
-    reported = livebode("archive", "report", lake, "--out", tmp_path / "hall.html")
+    reported = livebode("archive", "trend", lake, "--out", tmp_path / "hall.html")
     assert reported.code == 0, reported.err
     page = (tmp_path / "hall.html").read_text()
     assert "milling 1" in page

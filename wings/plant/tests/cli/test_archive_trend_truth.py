@@ -88,7 +88,7 @@ def test_a_wrong_word_is_one_sentence_with_what_to_do(hall: Path, words: list[st
 def test_the_report_of_a_hall_says_what_changed_what_is_silent_and_what_is_not_assessed(
     hall: Path, tmp_path: Path, language: str, words: list[str]
 ) -> None:
-    written = livebode("archive", "report", hall, "--out", tmp_path / "hall", "--language", language, "--json")
+    written = livebode("archive", "trend", hall, "--out", tmp_path / "hall", "--language", language, "--json")
     found = json.loads(written.out)
     assert (found["axes"], found["runs"], found["quarantined"]) == (8, 1069, 1)
     assert list(found["silent"]) == ["A/L2/M1/x", "A/L2/M3/x"]
@@ -100,7 +100,7 @@ def test_the_report_of_a_hall_says_what_changed_what_is_silent_and_what_is_not_a
 
 
 def test_a_hall_without_enough_runs_has_a_report_that_says_so(hall: Path, tmp_path: Path) -> None:
-    found = livebode("archive", "report", hall, "--machine", "A/L2/M3", "--out", tmp_path / "few")
+    found = livebode("archive", "trend", hall, "--machine", "A/L2/M3", "--out", tmp_path / "few")
     assert found.code == 0
     page = (tmp_path / "few.html").read_text("utf-8")
     assert "No axis has enough runs for a trend." in page

@@ -68,11 +68,11 @@ def test_what_a_source_sends_is_tracked_checked_listed_and_replayed(
     settings = FleetSettings.read(fleet)
     owned_until_current(settings.log, settings.read_axes())
 
-    checked = livebode("fleet", "check", fleet)
+    checked = livebode("fleet", "replay", fleet)
     assert checked.out == (
         f"{2 * BATCHES} responses (axes: 1): 0 missing, 0 doubled, 0 different from one uninterrupted computation\n"
     )
-    found = json.loads(livebode("fleet", "check", fleet, "--json").out)
+    found = json.loads(livebode("fleet", "replay", fleet, "--json").out)
     assert found["axes"]["Graz/x"]["responses"] == 2 * BATCHES
 
     status = json.loads(livebode("fleet", "status", fleet, "--json").out)
@@ -106,10 +106,27 @@ def test_a_sink_and_a_sender_end_in_order_at_the_signal_of_a_service_manager(fle
 
 def test_the_configuration_of_the_server_has_the_limits_and_the_partitions(tmp_path: Path) -> None:
     (tmp_path / "fleet.toml").write_text('axes = ["axis.toml"]\npartitions = 7\n[log]\nsize_gb = 20\nresults_gb = 10')
-    text = livebode("fleet", "server", tmp_path / "fleet.toml", "--store", "/var/lib/log", "--port", "4333").out
+    text = livebode("fleet", "setup", tmp_path / "fleet.toml", "--store", "/var/lib/log", "--port", "4333").out
     assert '"127.0.0.1:4333"' in text
     assert "max_file_store: 33000000000" in text
     assert "partition(7,1,2,3,4)" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["run"], "give either FLEET.toml or --demo"),
+        (["run", "fleet.toml", "--demo"], "give either FLEET.toml or --demo"),
+        (["status"], "give either FLEET.toml or --demo AXES"),
+        (["setup"], "give either FLEET.toml, for the configuration of a server, or --user"),
+        (["setup", "fleet.toml", "--user", "view"], "give either FLEET.toml"),
+        (["setup", "--user", "edge"], "an edge needs the path of its axes, such as edge:Graz"),
+        (["setup", "--user", "view:Graz"], "choose edge:PATH, fleet, view"),
+    ],
+)
+def test_a_fleet_or_what_needs_none_is_given(words: list[str], says: str) -> None:
+    refused = livebode("fleet", *words)
+    assert (refused.code, says in refused.err) == (2, True), refused.err
 
 
 def test_without_a_server_a_command_says_so_in_one_sentence(tmp_path: Path) -> None:

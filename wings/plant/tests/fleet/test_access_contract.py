@@ -302,13 +302,13 @@ def test_a_password_in_the_address_is_refused_and_not_shown() -> None:
 
 
 def test_a_key_is_a_file_of_this_user_alone_and_never_shown(tmp_path: Path) -> None:
-    made = livebode("fleet", "credentials", "Graz/2", "--out", tmp_path)
+    made = livebode("fleet", "setup", "--user", "edge:Graz/2", "--out", tmp_path)
     path = tmp_path / "edge-Graz%2F2.nkey"
     secret = path.read_text().strip()
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert f'[users.edges]\n"Graz/2" = ["{_public(path)}"]' in made.out
     assert secret not in made.out + made.err
-    again = livebode("fleet", "credentials", "Graz/2", "--out", tmp_path)
+    again = livebode("fleet", "setup", "--user", "edge:Graz/2", "--out", tmp_path)
     assert (again.code, "File exists" in again.err) == (2, True)
     assert path.read_text().strip() == secret
     os.chmod(path, 0o640)
@@ -324,13 +324,13 @@ def test_a_key_is_a_file_of_this_user_alone_and_never_shown(tmp_path: Path) -> N
 def test_a_server_on_a_network_needs_tls_and_keys(tmp_path: Path) -> None:
     fleet = tmp_path / "fleet.toml"
     fleet.write_text('axes = ["axis.toml"]')
-    refused = livebode("fleet", "server", fleet, "--host", "0.0.0.0")
+    refused = livebode("fleet", "setup", fleet, "--host", "0.0.0.0")
     assert refused.code == 2
     assert "would be open to everyone who reaches it; set server.certificate" in refused.err
     public = write_credentials(tmp_path / "key")
     fleet.write_text(
         f'axes = ["axis.toml"]\n[server]\ncertificate = "a.pem"\nkey = "b.pem"\n[users]\nfleet = ["{public}"]'
     )
-    text = livebode("fleet", "server", fleet, "--host", "0.0.0.0").out
+    text = livebode("fleet", "setup", fleet, "--host", "0.0.0.0").out
     assert f'cert_file: "{tmp_path / "a.pem"}"' in text
     assert f"{{nkey: {public}}}" in text

@@ -88,7 +88,7 @@ def test_copies_need_servers_a_member_a_number_and_a_network_certificates() -> N
 def test_the_command_writes_the_configuration_of_each_member(tmp_path: Path) -> None:
     fleet = tmp_path / "fleet.toml"
     fleet.write_text('axes = ["a.toml"]\n[log]\nreplicas = 2\n[server]\ncluster = ["127.0.0.1:6222", "127.0.0.1:6223"]')
-    text = livebode("fleet", "server", fleet, "--member", "2").out
+    text = livebode("fleet", "setup", fleet, "--member", "2").out
     assert "server_name: log-2" in text
     assert 'listen: "127.0.0.1:6223"' in text
     assert 'routes: ["nats://127.0.0.1:6222", "nats://127.0.0.1:6223"]' in text

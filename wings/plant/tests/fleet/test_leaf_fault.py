@@ -131,7 +131,7 @@ def test_a_leaf_node_is_closed_to_the_network_and_so_is_its_way_to_the_log(fleet
     with pytest.raises(FleetError, match=r"has no \[leaf\]"):
         leaf_configuration(settings.model_copy(update={"leaf": None}), host="127.0.0.1", port=4222)
     (tmp_path / "site.toml").write_text('axes = ["a.toml"]\n[leaf]\nurl = "tls://log.plant:7422"')
-    refused = livebode("fleet", "leaf", tmp_path / "site.toml")
+    refused = livebode("fleet", "setup", tmp_path / "site.toml", "--leaf")
     assert (refused.code, "without mutual TLS; write leaf.url as tls://" in refused.err) == (2, True)
 
 

@@ -47,10 +47,10 @@ def test_another_number_is_refused_while_the_log_has_data_and_accepted_before(
     assert caught.value.code == "fleet.partitions-changed"
     fleet = tmp_path / "fleet.toml"
     fleet.write_text(f'axes = ["axis.toml"]\npartitions = 9\n[log]\nurl = "{server.url}"')
-    refused = livebode("fleet", "server", fleet, "--store", tmp_path / "store")
+    refused = livebode("fleet", "setup", fleet, "--store", tmp_path / "store")
     assert (refused.code, f"set partitions = {PARTITIONS}" in refused.err) == (2, True)
     fleet.write_text(f'axes = ["axis.toml"]\npartitions = {PARTITIONS}')
-    assert livebode("fleet", "server", fleet, "--store", tmp_path / "store").code == 0
+    assert livebode("fleet", "setup", fleet, "--store", tmp_path / "store").code == 0
 
 
 def test_limits_of_an_existing_log_follow_the_settings_at_the_start_of_the_fleet(server: LogServer) -> None:

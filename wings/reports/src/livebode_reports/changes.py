@@ -67,7 +67,9 @@ def changes(of: Compared) -> Changes:
     own = [recorded_configuration(run.summary) for run in of.runs]
     section = next((s["fit"] for s in own if "fit" in s), None)
     if section is None:
-        words = Message("No parameters: neither run has a [fit] section (`livebode new --fit auto` writes one).")
+        words = Message(
+            "No parameters: neither run has a [fit] section (`livebode inspect --out axis.toml --fit auto` writes one)."
+        )
         return Changes((), words, (), Message("No margins: they need a fit."))
     model = FitSection.model_validate(section)
     try:

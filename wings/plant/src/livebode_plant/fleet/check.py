@@ -1,4 +1,4 @@
-"""`livebode fleet check`: stored results compared, bit for bit, with one uninterrupted computation from the log."""
+"""`livebode fleet replay`: stored results compared, bit for bit, with one uninterrupted computation from the log."""
 
 from __future__ import annotations
 

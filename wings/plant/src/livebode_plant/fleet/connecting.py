@@ -140,7 +140,7 @@ def _refusal(settings: LogSection, error: Exception) -> FleetError | None:
         return FleetError(
             "log-untrusted",
             f"the log at {url} does not offer TLS",
-            "set server.certificate and server.key, and restart it with what `livebode fleet server` writes",
+            "set server.certificate and server.key, and restart it with what `livebode fleet setup` writes",
             url=url,
         )
     if "authorization" in str(error).lower():

@@ -1,4 +1,4 @@
-"""`livebode fleet demo`: a log, workers and simulated axes; a worker is killed, and nothing is lost."""
+"""`livebode fleet run --demo`: a log, workers and simulated axes; a worker is killed, and nothing is lost."""
 
 from __future__ import annotations
 

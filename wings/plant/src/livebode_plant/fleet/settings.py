@@ -29,7 +29,7 @@ class LogSection(SettingsSection):
     url
         Address of nats-server; several of a cluster are joined by commas. Off the loopback it begins with tls://.
     credentials
-        File with the secret key of this user, relative to this file; `livebode fleet credentials` writes it.
+        File with the secret key of this user, relative to this file; `livebode fleet setup --user` writes it.
     authority
         Certificate of the authority that signed the server's certificate, in PEM, relative to this file. Default: the
         authorities that this computer trusts.
@@ -94,7 +94,7 @@ class LogSection(SettingsSection):
 
 
 class ServerSection(SettingsSection):
-    """[server]: what `livebode fleet server` writes into the configuration of nats-server.
+    """[server]: what `livebode fleet setup` writes into the configuration of nats-server.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class ServerSection(SettingsSection):
 
 
 class LeafSection(SettingsSection):
-    """[leaf]: the server of a site, which `livebode fleet leaf` configures.
+    """[leaf]: the server of a site, which `livebode fleet setup --leaf` configures.
 
     Parameters
     ----------

@@ -68,7 +68,11 @@ class NatsFeed:
             As `connected`.
         """
         self._connection = await connected(
-            self._log, "livebode fleet view", self._note, disconnected_cb=self._lost, reconnected_cb=self._back
+            self._log,
+            "livebode fleet status",
+            self._note,
+            disconnected_cb=self._lost,
+            reconnected_cb=self._back,
         )
         from nats.errors import Error
 

@@ -20,7 +20,7 @@ _WAITING_MAX = 1 << 14
 
 @dataclass
 class FleetView:
-    """What `livebode fleet view` shows.
+    """What `livebode fleet status --serve` shows.
 
     Attributes
     ----------

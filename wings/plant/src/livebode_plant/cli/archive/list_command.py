@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli import Json, console, is_terminal
+from livebode.cli import Csv, Json, RowsMax, check_query, console, is_terminal, print_result
 from livebode_plant.cli.archive.options import LakeOf
 
 _COLUMNS = ("machine", "runs", "judged", "alarming", "quarantined", "first", "last")
@@ -17,15 +17,34 @@ def list_command(
     quarantined: Annotated[
         bool, typer.Option("--quarantined", help="List the recordings in quarantine, with the reason of each.")
     ] = False,
+    sql: Annotated[
+        str | None,
+        typer.Option(
+            metavar="QUERY",
+            help="Print the rows of an SQL query (DuckDB) instead; tables: runs, quantities, responses, covariance, "
+            "parameters, events…",
+        ),
+    ] = None,
+    rows: RowsMax = 1000,
+    as_csv: Csv = False,
     as_json: Json = False,
 ) -> None:
-    """List the runs of a lake by machine, and the recordings in quarantine."""
+    """List the runs of a lake by machine, and the recordings in quarantine; with --sql, query its tables.
+
+    A query has no access to files, and does not see results that are not complete.
+    """
     from livebode.records import to_json
     from livebode_plant.archive.contents import machines, quarantine
     from livebode_plant.archive.settings import lake_url
     from livebode_plant.lake import Lake
 
     lake = Lake(lake_url(archive))
+    check_query(sql, as_csv=as_csv, as_json=as_json, others={"--quarantined": quarantined})
+    if sql is not None:
+        from livebode_plant.lake.query import query_lake
+
+        print_result(query_lake(lake, sql, rows), rows, as_csv=as_csv, as_json=as_json)
+        return
     if quarantined:
         bad = quarantine(lake)
         if as_json:
@@ -35,11 +54,11 @@ def list_command(
         else:
             print("no recording is in quarantine")
         return
-    rows = [one.plain for one in machines(lake)]
+    found = [one.plain for one in machines(lake)]
     if as_json:
-        print(to_json({"machines": rows}))
-    elif rows:
-        _print(_COLUMNS, [tuple(row.values()) for row in rows])
+        print(to_json({"machines": found}))
+    elif found:
+        _print(_COLUMNS, [tuple(row.values()) for row in found])
     else:
         print(f"the lake {lake.url} has no run yet")
 

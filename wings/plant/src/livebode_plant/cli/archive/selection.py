@@ -28,7 +28,10 @@ class By(StrEnum):
 
 
 Level = Annotated[
-    By, typer.Option("--by", help="Level up to which the names of a row are the same.", case_sensitive=False)
+    By | None,
+    typer.Option(
+        "--by", help="Level up to which the names of a row are the same. \\[default: machine]", case_sensitive=False
+    ),
 ]
 Below = Annotated[str, typer.Option("--machine", metavar="PATH", help="Only what is below site/line/machine/axis.")]
 Since = Annotated[str | None, typer.Option(metavar="DATE", help="First day of the recordings, in UTC: 2025-03-01.")]
@@ -52,7 +55,7 @@ Limit = Annotated[
 
 
 _OPTIONS: Mapping[str, tuple[Any, Any]] = {
-    "by": (Level, By.machine),
+    "by": (Level, None),
     "below": (Below, ""),
     "since": (Since, None),
     "until": (Until, None),
@@ -65,20 +68,20 @@ _OPTIONS: Mapping[str, tuple[Any, Any]] = {
 class SelectionOptions:
     """What was given; a command without an option has its default here."""
 
-    by: By = By.axis
+    by: By | None = None
     below: str = ""
     since: str | None = None
     until: str | None = None
     covariate: list[str] | None = None
     recipe: str | None = None
 
-    def selection(self) -> Selection:
-        """The runs that the options select; UsageError if a date is not one."""
+    def selection(self, by: By = By.axis) -> Selection:
+        """The runs that the options select, by this level if none is given; UsageError if a date is not one."""
         from livebode_plant.trending import Selection
 
         last = day(self.until, "--until")
         return Selection(
-            self.by.value,
+            (self.by or by).value,
             self.below.strip("/"),
             day(self.since, "--since"),
             last and last + timedelta(days=1),

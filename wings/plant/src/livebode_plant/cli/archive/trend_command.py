@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from livebode.cli import Json, console, is_terminal
+from livebode.cli import Json, ReportLanguage, console, is_terminal
 from livebode.core import UsageError
 from livebode_plant.cli.archive.options import LakeOf
-from livebode_plant.cli.archive.selection import Limit, SelectionOptions, with_selection
+from livebode_plant.cli.archive.selection import By, Limit, SelectionOptions, with_selection
 
 if TYPE_CHECKING:
     from livebode_plant.trending import Assessment, Ranked
@@ -22,37 +22,55 @@ _NUMBERS = ("runs",)
 @with_selection("by", "below", "since", "until", "covariate", "recipe")
 def trend_command(
     archive: LakeOf,
-    quantity: Annotated[
-        str, typer.Argument(metavar="QUANTITY", help="Name as in `livebode fit`, or MODEL:NAME if several have it.")
-    ],
     chosen: SelectionOptions,
+    quantity: Annotated[
+        str | None,
+        typer.Argument(metavar="QUANTITY", help="Name as in `livebode fit`, or MODEL:NAME if several have it."),
+    ] = None,
     limit: Limit = 10.0,
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Also write the worst machine's picture (.png) or the table of all machines (.csv)."
+            metavar="FILE",
+            help="Also write the worst machine's picture (.png) or the table of all machines (.csv); without QUANTITY "
+            "write FILE.html and FILE.pdf. \\[default: hall-report]",
         ),
     ] = None,
     dark: Annotated[bool, typer.Option("--dark", help="Draw the picture light on dark.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    name: Annotated[
+        str, typer.Option(metavar="TEXT", help="Title of the page, without QUANTITY. \\[default: name of the lake]")
+    ] = "",
+    language: ReportLanguage = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Find how a quantity changes over months, for each machine: slope, jumps and bends with bounds.
+    """Find how a quantity changes over months, for each machine; without QUANTITY, write all of them as one page.
 
     The influence of covariates, such as a temperature, is removed. Bounds cover 95 % and allow for outliers and for
     scatter that is correlated from run to run. The worst machine comes first. An asterisk marks a significant change:
     of the machines marked, at most 5 % are expected to be unchanged.
+
+    The page of all quantities contains alarms of recordings that were compared with a baseline, significant changes in
+    words, pictures of the worst machines, machines without data, and what was not assessed and why. The PDF needs the
+    extra `pdf`.
     """
     from livebode.records import to_json
     from livebode_plant.archive.settings import lake_url
+    from livebode_plant.cli.archive.hall_pages import write_hall_pages
     from livebode_plant.lake import Lake
     from livebode_plant.trending import assess, history
 
+    _check(quantity, {"--by": chosen.by is not None, "--dark": dark}, {"--name": name, "--language": language})
+    lake = Lake(lake_url(archive))
+    if quantity is None:
+        pages = out or Path("hall-report")
+        write_hall_pages(lake, chosen.selection(), name, limit, language or "en", pages, force=force, as_json=as_json)
+        return
     if out is not None and out.suffix.lower() not in (".png", ".csv"):
         raise UsageError(
             "unreadable", f"--out={str(out)!r} is neither a .png nor a .csv", "choose one of them", argument="--out"
         )
-    found = history(Lake(lake_url(archive)), quantity, chosen.selection())
+    found = history(lake, quantity, chosen.selection(By.machine))
     (of,) = assess([found], limit)
     if out is not None:
         _write(of, out, dark=dark, force=force)
@@ -62,6 +80,15 @@ def trend_command(
     _print(of, limit)
     if out is not None:
         print(out)
+
+
+def _check(quantity: str | None, of_one: dict[str, Any], of_all: dict[str, Any]) -> None:
+    """UsageError for an option of the other kind of result."""
+    given = [option for option, value in (of_one if quantity is None else of_all).items() if value]
+    if given:
+        what = "one quantity" if quantity is None else "the page of all quantities"
+        remedy = "name a QUANTITY" if quantity is None else "leave out the QUANTITY"
+        raise UsageError("conflict", f"{given[0]} is for {what}", f"{remedy}, or omit it", options=given[:1])
 
 
 def plain(of: Assessment) -> dict[str, Any]:

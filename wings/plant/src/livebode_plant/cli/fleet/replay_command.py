@@ -1,4 +1,4 @@
-"""`livebode fleet replay`: an axis computed again from the log."""
+"""`livebode fleet replay`: results computed again from the log, to compare the stored ones or to write one axis."""
 
 from __future__ import annotations
 
@@ -12,32 +12,69 @@ from livebode.cli import Json
 from livebode_plant.cli.fleet.options import Fleet
 
 if TYPE_CHECKING:
+    from livebode_plant.fleet.check import CheckResult
     from livebode_plant.fleet.replay import ReplayedAxis
+    from livebode_plant.fleet.settings import FleetSettings
 
 
 def replay_command(
     fleet: Fleet,
-    axis: Annotated[str, typer.Argument(metavar="AXIS", help="Path of the axis: site/line/machine/axis.")],
-    from_: Annotated[
-        datetime | None, typer.Option("--from", metavar="TIME", help="Beginning, in local time. Default: of the log.")
+    axis: Annotated[
+        str | None, typer.Argument(metavar="AXIS", help="Path of one axis to write: site/line/machine/axis.")
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Parquet file to write.")] = Path("replay.parquet"),
+    from_: Annotated[
+        datetime | None,
+        typer.Option("--from", metavar="TIME", help="Beginning for AXIS, in local time. \\[default: of the log]"),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Parquet file to write for AXIS.")] = Path("replay.parquet"),
     as_json: Json = False,
 ) -> None:
-    """Compute the responses and fits of an axis again from the log, and write them as tables.
+    """Compute results again from the log: compare the stored ones bit for bit, or write those of an AXIS.
 
-    With [fit] its parameters, derived quantities and margins are in a second one, FILE-parameters.parquet.
+    The fleet may run meanwhile. Exit code 2 if a response, parameter or event is missing, doubled or different. Of an
+    AXIS the responses are written as a table; with [fit] its parameters, derived quantities and margins are in a second
+    one, FILE-parameters.parquet.
     """
+    from livebode_plant.fleet.settings import FleetSettings
+
+    settings = FleetSettings.read(fleet)
+    if axis is None:
+        _compare(settings, as_json=as_json)
+    else:
+        _write(settings, axis, 0.0 if from_ is None else from_.timestamp(), out, as_json=as_json)
+
+
+def _compare(settings: FleetSettings, *, as_json: bool) -> None:
+    import asyncio
+
+    from livebode.records import to_json
+    from livebode_plant.cli.fleet.verdict import require_exact, verdict
+    from livebode_plant.fleet.check import check_results
+    from livebode_plant.fleet.log import FleetLog
+
+    axes = settings.read_axes()
+
+    async def check() -> CheckResult:
+        async with FleetLog(settings.log, "livebode replay") as log:
+            return await check_results(log, axes)
+
+    result = asyncio.run(check())
+    if as_json:
+        print(to_json(result.as_dict()))
+    require_exact(result)
+    if not as_json:
+        print(verdict(result))
+
+
+def _write(settings: FleetSettings, axis: str, begin_s: float, out: Path, *, as_json: bool) -> None:
     import asyncio
 
     from livebode.core import FleetError, nearest_name
     from livebode.records import to_json
     from livebode_plant.fleet.log import FleetLog
     from livebode_plant.fleet.replay import replayed, write_replayed
-    from livebode_plant.fleet.settings import FleetSettings
     from livebode_plant.fleet.subjects import axis_path
 
-    settings = FleetSettings.read(fleet)
     axes = settings.read_axes()
     keys = {axis_path(key): key for key in axes}
     if axis not in keys:
@@ -45,7 +82,7 @@ def replay_command(
 
     async def replay() -> ReplayedAxis:
         async with FleetLog(settings.log, "livebode replay") as log:
-            return await replayed(log, keys[axis], axes[keys[axis]], 0.0 if from_ is None else from_.timestamp())
+            return await replayed(log, keys[axis], axes[keys[axis]], begin_s)
 
     files = write_replayed(asyncio.run(replay()), out)
     if as_json:

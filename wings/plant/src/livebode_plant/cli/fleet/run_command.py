@@ -3,19 +3,51 @@
 from __future__ import annotations
 
 import threading
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from livebode.cli import Json
-from livebode.core import calls_at_end
-from livebode_plant.cli.fleet.options import Fleet
+from livebode.core import UsageError, calls_at_end
 
 _STEP_S = 0.25
+_DEMO_AXES, _DEMO_WORKERS, _DEMO_S = 20, 3, 20.0
 
 
-def run_command(fleet: Fleet, as_json: Json = False) -> None:
+def run_command(
+    fleet: Annotated[
+        Path | None, typer.Argument(metavar="FLEET.TOML", help="Configuration of the fleet; not for --demo.")
+    ] = None,
+    demo: Annotated[
+        bool,
+        typer.Option(
+            "--demo",
+            help="Start a log, three workers and 20 simulated axes for 20 s instead, kill a worker, and check that "
+            "nothing is lost.",
+        ),
+    ] = False,
+    as_json: Json = False,
+) -> None:
     """Start the workers of a fleet on this computer, and replace those that end or freeze, until Ctrl-C or SIGTERM.
 
     Nothing has to be ended in order: what is not stored yet is computed again from the log at the next start.
     """
+    if (fleet is None) != demo:
+        raise UsageError(
+            "options",
+            "give either FLEET.toml or --demo",
+            "`livebode fleet run --demo` needs no fleet",
+            options=["--demo"],
+        )
+    if fleet is None:
+        _run_demo(as_json=as_json)
+    else:
+        _run(fleet, as_json=as_json)
+
+
+def _run(fleet: Path, *, as_json: bool) -> None:
     from livebode_plant.fleet.worker_process import import_early
 
     import_early()  # beside the imports of this process
@@ -44,3 +76,24 @@ def run_command(fleet: Fleet, as_json: Json = False) -> None:
             coordinator.step()
     if not as_json:
         print("stopped; the log has everything that is not processed yet")
+
+
+def _run_demo(*, as_json: bool) -> None:
+    import tempfile
+
+    from livebode.records import to_json
+    from livebode_plant.cli.fleet.verdict import require_exact, verdict
+    from livebode_plant.fleet.demo import demo
+
+    began = time.monotonic()
+
+    def say(sentence: str) -> None:
+        if not as_json:
+            print(f"{time.monotonic() - began:5.1f} s  {sentence}", flush=True)
+
+    with tempfile.TemporaryDirectory(prefix="livebode-fleet-") as folder:
+        result = demo(Path(folder), axes=_DEMO_AXES, workers=_DEMO_WORKERS, seconds=_DEMO_S, say=say)
+    if as_json:
+        print(to_json(result.check.as_dict() | {"silence_s": result.silence_s}))
+    require_exact(result.check)
+    say(verdict(result.check))

@@ -2,16 +2,62 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
-from livebode.cli import Json, console
-from livebode_plant.cli.fleet.options import Fleet
+import typer
+
+from livebode.cli import Json, Port, ServeFile, console
+from livebode.core import UsageError
 
 _SHOWN = 20
 
 
-def status_command(fleet: Fleet, as_json: Json = False) -> None:
-    """Show partitions, axes, backlog and losses of a fleet."""
+def status_command(
+    fleet: Annotated[
+        Path | None, typer.Argument(metavar="FLEET.TOML", help="Configuration of the fleet; not for --demo.")
+    ] = None,
+    serve: Annotated[
+        bool, typer.Option("--serve", help="Show a tile for each axis in a browser instead, until Ctrl-C.")
+    ] = False,
+    demo: Annotated[
+        int | None, typer.Option(metavar="AXES", min=1, max=200_000, help="Show a simulated fleet of so many axes.")
+    ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PLAN.svg",
+            help="Floor plan of the page: elements whose id or data-axis is the path of an axis or a machine show its "
+            "state.",
+        ),
+    ] = None,
+    trends: Annotated[
+        str, typer.Option(metavar="URL", help="Page of trends, such as that of `livebode view`; each axis links to it.")
+    ] = "",
+    port: Port = None,
+    axis: ServeFile = None,
+    as_json: Json = False,
+) -> None:
+    """Show partitions, axes, alarms, backlog and losses of a fleet; with --serve a page with a tile for each axis.
+
+    Acknowledgements and shelves on the page are stored in the log of the fleet, so that all pages of it show the same.
+    """
+    if (fleet is None) == (demo is None):
+        raise UsageError(
+            "options",
+            "give either FLEET.toml or --demo AXES",
+            "`livebode fleet status --demo 10000` shows a simulated fleet in a browser",
+            options=["--demo"],
+        )
+    if serve or fleet is None:
+        from livebode_plant.cli.fleet.fleet_page import serve_page
+
+        serve_page(fleet, demo, plan, trends, port, axis)
+    else:
+        _print_status(fleet, as_json=as_json)
+
+
+def _print_status(fleet: Path, *, as_json: bool) -> None:
     import asyncio
 
     from livebode.records import to_json

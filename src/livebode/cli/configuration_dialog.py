@@ -1,4 +1,4 @@
-"""`livebode new`: ask for what a configuration needs, and write it."""
+"""Ask for what the configuration of a recording needs, and write it: `livebode inspect --out`."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from livebode.cli import terminal
-from livebode.cli.options import Dbc, Excitation, Json, Output, Rate, Time
 from livebode.cli.shell import command_line
 from livebode.core import OutputError, UsageError, write_whole, writing
 from livebode.locations import Location, Url, location
@@ -33,44 +30,31 @@ _ESTIMATORS = ("joint", "direct", "lpm", "welch")
 _MODELS = ("none", "auto", "rigid", "two-mass", "three-mass")
 
 
-def new_command(
-    log: Annotated[str, typer.Argument(metavar="LOG", help="A recording.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The configuration to write.")] = Path("axis.toml"),
-    excitation: Excitation = None,
-    input_: Annotated[
-        str | None, typer.Option("--input", metavar="CHANNEL", help="Channel of the plant input u.")
-    ] = None,
-    output: Output = None,
-    schedule: Annotated[
-        str | None, typer.Option(metavar="CHANNEL", help="Channel that the responses depend on, such as the position.")
-    ] = None,
-    estimator: Annotated[
-        str | None, typer.Option(help="joint, direct, lpm or welch. \\[default: by the excitation]")
-    ] = None,
-    average: Annotated[
-        bool | None, typer.Option(help="Average over the previous periods. \\[default: without a schedule]")
-    ] = None,
-    fit: Annotated[
-        str | None, typer.Option(metavar="MODEL", help="Model to fit: auto, two-mass, …; or none. \\[default: none]")
-    ] = None,
-    rate: Rate = None,
-    time: Time = None,
-    dbc: Dbc = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Take every proposal without asking.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
-    as_json: Json = False,
+def write_configuration(
+    log: str,
+    out: Path,
+    given: dict[str, str | None],
+    *,
+    estimator: str | None,
+    average: bool | None,
+    fit: str | None,
+    rate: float | None,
+    time: str | None,
+    dbc: Path | None,
+    yes: bool,
+    force: bool,
+    as_json: bool,
 ) -> None:
     """Write the configuration of a recording: list its channels, propose their roles, ask, and find lines and window.
 
-    What an option gives is not asked for; "-" means no channel.
+    What is given is not asked for; "-" is no channel.
     """
     from livebode.preparation import Proposals, settled, suitable_estimator
     from livebode.records import to_json
     from livebode.sources import open_log
 
     asks = not (yes or as_json)
-    _check_new(out, force)
-    given = {"excitation": excitation, "input": input_, "output": output, "schedule": schedule}
+    _check_replaceable(out, force)
     place = location(log)
     recording = open_log(place, rate_hz=rate, time=time, dbc=dbc)
     if asks:
@@ -106,7 +90,7 @@ def new_command(
     print(f"{out}\nTrack it: {command_line('livebode', 'run', str(out))}")
 
 
-def _check_new(out: Path, force: bool) -> None:
+def _check_replaceable(out: Path, force: bool) -> None:
     if out.is_dir() or (out.exists() and not force):
         raise OutputError(
             "exists",

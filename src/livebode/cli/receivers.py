@@ -1,14 +1,13 @@
-"""`livebode publish`: the receivers of a configuration, and a test message to each."""
+"""The receivers of a configuration, and a test message to each: `livebode doctor --receivers`."""
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from livebode.cli.options import Json
 from livebode.core import LivebodeError, PublishError
 
 if TYPE_CHECKING:
@@ -16,14 +15,15 @@ if TYPE_CHECKING:
     from livebode.publishing import EventMessage
 
 
-def publish_command(
-    configuration: Annotated[Path, typer.Argument(metavar="AXIS.toml", help="The configuration.")] = Path("axis.toml"),
-    test: Annotated[bool, typer.Option("--test", help="Send a test message to each receiver.")] = False,
-    as_json: Json = False,
-) -> None:
-    """List the receivers of events and results in a configuration; --test sends a message to each.
+def show_receivers(configuration: Path, *, test: bool, as_json: bool) -> None:
+    """Print one line for each [[publish]] section: what is sent, or the result of a test message.
 
-    One line for each [[publish]] section: with --test the result, else what is sent. Exit code 2 if a test failed.
+    Raises
+    ------
+    PublishError
+        If the configuration has no such section.
+    typer.Exit
+        With code 2 if a test failed.
     """
     from livebode.configuration import ConfigurationFile
     from livebode.publishing import exposure, sections_of

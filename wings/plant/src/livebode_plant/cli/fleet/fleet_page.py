@@ -1,52 +1,23 @@
-"""`livebode fleet view`: the page of a fleet."""
+"""`livebode fleet status --serve`: the page of a fleet."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from livebode.cli import Port, ServeFile
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
     from livebode_plant.page.fleet_feed import StatusFeed
 
 
-def view_command(
-    fleet: Annotated[
-        Path | None, typer.Argument(metavar="FLEET.toml", help="The fleet: its \\[log] says where the log is.")
-    ] = None,
-    demo: Annotated[
-        int | None, typer.Option(metavar="AXES", min=1, max=200_000, help="Show a simulated fleet of so many axes.")
-    ] = None,
-    plan: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PLAN.svg",
-            help="Floor plan: elements whose id or data-axis is the path of an axis or a machine show its state.",
-        ),
-    ] = None,
-    trends: Annotated[
-        str, typer.Option(metavar="URL", help="Page of trends, such as that of `livebode view`; each axis links to it.")
-    ] = "",
-    port: Port = None,
-    axis: ServeFile = None,
+def serve_page(
+    fleet: Path | None, demo: int | None, plan: Path | None, trends: str, port: int | None, axis: Path | None
 ) -> None:
-    """Show a tile for each axis of a fleet in a browser, with alarms, workers and gaps, until Ctrl-C.
-
-    Acknowledgements and shelves are stored in the log of the fleet, so that all pages of it show the same.
-    """
+    """Serve the page of a fleet, or of a simulated one with so many axes, until Ctrl-C."""
     from livebode.cli import dashboard_of, print_line, wait_for_the_end
     from livebode.configuration import ServeSection, read_serve_section
 
-    if (fleet is None) == (demo is None):
-        raise UsageError(
-            "options",
-            "give either FLEET.toml or --demo AXES",
-            "`livebode fleet view --demo 10000` shows a simulated fleet",
-        )
     if trends and not trends.startswith(("https://", "http://", "/")):
         raise UsageError("unreadable", f"{trends!r} is not an address", "begin it with https://", argument="trends")
     dashboard = dashboard_of(ServeSection() if axis is None else read_serve_section(axis), port)

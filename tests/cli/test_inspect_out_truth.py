@@ -1,4 +1,4 @@
-"""`livebode new`: the configuration that it writes has the roles, lines and window of the simulated machine."""
+"""`livebode inspect --out`: its configuration has the roles, lines and window of the simulated machine."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def written(folder: Path, log: str, *options: object) -> dict[str, dict[str, object]]:
     out = folder / "axis.toml"
-    result = livebode("new", folder / log, "--yes", "--force", "--out", out, *options)
+    result = livebode("inspect", folder / log, "--yes", "--force", "--out", out, *options)
     assert result.code == 0, result.err
     return tomllib.loads(out.read_text("utf-8"))
 
@@ -54,7 +54,7 @@ def test_without_units_the_names_suffice_and_without_both_the_sentence_lists_the
     assert written(tmp_path, "log.csv")["signals"] == {"excitation": "w", "input": "u", "output": "y"}
     renamed = {"t": given["t"], "a": given["w"], "b": given["u"], "c": given["y"]}
     write_csv(tmp_path / "names.csv", renamed)
-    refused = livebode("new", tmp_path / "names.csv", "--yes", "--out", tmp_path / "other.toml")
+    refused = livebode("inspect", tmp_path / "names.csv", "--yes", "--out", tmp_path / "other.toml")
     assert refused.code == 2
     assert "not recognised among t, a, b, c; give --output CHANNEL" in refused.err
     roles = written(tmp_path, "names.csv", "--output", "c", "--input", "b")["signals"]
@@ -63,7 +63,9 @@ def test_without_units_the_names_suffice_and_without_both_the_sentence_lists_the
 
 def test_exchanged_roles_are_refused_and_nothing_is_written(folder: Path) -> None:
     out = folder / "exchanged.toml"
-    refused = livebode("new", folder / "standstill.csv", "--yes", "--out", out, "--input", "velocity", "--output", "u")
+    refused = livebode(
+        "inspect", folder / "standstill.csv", "--yes", "--out", out, "--input", "velocity", "--output", "u"
+    )
     assert refused.code == 2
     assert "'velocity'" in refused.err
     assert not out.exists()
@@ -73,20 +75,35 @@ def test_an_existing_file_and_a_missing_terminal_are_one_sentence_each(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     existing = folder / "standstill.toml"
-    refused = livebode("new", folder / "standstill.csv", "--yes", "--out", existing)
+    refused = livebode("inspect", folder / "standstill.csv", "--yes", "--out", existing)
     assert (refused.code, refused.err.count("\n")) == (2, 1)
     assert "replace it with --force" in refused.err
     with open(os.devnull) as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
-        refused = livebode("new", folder / "standstill.csv", "--out", folder / "asked.toml")
-        missing = livebode("new", folder / "nofile.csv", "--out", folder / "asked.toml")
+        refused = livebode("inspect", folder / "standstill.csv", "--out", folder / "asked.toml")
+        missing = livebode("inspect", folder / "nofile.csv", "--out", folder / "asked.toml")
     assert "there is no terminal to ask on; take the proposals with --yes" in refused.err
     assert "there is no file" in missing.err
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--schedule", "x"), "--schedule is for the configuration of the recording; give --out axis.toml too"),
+        (("--no-average",), "--average is for the configuration"),
+        (("--out", "other.toml", "--from", "3"), "--from and --out exclude each other"),
+    ],
+)
+def test_an_option_of_the_list_or_of_the_configuration_belongs_to_it(
+    folder: Path, words: tuple[str, ...], says: str
+) -> None:
+    refused = livebode("inspect", folder / "standstill.csv", *words)
+    assert (refused.code, says in refused.err) == (2, True), refused.err
+
+
 def test_json_gives_the_configuration(folder: Path) -> None:
     out = folder / "json.toml"
-    result = livebode("new", folder / "chirp.csv", "--json", "--out", out)
+    result = livebode("inspect", folder / "chirp.csv", "--json", "--out", out)
     assert json.loads(result.out)["configuration"] == tomllib.loads(out.read_text("utf-8"))
 
 
@@ -96,7 +113,9 @@ def test_on_a_terminal_it_lists_the_channels_asks_again_after_a_wrong_name_and_t
         ("Excitation", "nonsense"), ("select one", "2"), ("Input", ""), ("Output", "velocity"), ("Schedule", "-"),
         ("Estimator", ""), ("Average", "n"), ("Model", "two-mass"),
     ]  # fmt: skip
-    code, text = on_terminal("new", folder / "moving.parquet", "--out", out, columns=120, kind="dumb", answers=answers)
+    code, text = on_terminal(
+        "inspect", folder / "moving.parquet", "--out", out, columns=120, kind="dumb", answers=answers
+    )
     assert code == 0, text
     assert "torque" in text
     assert tomllib.loads(out.read_text("utf-8"))["signals"] == {"excitation": "w", "input": "u", "output": "velocity"}
