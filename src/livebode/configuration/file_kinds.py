@@ -1,4 +1,4 @@
-"""Kinds of TOML files: `livebode doctor --schema` prints the schema of each, and its tables show that a file is of it."""
+"""Kinds of TOML files: `livebode doctor --schema` prints the schema of each, and its tables show the kind of a file."""
 
 from __future__ import annotations
 
