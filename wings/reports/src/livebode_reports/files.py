@@ -22,19 +22,13 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
     OutputError
         If a file exists and must not be replaced, or cannot be written.
     """
-    from livebode.export import save
+    from livebode.export import check_free, save
     from livebode_reports.html import to_html
     from livebode_reports.svg import pictures_svg
 
     base = out.with_suffix("") if out.suffix.lower() in (".html", ".pdf") else out
     page, paper = (base.with_name(base.name + ending) for ending in (".html", ".pdf"))
-    if not force and paper.exists():
-        raise OutputError(
-            "exists",
-            f"{str(paper)!r} exists already",
-            "choose another --out, or replace it with --force",
-            path=str(paper),
-        )
+    check_free(paper, force=force)
     drawn = pictures_svg(document)
     save(page, lambda partial: partial.write_text(to_html(document, drawn), encoding="utf-8"), force=force)
     try:

@@ -9,12 +9,12 @@ from livebode.cli import COMPARE, RESULTS, Command
 COMMANDS: Mapping[str, Command] = {
     "report": Command(
         "Write the measurement and its results as report.html and report.pdf, with the verdict on page 1.",
-        "livebode_reports.report_command:report_command",
+        "livebode_reports.cli.report_command:report_command",
         panel=RESULTS,
     ),
     "compare": Command(
         "Find the lines, parameters and margins that differ between two runs, with amounts and bounds.",
-        "livebode_reports.compare_command:compare_command",
+        "livebode_reports.cli.compare_command:compare_command",
         panel=COMPARE,
     ),
 }

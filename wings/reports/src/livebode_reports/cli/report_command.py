@@ -12,7 +12,7 @@ import typer
 from livebode.cli import Entry, Json, ReportLanguage, results_directory
 from livebode.estimates import kind_of
 from livebode.locations import location
-from livebode_reports.report_options import (
+from livebode_reports.cli.report_options import (
     Appendix,
     Ask,
     Company,

@@ -13,7 +13,7 @@ import typer
 from livebode.cli import Entry, Json, ReportLanguage
 from livebode.core import UsageError
 from livebode.locations import location
-from livebode_reports.report_options import (
+from livebode_reports.cli.report_options import (
     Appendix,
     Ask,
     Company,
