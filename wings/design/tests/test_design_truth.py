@@ -15,14 +15,13 @@ from livebode import Lines, open_log
 from livebode.core import LivebodeError
 from livebode.excitation import Waveform, multisine
 from livebode.records import RunRecord
-from livebode.report import save_excitation_picture
 from livebode.simulation import SimulatedAxis
-from livebode_design import Experiment, choose, write
+from livebode_design import Experiment, choose, save_excitation_picture, write
 from tests.support.command import livebode, write_parquet
 from tests.support.schemas import validator
 from tools.structured_text import Machine
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 BELT = """
 [belt.sensor]
 noise_rad_per_s = 0.05
