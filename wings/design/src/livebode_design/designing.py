@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from livebode.configuration import axis_schema, kind_of_file, read_table
 from livebode.core import (
@@ -52,9 +52,9 @@ class DescribedExperiment(Protocol[D]):
         "module:name" of what prints a design, and of what draws it to a file.
     """
 
-    formats: Sequence[str]
-    terminal: str
-    picture: str
+    formats: ClassVar[Sequence[str]]
+    terminal: ClassVar[str]
+    picture: ClassVar[str]
 
     @property
     def log(self) -> str: ...
@@ -173,7 +173,8 @@ def design_described(
 ) -> AnyDesign:
     """The design of what is `described`; its files are written to `directory`, in every format; None: nothing is."""
     found = described(experiment, over)
-    return found.design() if directory is None else design_experiment(found, directory).design
+    design: AnyDesign = found.design() if directory is None else design_experiment(found, directory).design
+    return design
 
 
 def _check_names(name: str, log: str) -> None:
