@@ -16,7 +16,8 @@ from livebode.core import LivebodeError
 from livebode.excitation import Waveform, multisine
 from livebode.records import RunRecord
 from livebode.simulation import SimulatedAxis
-from livebode_design import Experiment, choose, save_excitation_picture, write
+from livebode_design import Experiment, choose, write
+from livebode_design.excitation_picture import save_excitation_picture
 from tests.support.command import livebode, write_parquet
 from tests.support.schemas import validator
 from tools.structured_text import Machine

@@ -10,7 +10,6 @@ from livebode_design.belt import belt_machine as belt_machine
 from livebode_design.design import Choice as Choice
 from livebode_design.design import Design as Design
 from livebode_design.designing import design_experiment as design_experiment
-from livebode_design.excitation_picture import save_excitation_picture as save_excitation_picture
 from livebode_design.experiment import Experiment as Experiment
 from livebode_design.files import FORMATS as FORMATS
 from livebode_design.files import as_lines as as_lines
