@@ -22,7 +22,7 @@ from tests.support.command import livebode, write_parquet
 from tests.support.schemas import validator
 from tools.structured_text import Machine
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 BELT = """
 [belt.sensor]
 noise_rad_per_s = 0.05

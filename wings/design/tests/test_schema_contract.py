@@ -18,7 +18,7 @@ from livebode_design.experiment_schema import experiment_schema
 from livebode_design.matrix.matrix_experiment import TABLES as MACHINES
 from tests.support.schemas import tables, validator, values_of, with_value
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SCHEMA = experiment_schema()
 VALID = validator(SCHEMA)
 TABLES = dict(tables(SCHEMA))

@@ -1,4 +1,5 @@
 from livebode_design._choose import choose as choose
+from livebode_design._choose import equal_snr as equal_snr
 from livebode_design._peaks import Peak as Peak
 from livebode_design._peaks import peaks as peaks
 from livebode_design._peaks import worst as worst
@@ -9,7 +10,6 @@ from livebode_design.belt import belt_machine as belt_machine
 from livebode_design.design import Choice as Choice
 from livebode_design.design import Design as Design
 from livebode_design.designing import design_experiment as design_experiment
-from livebode_design.excitation_picture import excitation_figure as excitation_figure
 from livebode_design.experiment import Experiment as Experiment
 from livebode_design.files import FORMATS as FORMATS
 from livebode_design.files import as_lines as as_lines
@@ -21,9 +21,7 @@ from livebode_design.machine import QUANTITIES as QUANTITIES
 from livebode_design.machine import UNITS as UNITS
 from livebode_design.machine import Machine as Machine
 from livebode_design.machine import OperatingPoint as OperatingPoint
-from livebode_design.make import equal_snr as equal_snr
 from livebode_design.matrix.matrix_experiment import MatrixExperiment as MatrixExperiment
-from livebode_design.matrix.matrix_picture import matrix_excitation_figure as matrix_excitation_figure
 from livebode_design.measured import MeasuredResponse as MeasuredResponse
 from livebode_design.measured import Output as Output
 from livebode_design.measured import measured_machine as measured_machine

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import ceil, inf
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from livebode.core import DesignError, rounded_down
+from livebode.arrays import Floats
+from livebode.core import DesignError, Lines, UsageError, rounded_down
 from livebode.estimation import default_hop
-from livebode.excitation import Waveform
+from livebode.excitation import Phases, Waveform, chirp, multisine, prbs, stepped_sine
 from livebode_design._peaks import Peak, peaks
 from livebode_design.accuracy import accuracy_of
 from livebode_design.design import Design
 from livebode_design.explain import explained
-from livebode_design.grid import grid
+from livebode_design.grid import LineChoice, grid
 from livebode_design.limits import MachineLimits, beyond, check_known, room
 from livebode_design.machine import Machine
-from livebode_design.make import REACHED, unit_waveform
 from livebode_design.spec import ExperimentSpec
 
 # Of the room that the limits leave: reserve for errors of the prediction.
@@ -28,6 +30,7 @@ _RAMP_S = 0.5
 _STROKES_MIN = 2  # forward and return
 _LONG_S = 3600.0
 _TRIES = 100  # to find an amplitude that passes when rounded to the drive's steps
+_REACHED = 1e-9  # share of a crest factor that is rounding
 _WINDOWS_MIN = 10  # sigma is estimated from the scatter between periods, which needs several
 
 
@@ -43,7 +46,7 @@ def choose(spec: ExperimentSpec, machine: Machine, limits: MachineLimits | None 
     limits = limits or MachineLimits()
     check_known(machine, limits)
     found = grid(spec, machine.rate_hz)
-    unit = unit_waveform(spec, found, machine)
+    unit = _unit_waveform(spec, found, machine)
     of_unit = peaks(unit, machine)  # rejected where it has power outside of the known band of the machine
     factor, why = _factor(spec, unit, of_unit, machine, limits)
     waveform = _played(spec, unit, factor)
@@ -82,7 +85,7 @@ def _played(spec: ExperimentSpec, unit: Waveform, factor: float) -> Waveform:
     if spec.resolution_n_m is None:
         return waveform
     waveform = waveform.quantised(spec.resolution_n_m)
-    if spec.crest_factor_max is not None and waveform.crest_factor > spec.crest_factor_max * (1 + REACHED):
+    if spec.crest_factor_max is not None and waveform.crest_factor > spec.crest_factor_max * (1 + _REACHED):
         raise DesignError(
             "crest-factor-not-reached",
             f"rounding to steps of {spec.resolution_n_m:g} N m gives a crest factor "
@@ -151,3 +154,102 @@ def _recording(waveform: Waveform, machine: Machine, windows: int) -> tuple[floa
     why = "averaged" if windows > _WINDOWS_MIN else "to estimate sigma"
     seconds = (many + 1) * waveform.lines.window / waveform.lines.rate_hz
     return seconds, f"{many} windows, {why}, and one before the first is whole"
+
+
+def _unit_waveform(spec: ExperimentSpec, found: LineChoice, machine: Machine) -> Waveform:
+    """The excitation with an amplitude of 1 N m (of a list: with those), before limits and accuracy are applied."""
+    lines = found.lines
+    about: dict[str, Any] = {"kind": spec.kind, "seed": spec.seed}
+    if spec.kind == "prbs":
+        about |= {"order": found.order, "rate_divider": found.rate_divider}
+        samples = prbs(found.order, rate_divider=found.rate_divider)
+    elif spec.kind == "chirp":
+        assert spec.band_hz is not None
+        sweep = spec.sweep or "linear"
+        about |= {"sweep": sweep, "band_hz": list(spec.band_hz)}
+        samples = chirp(*spec.band_hz, lines.rate_hz, lines.window, sweep=sweep)
+    else:
+        each = _amplitudes(spec, found.base or lines, machine)
+        about |= {"shape": "as listed" if spec.listed else spec.shape}
+        if found.base is not None:
+            about |= {"periods": found.periods, "step_samples": found.base.window}
+            samples = stepped_sine(found.base, each, periods=found.periods)
+        else:
+            phases: Phases = spec.phases or "low crest"
+            about |= {"phases": phases}
+            samples = multisine(lines, each, phases, seed=spec.seed)
+    # A mean moves a loop at its start, far more than the lines do, without information; a PRBS and a chirp have one.
+    made = Waveform(lines, samples - np.mean(samples), about)
+    if spec.crest_factor_max is not None and made.crest_factor > spec.crest_factor_max * (1 + _REACHED):
+        raise DesignError(
+            "crest-factor-not-reached",
+            f"a crest factor of {spec.crest_factor_max:g} is not reached: the lowest found is {made.crest_factor:.4f}",
+            f"allow {made.crest_factor + 5e-4:.3f}, or take {_lower(spec)}",
+            argument="crest_factor_max",
+            crest_factor=made.crest_factor,
+            crest_factor_max=spec.crest_factor_max,
+        )
+    return made
+
+
+def _lower(spec: ExperimentSpec) -> str:
+    searched = spec.phases in (None, "low crest")
+    return "a PRBS" if searched else "phases = 'low crest'"
+
+
+def _amplitudes(spec: ExperimentSpec, lines: Lines, machine: Machine) -> Floats:
+    """Of each line, shape (lines,): as listed, else of rms 1."""
+    if spec.listed:
+        if len(spec.listed) != len(lines):
+            raise UsageError(
+                "wrong-shape",
+                f"amplitude_n_m lists {len(spec.listed)} amplitudes for {len(lines)} lines",
+                "give one for each line",
+                argument="amplitude_n_m",
+                amplitudes=len(spec.listed),
+                lines=len(lines),
+            )
+        return np.array(spec.listed)
+    if spec.shape == "flat":
+        return np.ones(len(lines))
+    f = lines.frequency_hz
+    # For a moving machine, the worst case is the place of the smallest response, relative to the required accuracy.
+    heard = [np.abs(machine.torque(p, f) * p.plant.response(f)) for p in machine.places]
+    return equal_snr(np.min(heard, axis=0))
+
+
+def equal_snr(response: ArrayLike, noise: ArrayLike = 1.0) -> Floats:
+    """Amplitudes of the lines for the same signal-to-noise ratio at the output, shape (lines,), of rms 1.
+
+    A_k ∝ noise_k/|Y/W|_k. The relative error of a line, sigma/|G|, is then the same for all.
+
+    Parameters
+    ----------
+    response
+        Y/W at the lines, from the excitation to the measured output, shape (lines,); of a machine whose response
+        changes, the smallest magnitude at each line.
+    noise
+        Standard deviation of the output's noise, one for white noise or one for each line, in any unit.
+
+    Raises
+    ------
+    UsageError
+        If a response is zero or not finite: no amplitude reaches the ratio at such a line.
+
+    Examples
+    --------
+    >>> equal_snr([1.0, 0.5]) * np.sqrt(2.5)
+    array([1., 2.])
+    """
+    size = np.abs(np.asarray(response, dtype=np.complex128))
+    if not size.size or not np.all(np.isfinite(size) & (size > 0)):
+        line = int(np.argmin(np.where(np.isfinite(size), size, 0.0))) if size.size else 0
+        raise UsageError(
+            "not-finite",
+            f"the response at line {line} is zero or not finite",
+            "leave out that line",
+            argument="response",
+            line=line,
+        )
+    required = np.asarray(noise, dtype=np.float64) / size
+    return np.asarray(required / np.sqrt(np.mean(required**2)))

@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from livebode.configuration import axis_schema, kind_of_file, read_table
-from livebode.core import ConfigError, UsageError, install_command, whole_directory, writing
+from livebode.core import (
+    ConfigError,
+    OutputError,
+    UsageError,
+    install_command,
+    remove_empty,
+    remove_files,
+    whole_directory,
+    writing,
+)
 from livebode.plugins import loaded, named
 from livebode.records import to_json
-from livebode_design.design_directory import AXIS, MARK, SCHEMA, check_free, check_names, remove_design
+from livebode_design.files import FORMATS
+
+_MARK, _AXIS, _SCHEMA = "design.json", "axis.toml", "axis.schema.json"
 
 
 class AnyDesign(Protocol):
@@ -40,9 +52,9 @@ class DescribedExperiment(Protocol[D]):
         "module:name" of what prints a design, and of what draws it to a file.
     """
 
-    formats: Sequence[str]
-    terminal: str
-    picture: str
+    formats: ClassVar[Sequence[str]]
+    terminal: ClassVar[str]
+    picture: ClassVar[str]
 
     @property
     def log(self) -> str: ...
@@ -117,21 +129,21 @@ def design_experiment(
                 value=kind,
                 allowed=list(experiment.formats),
             )
-    check_names(name, experiment.log)
-    check_free(directory, force)
+    _check_names(name, experiment.log)
+    _check_free(directory, force)
     design = experiment.design()
     left_out = {} if kinds else _without_scipy() | experiment.left_out(design)
-    with writing(directory), whole_directory(directory, remove_design) as partial:
+    with writing(directory), whole_directory(directory, _remove_design) as partial:
         for kind in kinds or (kind for kind in experiment.formats if kind not in left_out):
             experiment.write(partial / f"{name}{kind}", design, name)
-        (partial / AXIS).write_text(f"#:schema ./{SCHEMA}\n{experiment.axis_text(design)}", encoding="utf-8")
-        (partial / SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
+        (partial / _AXIS).write_text(f"#:schema ./{_SCHEMA}\n{experiment.axis_text(design)}", encoding="utf-8")
+        (partial / _SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
         if draw is not None:
             draw(design, partial / f"{name}.png")
-        files = tuple(sorted([*(path.name for path in partial.iterdir()), MARK]))
+        files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
         facts = {"files": files} | design.plain()
-        (partial / MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
-        check_free(directory, force)
+        (partial / _MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
+        _check_free(directory, force)
     return Designed(design, directory, files, "\n".join(left_out.values()))
 
 
@@ -161,4 +173,86 @@ def design_described(
 ) -> AnyDesign:
     """The design of what is `described`; its files are written to `directory`, in every format; None: nothing is."""
     found = described(experiment, over)
-    return found.design() if directory is None else design_experiment(found, directory).design
+    design: AnyDesign = found.design() if directory is None else design_experiment(found, directory).design
+    return design
+
+
+def _check_names(name: str, log: str) -> None:
+    """UsageError or ConfigError if the excitation or the recording cannot have this name."""
+    if not name.strip() or not name.isprintable() or name.startswith(".") or Path(name).name != name:
+        raise UsageError(
+            "invalid-name",
+            f"{name!r} cannot be the name of a file",
+            "choose letters, digits and underscores",
+            argument="name",
+            value=name,
+        )
+    if not log.isprintable() or not Path(log).name:
+        raise ConfigError(
+            "value-invalid",
+            f"log = {log!r} cannot be the file of a recording",
+            "specify one such as 'log.csv'",
+            key="log",
+            value=log,
+        )
+    if log in (_MARK, _AXIS, _SCHEMA, f"{name}.png", *(f"{name}{kind}" for kind in FORMATS)):
+        raise ConfigError(
+            "key-conflict",
+            f"log = {log!r} is a file of the design",
+            "give the recording another name",
+            key="log",
+            value=log,
+        )
+
+
+def _check_free(directory: Path, force: bool) -> None:
+    """OutputError if the directory exists and must not be replaced."""
+    if not (directory.exists() or directory.is_symlink()):
+        return
+    if not force:
+        raise OutputError(
+            "exists",
+            f"{str(directory)!r} exists already",
+            "choose another directory, or replace it with force",
+            path=str(directory),
+        )
+    own = set() if directory.is_symlink() else _left_by(directory)
+    if not own:
+        raise OutputError(
+            "not-replaceable",
+            f"{str(directory)!r} is not the directory of an earlier design",
+            "choose another directory",
+            path=str(directory),
+        )
+    if others := sorted(
+        path.name for path in directory.iterdir() if path.name not in own or path.is_symlink() or not path.is_file()
+    ):
+        raise OutputError(
+            "not-replaceable",
+            f"{str(directory)!r} also contains {others[0]!r}, which is not from a design",
+            "move it, or choose another directory",
+            path=str(directory),
+            name=others[0],
+        )
+
+
+def _remove_design(directory: Path) -> None:
+    """Remove the files of an earlier design, and the directory if it is then empty; OSError if it is not."""
+    remove_files(directory, sorted(_left_by(directory), key=lambda name: name == _MARK))
+    remove_empty(directory)
+
+
+def _left_by(directory: Path) -> set[str]:
+    """The files that design.json lists; none if it is not that of a design."""
+    mark = directory / _MARK
+    if mark.is_symlink() or not mark.is_file():
+        return set()
+    try:
+        listed = json.loads(mark.read_text(encoding="utf-8"))["files"]
+        names = {name for name in listed if isinstance(name, str)}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+    excitations = names - {_MARK, _AXIS, _SCHEMA}
+    one = len({Path(name).stem for name in excitations}) == 1
+    plain = all(Path(name).suffix in (*FORMATS, ".png") and Path(name).name == name for name in excitations)
+    return names if one and plain and len(names - excitations) == 3 else set()

@@ -96,12 +96,16 @@ def write_npz(path: Path, waveform: Waveform, name: str) -> None:
 
 def write_mat(path: Path, waveform: Waveform, name: str) -> None:
     """A MATLAB v5 file with one struct of that name; its arrays are columns, `Ts` is the sample time in seconds."""
+    found = _arrays(waveform)
+    columns = {key: value[:, np.newaxis] if np.ndim(value) else value for key, value in found.items()}
+    write_struct(path, columns | {"Ts": 1 / waveform.lines.rate_hz}, name)
+
+
+def write_struct(path: Path, struct: Mapping[str, Any], name: str) -> None:
+    """A MATLAB v5 file with one struct of that name."""
     with needing("SciPy", "analysis", "a design for MATLAB"):
         from scipy.io import savemat
 
-    found = _arrays(waveform)
-    columns = {key: value[:, np.newaxis] if np.ndim(value) else value for key, value in found.items()}
-    struct = columns | {"Ts": 1 / waveform.lines.rate_hz}
     savemat(path, {identifier(name, "MATLAB"): struct}, appendmat=False)
     with path.open("r+b") as file:  # instead of the time of day, so that the same design gives the same file
         file.write(b"MATLAB 5.0 MAT-file, written by livebode".ljust(_TEXT_BYTES))

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import needing
 from livebode.mimo import MatrixDesign
 from livebode.version import __version__
-from livebode_design.files import as_lines, c_rows, identifier
+from livebode_design.files import as_lines, c_rows, identifier, write_struct
 
 
 def facts(design: MatrixDesign) -> dict[str, Any]:
@@ -66,16 +65,13 @@ def write_npz(path: Path, design: MatrixDesign, name: str) -> None:
 
 def write_mat(path: Path, design: MatrixDesign, name: str) -> None:
     """A MATLAB v5 file with one struct of that name; `samples` has a column for each input, `Ts` is in seconds."""
-    with needing("SciPy", "analysis", "a design for MATLAB"):
-        from scipy.io import savemat
-
     found = _arrays(design)
     struct = found | {
         "samples": found["samples"].T,
         "frequency_hz": found["frequency_hz"][:, np.newaxis],
         "Ts": 1 / design.excitation.lines.rate_hz,
     }
-    savemat(path, {identifier(name, "MATLAB"): struct}, appendmat=False)
+    write_struct(path, struct, name)
 
 
 def write_c_header(path: Path, design: MatrixDesign, name: str) -> None:
