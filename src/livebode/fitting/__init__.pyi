@@ -46,6 +46,5 @@ from livebode.fitting.separable import Separated as Separated
 from livebode.fitting.separable import pole_price as pole_price
 from livebode.fitting.separable import solve as solve
 from livebode.fitting.together import fit_each as fit_each
-from livebode.fitting.together import fit_together as fit_together
 from livebode.fitting.transfer import Transfer as Transfer
 from livebode.fitting.two_masses import scan as scan

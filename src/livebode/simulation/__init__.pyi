@@ -24,7 +24,6 @@ from livebode.simulation.gantry import Gantry as Gantry
 from livebode.simulation.gantry import GantryLoop as GantryLoop
 from livebode.simulation.mechanics import Mechanics as Mechanics
 from livebode.simulation.mechanics import Spans as Spans
-from livebode.simulation.mechanism import LinearMechanism as LinearMechanism
 from livebode.simulation.modal import ModalLoop as ModalLoop
 from livebode.simulation.modal import ModalMachine as ModalMachine
 from livebode.simulation.motion import Motion as Motion
