@@ -99,7 +99,7 @@ def timed(job: Job, results: Callable[[], Iterable[Handled]], recordings: int) -
     committer = Committer(Lake(job.lake), job)
     began, before_s = time.perf_counter(), processor_s()
     found = each_result(results())
-    committer.take(found)
+    committer.add(found)
     committer.commit()
     cost = Cost(time.perf_counter() - began, processor_s() - before_s)
     assert sum(isinstance(one, Tracked) for one in found) == recordings, found[:2]

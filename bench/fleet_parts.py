@@ -103,7 +103,7 @@ class MessageCosts:
     def _track_s(self, together: int) -> float:
         stream, spent_s = AxisStream(self._axis, 1), 0.0
         for number, message in enumerate(self._messages, 1):
-            stream.take(message, number, 0.0)
+            stream.add(message, number, 0.0)
             if number % together == 0:
                 began_s = time.thread_time()
                 stream.output()
@@ -137,7 +137,7 @@ class MessageCosts:
             for first in range(0, _OWNED, each):
                 part, began = slice(first, first + each), time.thread_time()
                 for stream, message in zip(streams[part], messages[part]):
-                    stream.take(message, number + 1, number * self._load.period_s)
+                    stream.add(message, number + 1, number * self._load.period_s)
                 taken = time.thread_time()
                 stacks, outputs = stacked_together(streams[part])
                 tracked, pending = time.thread_time(), PendingResults()

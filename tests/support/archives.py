@@ -108,8 +108,8 @@ def loop(archive: Path, lake: str) -> Lake:
     job = Job.of(settings.axes(), lake, 10**12, settings.baselines)
     contents = contents_of(job, find_places(settings.templates))
     committer = Committer(into, job)
-    committer.take(Hashed(place, content) for place, content in contents)
-    committer.take(each_result(handle(job, untracked(contents, job.recipes, into.keys("runs")))))
+    committer.add(Hashed(place, content) for place, content in contents)
+    committer.add(each_result(handle(job, untracked(contents, job.recipes, into.keys("runs")))))
     committer.commit()
     assert set(known_contents(into)[0].values()) >= {content for _, content in contents}
     return into

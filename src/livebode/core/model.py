@@ -67,7 +67,7 @@ class Combined(Algebra):
 
 @dataclass(frozen=True)
 class Gain(Algebra):
-    """The same response at every frequency."""
+    """A response that is equal at every frequency."""
 
     value: float
 

@@ -159,7 +159,7 @@ class Board:
                 items, rows, summary, finished = await self.elsewhere(viewed.more)
             except LivebodeError:
                 continue  # it is just being closed; the next look reads it
-            state.take(items)
+            state.add(items)
             for model, name, unit, new in rows:
                 state.trends.add(model, [name], [unit], new)
             state.renewed(summary, finished)

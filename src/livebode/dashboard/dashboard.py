@@ -230,7 +230,7 @@ class Dashboard:
         try:
             await self._application(scope, receive, send)
         except Exception as error:
-            self._faults.take(error)
+            self._faults.report(error)
 
 
 def listening(serving: Serving) -> socket.socket:

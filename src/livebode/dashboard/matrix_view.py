@@ -40,7 +40,7 @@ def views_of_matrix(directory: Path, name: str, first_axis: int) -> list[tuple[S
     if not all(viewed.fill_from_means(state) for state, viewed in views):
         for part in run.matrix_batches():
             for (state, viewed), (output, input) in zip(views, group.entries):
-                viewed.take(state, part.entry(output, input))
+                viewed.pass_new(state, part.entry(output, input))
     for state, viewed in views:
         viewed.rest(state)
     return views

@@ -135,7 +135,7 @@ class DistortionLevels(StatefulBase):
         self._now, self._mean = 0, np.zeros((3, self._at.size), dtype=np.complex128)
         self._spread = np.zeros((3, self._at.size), dtype=np.complex128)  # Σ|δY|², Σ|δU|², ΣδY·conj(δU)
 
-    def take(self, spectra: Complex) -> None:
+    def process(self, spectra: Complex) -> None:
         """Process the spectra of a complete period, all bins of all signals: shape (signals, bins)."""
         if not self.bins.size:
             return

@@ -167,7 +167,7 @@ class Tracker(StreamEstimator[InputStatistics]):
             if self._repeating is not None:
                 self._repeating.restart(block.start, block.origin_s + block.start / block.rate_hz)
         rows = self._spectra.process(channels)
-        self._watch.take(block, rows)
+        self._watch.count(block, rows)
         centre = np.empty((2, len(rows.sample)))
         centre[0] = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
         centre[1] = self._centre.at(schedule, rows.sample - block.start)

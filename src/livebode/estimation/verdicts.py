@@ -144,7 +144,7 @@ class Judge:
             )
         )
 
-    def take(self, state: PeriodState, periods: PeriodSpectra) -> tuple[PeriodVerdicts, float, float]:
+    def process(self, state: PeriodState, periods: PeriodSpectra) -> tuple[PeriodVerdicts, float, float]:
         """The verdicts after each of some periods, and `largest` and `step` of the state after them."""
         return judge_periods(self._plan, state, periods)
 

@@ -39,7 +39,7 @@ class WelchAverage(StatefulBase):
         self._triangle = np.zeros((places, self._bins.size, 1 + signals, 1 + signals), dtype=np.complex128)
         self._weights = np.zeros((places, 2))
 
-    def take(self, samples: Floats, place: int) -> Quotient:
+    def process(self, samples: Floats, place: int) -> Quotient:
         """Quotients of a stretch, or of it and those before it at its place.
 
         `samples` is the stretch of the reference and of the signals, shape (1 + signals, WINDOWS·window).

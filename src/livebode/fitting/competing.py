@@ -129,7 +129,7 @@ def _rivals(of: Competitor, measured: Measured, noise_dof: Floats, allowed: Allo
 
 
 def _less(of: Competitor, measured: Measured, noise_dof: Floats) -> Iterator[Competitor]:
-    """The same without one of its earlier additions, such as a delay that approximated a mode."""
+    """The competitor without one of its earlier additions, such as a delay that approximated a mode."""
     for i, name in enumerate(of.taken[:-1]):
         if name in of.problem.model.names and name not in of.problem.held and name not in (LAG, MODE, RESIDUAL):
             problem = of.problem.variant(held={name: 0.0})

@@ -92,7 +92,7 @@ class Fit:
         return self.refusal or SENTENCES[self.status]
 
     def refused(self, reason: str) -> Fit:
-        """The same without numbers, for a reason that is its sentence."""
+        """This fit without numbers, for a reason that is its sentence."""
         part = self.parameters
         status = np.full(1, NO_FIT, dtype=part.status.dtype)
         blank = [

@@ -227,7 +227,7 @@ def _unknown(measured: Measured) -> Any:
 
 
 def _weights(measured: Measured, epsilon: Floats) -> Floats:
-    """Of each line; by its size where neither noise nor ε is known.
+    """Weight of each line; by its size where neither noise nor ε is known.
 
     The size is the measured one: that of a model with too few poles is wrong by orders of magnitude between them.
     """

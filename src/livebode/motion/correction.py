@@ -161,11 +161,11 @@ class MotionCorrection(StatefulBase):
         }
 
     def excitation_power(self) -> Floats:
-        """As `Tracker.excitation_power`."""
+        """Power of the excitation, as `Tracker.excitation_power` gives it."""
         return self._tracker.excitation_power()
 
     def repeatability(self) -> Floats:
-        """As `Tracker.repeatability`."""
+        """Repeatability, as `Tracker.repeatability` gives it."""
         return self._tracker.repeatability()
 
     def process(self, block: Block, emit: Emit = ignore) -> Responses:
@@ -232,7 +232,7 @@ class MotionCorrection(StatefulBase):
 
     def _corrected(self, stop: int) -> Responses:
         """Responses up to the sample before `stop`, and their fit; drops what no later chunk needs."""
-        tracked = self._waiting.take(stop)
+        tracked = self._waiting.pop(stop)
         end = min(stop + self.settings.lines.window, self._recorded.stop)
         chunk = self._recorded.chunk(self._from, stop, end)
         self._from = stop
@@ -265,7 +265,7 @@ class MotionCorrection(StatefulBase):
         valid = tracked.valid & seen.valid & np.isfinite(value)
         scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
         if not aside:
-            self._ripple.take(left, chunk, now.model)
+            self._ripple.process(left, chunk, now.model)
         with np.errstate(invalid="ignore", divide="ignore"):
             ripple = np.abs(value) * np.sqrt(self._ripple.power(chunk, tracked.sample)) / chunk.torque
         return replace(

@@ -108,7 +108,7 @@ def test_any_value_of_an_opc_ua_variant_gives_a_batch_or_a_sentence():
         key = rng.choice("abn")
         value = rng.choice([rng.choice(VALUES), rng.randrange(1000) if key == "n" else [1.0, 2.0]])
         try:
-            found += gathered.take(key, value, stamp) is not None
+            found += gathered.add(key, value, stamp) is not None
         except SourceError as error:
             one_sentence(error)
         assert len(gathered._moments) <= INCOMPLETE_MAX

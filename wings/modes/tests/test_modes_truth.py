@@ -27,7 +27,7 @@ def windows(y: Floats, of: OutputOnlySettings, events: list[Event] | None = None
 
 def tracked(found: list[WindowModes], of: OutputOnlySettings) -> dict[str, Parameters]:
     tracks, rows = Tracks(of.hops), dict[str, list[Parameters]]()
-    for parts in [*map(tracks.take, found), tracks.finish()]:
+    for parts in [*map(tracks.process, found), tracks.finish()]:
         for part in parts:
             rows.setdefault(part.model, []).append(part)
     return {name: Parameters.join(parts) for name, parts in rows.items()}

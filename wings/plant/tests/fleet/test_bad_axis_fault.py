@@ -70,7 +70,7 @@ def _streams() -> dict[int, AxisStream]:
 def _outputs(streams: dict[int, AxisStream]) -> list[Output]:
     for axis, stream in streams.items():
         for n in range(BATCHES):
-            stream.take(fitted_message(axis, n), n + 1, 1e9 + 0.1 * n)
+            stream.add(fitted_message(axis, n), n + 1, 1e9 + 0.1 * n)
     return outputs_together([*streams.values()])
 
 

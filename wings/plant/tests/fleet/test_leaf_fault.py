@@ -60,12 +60,12 @@ def test_an_edge_behind_a_leaf_node_is_tracked_and_a_cut_of_the_link_loses_nothi
     async def outage(settings: LogSection) -> None:
         sending = asyncio.create_task(send_edges(settings, [(edge, taking)], threading.Event()))
         for first in range(0, 1000, 50):
-            edge.take(batch(0, first))
+            edge.add(batch(0, first))
         while edge.sent < 5:
             await asyncio.sleep(0.02)
         await asyncio.to_thread(fleet.server.kill)
         for first in range(1000, 2000, 50):
-            edge.take(batch(0, first))
+            edge.add(batch(0, first))
         await asyncio.to_thread(fleet.server.start)
         taking.set_result(None)
         await sending

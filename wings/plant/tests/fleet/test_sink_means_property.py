@@ -63,7 +63,7 @@ def means(messages: Sequence[SinkRows], kills: Sequence[int] = ()) -> list[Close
         tier = MeanTier("minute", PERIOD_S, found[-1].through if found else 0)
         first = found[-1].first if found else messages[0].number
         stop = next((kill for kill in kills if kill > at), len(messages))
-        taken = (tier.take(one, "log") for one in messages[first - messages[0].number : stop])
+        taken = (tier.process(one, "log") for one in messages[first - messages[0].number : stop])
         found += [closed for closed in taken if closed is not None]
         if stop == len(messages):
             return found

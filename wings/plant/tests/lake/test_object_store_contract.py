@@ -47,7 +47,7 @@ def test_two_coordinators_lose_nothing_and_double_nothing(tmp_path: Path) -> Non
         lake = Lake(LAKE)
         for result in [*(Hashed(*one) for one in contents), *results[::order]]:
             committer = Committer(lake, job)
-            committer.take([result])
+            committer.add([result])
             committer.commit()
         return [file for result in results if isinstance(result, Tracked) for file in result.files]
 

@@ -132,7 +132,7 @@ class CanSource(LiveSource):
             self._take_foreign(identity)
         else:
             try:
-                return self._samples.take(identity, bytes(frame.data), frame.timestamp)
+                return self._samples.process(identity, bytes(frame.data), frame.timestamp)
             except SourceError as error:
                 self._malformed(error)
         return []
@@ -143,7 +143,7 @@ class CanSource(LiveSource):
         self._samples.problems.clear()
         if found:
             self._count += len(found)
-            self._rate.take(self._count, time.monotonic())
+            self._rate.add(self._count, time.monotonic())
             self._foreign.clear()
         for batch in batches_of(found, self._samples.channels, self._rate_given, time.monotonic()):
             self._deliver(batch)

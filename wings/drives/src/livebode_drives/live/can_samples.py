@@ -35,7 +35,7 @@ class FrameClock:
         self._period_s = 1 / rate_hz
         self._due_s: float | None = None
         self.number = 0
-        """Of the newest frame."""
+        """Number of the newest frame."""
 
     @property
     def paused_s(self) -> float:
@@ -47,7 +47,7 @@ class FrameClock:
         """Time at which the newest frame was due, by all before it."""
         return self._due_s
 
-    def take(self, time_s: float) -> bool:
+    def add(self, time_s: float) -> bool:
         """Whether a frame at this time has a certain number, which is then `number`."""
         if self._due_s is None:
             self._due_s = time_s
@@ -179,7 +179,7 @@ class CanSamples:
         self._offsets: dict[Identity, int] | None = None
         self._waiting: dict[int, dict[int, float]] = {}
 
-    def take(self, identity: Identity, data: bytes, time_s: float) -> list[Counted]:
+    def process(self, identity: Identity, data: bytes, time_s: float) -> list[Counted]:
         """The samples that are certain with this frame, which was received at `time_s`.
 
         Raises
@@ -190,7 +190,7 @@ class CanSamples:
         values = self._decoded(identity, data)
         if self._counter is not None and self._counted is not None:
             row = np.array([values[signal.name] for signal in self.signals], dtype=np.float64)
-            found = self._counter.take(int(values[self._counted.name]), time_s, row)
+            found = self._counter.process(int(values[self._counted.name]), time_s, row)
             if self._counter.damaged:
                 self.problems.append(f"{self._counter.damaged} frames had a counter that no other frame confirmed")
                 self._counter.damaged = 0
@@ -221,7 +221,7 @@ class CanSamples:
             self.problems.append(f"no {self._messages[identity].name} for {time_s - clock.newest_s:.3g} s")
             self.restart()
             clock = self._clocks[identity]
-        if not clock.take(time_s):
+        if not clock.add(time_s):
             self._doubt(identity)
             return []
         self._uncertain = 0

@@ -49,7 +49,7 @@ class Counter:
         self.damaged = 0
         """Samples that were dropped because no other one confirmed their counter."""
 
-    def take(self, count: int, time_s: float, row: NDArray[np.float64]) -> list[Counted]:
+    def process(self, count: int, time_s: float, row: NDArray[np.float64]) -> list[Counted]:
         """The samples that are certain with this one: its counter, its time on any clock, and its values."""
         doubtful, self._doubtful = self._doubtful, None
         found = []

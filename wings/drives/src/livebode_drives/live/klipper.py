@@ -263,7 +263,7 @@ class KlipperSource(LiveSource):
         if not len(rows):
             return
         self._newest_s = float(rows[-1, 0])
-        self._waiting += self._grid.take(rows[:, 0], rows[:, 1:].T)
+        self._waiting += self._grid.process(rows[:, 0], rows[:, 1:].T)
         self._check_rate()
         self._pass_on()
 

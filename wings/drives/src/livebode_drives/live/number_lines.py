@@ -109,4 +109,4 @@ class NumberLines:
         count = row[self._column]
         if not (math.isfinite(count) and count == math.floor(count) and 0 <= count < 1 << 53):
             raise line_not_numbers(line, f"has the counter {count:g}, which is not a whole number")
-        return self._counter.take(int(count), time_s, row)
+        return self._counter.process(int(count), time_s, row)

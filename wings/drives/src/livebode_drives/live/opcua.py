@@ -51,7 +51,7 @@ class Gathered:
         self._numbered = Numbered(self._channels, rate_hz)
         self._moments: OrderedDict[datetime, dict[str, Any]] = OrderedDict()
 
-    def take(self, key: str, value: Any, stamp: datetime | None) -> Batch | None:
+    def add(self, key: str, value: Any, stamp: datetime | None) -> Batch | None:
         """Add a new value of node `key`; returns the batch that it completes. SourceError if the values are invalid."""
         if stamp is None:
             raise SourceError(
@@ -256,7 +256,7 @@ class Handler:
     def datachange_notification(self, node: Any, value: Any, data: Any) -> None:
         """A node has a new value."""
         try:
-            batch = self._gathered.take(self._by_node[node], value, data.monitored_item.Value.SourceTimestamp)
+            batch = self._gathered.add(self._by_node[node], value, data.monitored_item.Value.SourceTimestamp)
             if batch is not None:
                 self._source._deliver(batch)
         except LivebodeError as error:

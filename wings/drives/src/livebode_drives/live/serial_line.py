@@ -209,7 +209,7 @@ class SerialSource(LiveSource):
         if batch.epoch != self._epoch:
             self._epoch = batch.epoch
             self._arrival.restart()
-        self._arrival.take(batch.stop, now)
+        self._arrival.add(batch.stop, now)
 
 
 def number_lines(settings: DriveKeys, epoch: int) -> NumberLines:

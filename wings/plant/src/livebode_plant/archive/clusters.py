@@ -59,7 +59,7 @@ _ENVIRONMENT = {
 
 
 def _environment() -> dict[str, str]:
-    """Of each worker. Fits on different processors differ in the last digits, except if all use the same routines."""
+    """Environment of each worker: fits on different processors differ in the last digits if routines differ."""
     same = os.environ.get("OPENBLAS_CORETYPE")
     return _ENVIRONMENT | ({"OPENBLAS_CORETYPE": same} if same else {})
 

@@ -59,8 +59,8 @@ class Committer:
     _waiting: list[Result] = field(default_factory=list)
     _committed_s: float = field(default_factory=time.monotonic)
 
-    def take(self, results: Iterable[Result]) -> None:
-        """Take results, and commit if it is time."""
+    def add(self, results: Iterable[Result]) -> None:
+        """Add results, and commit if it is time."""
         self._waiting += results
         if time.monotonic() - self._committed_s > _EVERY_S or len(self._waiting) >= _RESULTS_MAX:
             self.commit()
@@ -256,7 +256,7 @@ class Coordinator:
                     self._outcome.remaining -= len(handled)
                     self._outcome.known += sum(all(isinstance(x, Hashed) for x in one.results) for one in handled)
                 results += [] if tracking else found
-                committer.take(found)
+                committer.add(found)
         finally:
             committer.commit()
         return results

@@ -137,7 +137,7 @@ class SimulatedMachines:
 
     def _take_batches(self, number: int) -> None:
         for axis, edge in enumerate(self._edges):
-            edge.take(self.batch(axis, number))
+            edge.add(self.batch(axis, number))
 
     def _send(self) -> None:
         edges = [(edge, self._taking) for edge in self._edges]

@@ -16,7 +16,7 @@ from livebode_plant.fleet.subjects import ACTS_STREAM, API, EDGE, STATUS_STREAM,
 _FLEET, _VIEW = "FLEET", "VIEW"
 _CONNECTIONS_MORE, _SUBSCRIPTIONS = 4, 4
 _MESSAGE_BYTES_MAX = 2 * FRAME_BYTES_MAX
-"""Of an edge: a frame with the names of the channels, and one of samples."""
+"""Largest message of an edge: a frame with the names of the channels, and one of samples."""
 _VIEWED = ("STREAM.INFO.*", f"STREAM.MSG.GET.{STATUS_STREAM}", f"STREAM.MSG.GET.{ACTS_STREAM}")
 """Requests of a viewer. A consumer is not one of them: it could deliver to any subject of the log's account."""
 _ONLY_ASKS = json.dumps([f"{VIEW_API}.{request}" for request in _VIEWED])

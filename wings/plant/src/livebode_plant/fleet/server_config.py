@@ -13,7 +13,7 @@ from livebode_plant.fleet.settings import FleetSettings, LeafSection, ServerSect
 from livebode_plant.fleet.subjects import EDGE, LEVELS, LOG
 
 PAYLOAD_BYTES_MAX = 8 << 20
-"""Of one message: the state of an axis with [motion] has 0.65 MB."""
+"""Size of one message: the state of an axis with [motion] has 0.65 MB."""
 _MEMORY_BYTES = 64 << 20
 
 

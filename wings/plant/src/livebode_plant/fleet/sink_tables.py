@@ -116,8 +116,8 @@ class MeanTier:
         self._responses: dict[PeriodKey, _Responses] = {}
         self._parameters: dict[PeriodKey, FittedQuantities] = {}
 
-    def take(self, message: SinkRows, log: str) -> Closed | None:
-        """Take the next message; returns the means of the periods that have ended before it, if any have."""
+    def process(self, message: SinkRows, log: str) -> Closed | None:
+        """Add the next message; returns the means of the periods that have ended before it, if any have."""
         # A clock that was set back must not open a period again.
         self._now_s = max(self._now_s, message.stored_s)
         self._begins.setdefault(int(self._now_s // self._period_s), message.number)
@@ -297,7 +297,7 @@ class SinkTables:
         self._next = message.number + 1
         rows = sink_rows(message, self.name)
         for tier in self._tiers:
-            if (closed := tier.take(rows, self.name)) is not None:
+            if (closed := tier.process(rows, self.name)) is not None:
                 for name, table in closed.tables.items():
                     self._waiting[name].add(closed.through, table)
                 self._firsts[tier.name] = closed.through, closed.first

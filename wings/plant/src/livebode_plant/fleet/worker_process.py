@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 SILENT_S = 4.0
 """Time without a sign of life after which a worker is frozen."""
 _START_S = 30.0
-"""The same for its first one: on a busy computer the imports take that long."""
+"""Time until its first one: on a busy computer the imports take that long."""
 _SIGN_S = 0.5
 END_S = 5.0
 """Time that a worker has to store its results and states when it is to end."""

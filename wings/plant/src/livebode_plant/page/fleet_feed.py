@@ -119,7 +119,7 @@ class NatsFeed:
         await asyncio.Event().wait()
 
     async def _ask_for_acts(self, hear_act: Hear) -> None:
-        """The same with the key of a viewer, which has no consumer: ask for the next one, again and again.
+        """Receive acts with the key of a viewer, which has no consumer: ask for the next one, again and again.
 
         nats-server 2.9.10 can end at the request for the next message of a stream that is being created, so it is asked
         first whether there is one.
