@@ -25,12 +25,12 @@ from bench.fleet_loads import SAMPLES_100, SAMPLES_500, SPECTRA, AxisLoad
 from bench.fleet_path import LOAD, state_every_s
 from livebode.sources.live import Sequencer, SourceEvents
 from livebode_plant.fleet.axis_stream import AxisStream, stacked_together
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message
 from livebode_plant.fleet.reader import Reader
 from livebode_plant.fleet.result_message import PendingResults
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM
 
 _MESSAGES, _ROUNDS, _AXES, _WARM = 96, 5, 50, 16

@@ -25,7 +25,7 @@ from babel.messages.pofile import read_po, write_po
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.estimation.verdicts import KINDS as DOUBTS
 from livebode.fitting import model_named
-from livebode.fitting.extended import LAG, MODE, RESIDUAL, Extended
+from livebode.fitting.extended_model import LAG, MODE, RESIDUAL, Extended
 from livebode.fitting.models import MODELS
 from livebode.margins._margins import NAMES as MARGINS
 from livebode.monitoring import ALARMS, RETURNS, UNMONITORED

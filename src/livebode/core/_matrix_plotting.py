@@ -8,7 +8,7 @@ import numpy as np
 
 from livebode.core._plotting import plot_responses
 from livebode.core.errors import UsageError
-from livebode.core.installing import needing
+from livebode.core.optional_packages import needing
 
 if TYPE_CHECKING:
     from livebode.core._matrix_responses import MatrixResponses

@@ -8,7 +8,7 @@ import numpy as np
 
 from livebode.core._kinds import PlotKind
 from livebode.core.errors import UsageError
-from livebode.core.installing import needing
+from livebode.core.optional_packages import needing
 from livebode.drawing import Cloud, Curve
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from livebode.estimation.line_stage import response_unit
 from livebode.estimation.local_polynomial import LocalPolynomial
 from livebode.estimation.quantities import from_plant
 from livebode.estimation.quotient import Quotient
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
+from livebode.estimation.tracker_settings import Settings
 from livebode.estimation.welch_average import WelchAverage
 
 _EXCITED = 1e-12  # of the largest power so far, as for a LineStage

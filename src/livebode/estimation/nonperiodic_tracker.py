@@ -11,9 +11,9 @@ from livebode.arrays import Floats
 from livebode.core import Block, Emit, Event, Responses, Stage, StatefulBase, UsageError, hand_over, ignore
 from livebode.estimation.centre import Centre
 from livebode.estimation.nonperiodic_stage import NonPeriodicStage, Row
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.stream_estimator import StreamEstimator, signals_of
+from livebode.estimation.tracker_settings import Settings
 from livebode.estimation.watch import InputStatistics
 
 

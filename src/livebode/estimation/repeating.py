@@ -17,9 +17,9 @@ from livebode.estimation.levels import DistortionLevels
 from livebode.estimation.moments import PeriodMoments
 from livebode.estimation.movement import PLACES, Movement
 from livebode.estimation.periods import PeriodCutter, Periods
-from livebode.estimation.settings import Settings
 from livebode.estimation.silence_search import HumSpan, SilenceSearch, SilentStretch, updated
 from livebode.estimation.spectra import SpectraRows
+from livebode.estimation.tracker_settings import Settings
 from livebode.estimation.verdicts import HUM, KINDS, Verdict, judge_of, reason
 from livebode.kernel import ADDED, FORGOTTEN, NEWS, NEWS_GONE, PeriodSpectra, PeriodState, PeriodVerdicts
 from livebode.language import Message

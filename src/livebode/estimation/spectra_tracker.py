@@ -31,9 +31,9 @@ from livebode.core import (
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.ripple import HopSpeed, ripple_power
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows, after
 from livebode.estimation.stream_estimator import StreamCounters, StreamEstimator
+from livebode.estimation.tracker_settings import Settings
 from livebode.language import Message
 
 DRIVE = {

@@ -13,8 +13,8 @@ from livebode.core import Lines, QuantityKind
 from livebode.estimation.distortion import Distortion, reached
 from livebode.estimation.estimators import Role
 from livebode.estimation.mains import Neighbours, mains_of
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
+from livebode.estimation.tracker_settings import Settings
 from livebode.kernel import (
     REASONS,
     PeriodSpectra,

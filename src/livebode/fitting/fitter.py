@@ -29,7 +29,7 @@ from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, FittedRows
 from livebode.fitting.tasks import FitTask
-from livebode.fitting.weighing import epsilon_for, squares
+from livebode.fitting.weights import epsilon_for, squares
 
 _GROUP = 16  # rows that share a start and an ε, however they arrive
 _MEMORY = 64  # rows that ε is taken from

@@ -15,7 +15,7 @@ from livebode.fitting.hold import to_continuous
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import NO_RESPONSE, NOT_SEEN
 from livebode.fitting.transfer import Transfer
-from livebode.fitting.weighing import chi_squared, own_epsilon, squares, weights
+from livebode.fitting.weights import chi_squared, own_epsilon, squares, weights
 
 Method = Literal["levy", "sanathanan-koerner", "maximum likelihood"]
 

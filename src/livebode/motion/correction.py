@@ -13,7 +13,7 @@ from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, S
 from livebode.estimation import NOTHING, Settings, Tracker, contains
 from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, PendingResponses, RecentSamples
-from livebode.motion.learner import Learner, Replayed, frozen
+from livebode.motion.learner import Learner, ReplayResult, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.orders import RippleMonitor
 from livebode.motion.replay import by_excitation, drive_of
@@ -242,7 +242,7 @@ class MotionCorrection(StatefulBase):
         return self._correct(tracked, chunk.at_rows(self.settings.lines, tracked.sample))
 
     def _correct(self, tracked: Responses, chunk: Chunk) -> Responses:
-        def replay(model: MovingModel) -> Replayed:
+        def replay(model: MovingModel) -> ReplayResult:
             return self._replayed(model, tracked, chunk)
 
         now = self._learner.learn(tracked, chunk, replay)
@@ -276,12 +276,12 @@ class MotionCorrection(StatefulBase):
             valid=valid,
         )
 
-    def _replayed(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> Replayed:
+    def _replayed(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> ReplayResult:
         left = residual(model, chunk, self.settings)
         seen = _rows_of(self._scatter.once(left.velocity, chunk), tracked)
-        return Replayed(model, left, seen, frozen(model, tracked.schedule, self.settings) + seen.value)
+        return ReplayResult(model, left, seen, frozen(model, tracked.schedule, self.settings) + seen.value)
 
-    def _value(self, now: Replayed, tracked: Responses, chunk: Chunk) -> Complex:
+    def _value(self, now: ReplayResult, tracked: Responses, chunk: Chunk) -> Complex:
         """The tracked responses plus the model's difference to its frozen response; NaN without a whole window."""
         if self._drive is None and not self._quotient:
             return now.value

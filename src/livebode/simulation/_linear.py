@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Algebra
+from livebode.simulation.axis_settings import Friction
 from livebode.simulation.hold import held
 from livebode.simulation.mechanics import Mechanics, Spans
-from livebode.simulation.settings import Friction
 
 Output = Literal["velocity", "position", "cart"]
 

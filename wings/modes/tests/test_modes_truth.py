@@ -9,7 +9,7 @@ from scipy.special import ndtri
 
 from livebode.core import Block, Event, Parameters
 from livebode_modes import ModeTracker, OutputOnlySettings, Tracks, WindowModes, reduced
-from livebode_modes.settings import window_of
+from livebode_modes.output_only_settings import window_of
 from tests.support.ringing import DAMPING, FREQUENCY_HZ, RATE_HZ, moving_mode, two_modes
 
 Floats = NDArray[np.float64]

@@ -18,7 +18,7 @@ from livebode.language import Message
 from livebode.records import PARAMETERS
 from livebode.runtime import Document, Estimate, FitResults, Outcome, versions
 from livebode_modes.mode_tracker import ModeTracker, WindowModes
-from livebode_modes.settings import OutputOnlySettings
+from livebode_modes.output_only_settings import OutputOnlySettings
 from livebode_modes.stabilisation import Mode
 
 Kind = Literal["mode", "harmonic"]

@@ -96,7 +96,7 @@ COMMANDS: Mapping[str, Command] = {
         "Track every recording of an archive on all cores or a cluster, and keep the results in one lake.",
         commands=_ARCHIVE,
         extra="archive",
-        schema="livebode_plant.archive.settings:archive_schema",
+        schema="livebode_plant.archive.archive_settings:archive_schema",
     ),
     "fleet": Command(
         "Track the axes of a fleet from a log on several workers: every result once, also when a worker dies.",

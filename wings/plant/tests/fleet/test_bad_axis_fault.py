@@ -14,12 +14,12 @@ from livebode.core import FleetError
 from livebode.fitting import Fitter, problem, rows
 from livebode.runtime import Fits
 from livebode_plant.fleet.axis_stream import AxisStream, Output, outputs_together
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.replay import replayed
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.status import fleet_status
 from livebode_plant.fleet.subjects import RESULT_STREAM, RESULTS, axis_path
 from tests.support.fitted_fleet import fitted_axes, fitted_message, fitted_sent, healthy_baseline

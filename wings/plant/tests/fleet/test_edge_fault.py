@@ -22,11 +22,11 @@ from livebode.sources.live import Batch, SpectraBatch
 from livebode_plant.fleet import edge as edge_module
 from livebode_plant.fleet.edge import Edge, SoleSender, send_edges
 from livebode_plant.fleet.edge_buffer import EdgeBuffer
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message, write_message
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.subjects import LOG, LOG_STREAM
 from tests.support.fleet_runs import CHANNELS, PARTITIONS, RATE_HZ, batch, fleet_axes, log_section
 

@@ -13,14 +13,14 @@ import pytest
 from nats.errors import Error
 
 from livebode.core import FleetError
-from livebode_plant.fleet.connecting import security
+from livebode_plant.fleet.connection import security
 from livebode_plant.fleet.edge import Edge, send_edges
 from livebode_plant.fleet.edge_buffer import EdgeBuffer
 from livebode_plant.fleet.encrypted_client import EncryptedClient
+from livebode_plant.fleet.fleet_settings import FleetSettings, LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import NatsServer, free_port
 from livebode_plant.fleet.server_config import leaf_configuration
-from livebode_plant.fleet.settings import FleetSettings, LogSection
 from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM
 from tests.support.command import livebode
 from tests.support.fleet_runs import batch, checked, owned_until_current

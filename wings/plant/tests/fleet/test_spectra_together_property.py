@@ -16,11 +16,11 @@ from livebode.configuration import Axis
 from livebode.core import PER_LINE, PER_RESPONSE, Channel, Responses, SpectraLayout
 from livebode.sources.live import SpectraBatch
 from livebode_plant.fleet.axis_stream import AxisStream, Output, outputs_together, stacked_together
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import message_id, write_message
 from livebode_plant.fleet.result_message import PendingResults
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.subjects import EDGE
 from tests.support.fleet_runs import (
     CHANNELS,

@@ -13,7 +13,7 @@ import numpy as np
 
 from livebode.core import Channel, ConfigError, SourceError, nearest_name
 from livebode.sources import split_unit
-from livebode_drives.live.counter import Counted, Counter
+from livebode_drives.live.counter import Counter, NumberedSample
 
 TOLERANCE = 0.4
 """A frame that is further from its due time than this, in periods, has no certain number."""
@@ -179,7 +179,7 @@ class CanSamples:
         self._offsets: dict[Identity, int] | None = None
         self._waiting: dict[int, dict[int, float]] = {}
 
-    def process(self, identity: Identity, data: bytes, time_s: float) -> list[Counted]:
+    def process(self, identity: Identity, data: bytes, time_s: float) -> list[NumberedSample]:
         """The samples that are certain with this frame, which was received at `time_s`.
 
         Raises
@@ -215,7 +215,7 @@ class CanSamples:
                 "check that the DBC belongs to the device",
             ) from None
 
-    def _timed(self, identity: Identity, values: dict[str, float], time_s: float) -> list[Counted]:
+    def _timed(self, identity: Identity, values: dict[str, float], time_s: float) -> list[NumberedSample]:
         clock = self._clocks[identity]
         if clock.newest_s is not None and time_s - clock.newest_s > clock.paused_s:
             self.problems.append(f"no {self._messages[identity].name} for {time_s - clock.newest_s:.3g} s")
@@ -255,7 +255,7 @@ class CanSamples:
             apart = round((clock.newest_s - first.newest_s) * self._rate_hz)
             self._offsets[identity] = apart - (clock.number - first.number)
 
-    def _complete(self, number: int, sample: dict[int, float]) -> list[Counted]:
+    def _complete(self, number: int, sample: dict[int, float]) -> list[NumberedSample]:
         if len(sample) < len(self.signals):
             while len(self._waiting) > INCOMPLETE_MAX:
                 del self._waiting[min(self._waiting)]
@@ -263,7 +263,7 @@ class CanSamples:
         # Frames of a bus are in order, so what is incomplete and older is lost.
         self._waiting = {later: values for later, values in self._waiting.items() if later > number}
         row = np.array([sample[place] for place in range(len(self.signals))], dtype=np.float64)
-        return [Counted(self._epoch, number, row)]
+        return [NumberedSample(self._epoch, number, row)]
 
 
 def counted_signal(signals: list[Signal], counter: str, messages: Mapping[Identity, Any]) -> Signal:

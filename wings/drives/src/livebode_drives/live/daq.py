@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from livebode.core import Channel, SourceError, nearest_name, not_installed
 from livebode.sources import split_unit
 from livebode.sources.live import CHANNELS_MAX, VALUES_MAX, Address, Batch, LiveSource, Reach
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 
 BEHIND_MAX = 1 << 18
 """Samples that wait for those of another signal."""

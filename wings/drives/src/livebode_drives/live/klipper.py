@@ -28,7 +28,7 @@ from livebode.sources.live import (
     pieces,
 )
 from livebode_drives.live.on_grid import OnGrid
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 
 MOVES_MAX = 1 << 16
 """Moves that wait for the samples of their time."""

@@ -26,7 +26,7 @@ from livebode.sources.live import (
 )
 from livebode_drives.live.arrival_rate import ArrivalRate
 from livebode_drives.live.number_lines import NumberLines
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 
 UNKNOWN_BYTES = 1 << 12
 """Bytes without a frame or JSON that are searched, and reported together."""

@@ -15,7 +15,7 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.core import ArchiveError, not_installed
-from livebode_plant.archive.settings import ClusterSection
+from livebode_plant.archive.archive_settings import ClusterSection
 
 try:
     import dask

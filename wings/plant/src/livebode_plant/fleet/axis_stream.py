@@ -81,7 +81,7 @@ class UnfittedOutput(NamedTuple):
     events: list[Event]
 
 
-class _Taken(NamedTuple):
+class _TakenMessages(NamedTuple):
     """Messages that are tracked together: number in the log of the last one, its last sample and time, their Blocks,
     and the most bytes of their responses; more than allowed only for a single message."""
 
@@ -133,7 +133,7 @@ class AxisStream(StatefulBase):
         settings = axis.source
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
         self._pipeline: SingleResponse | None = None
-        self._taken: list[_Taken] = []
+        self._taken: list[_TakenMessages] = []
         self.usual: UsualSpectra | None = None
         self.spectra: list[PendingSpectrum] = []
         """The messages taken since the last output, while they are usual ones."""
@@ -186,7 +186,7 @@ class AxisStream(StatefulBase):
         if self._taken and self._taken[-1].size_bytes + size_bytes <= _OUTPUT_BYTES_MAX:
             before = self._taken.pop()
             blocks, size_bytes = before.blocks + blocks, before.size_bytes + size_bytes
-        self._taken.append(_Taken(position, end, blocks, size_bytes))
+        self._taken.append(_TakenMessages(position, end, blocks, size_bytes))
 
     def _read_spectra(self) -> None:
         """Process usual messages like any others: they are not tracked with those of other axes."""

@@ -26,9 +26,9 @@ from livebode_plant.fleet.check import CheckResult, check_results
 from livebode_plant.fleet.coordinator import FleetCoordinator
 from livebode_plant.fleet.edge import Edge, send_edges
 from livebode_plant.fleet.edge_buffer import FILE_BYTES, EdgeBuffer
+from livebode_plant.fleet.fleet_settings import FleetSettings
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import FleetSettings
 from livebode_plant.fleet.status import fleet_status, silences
 
 RATE_HZ, WINDOW = 4000.0, 400

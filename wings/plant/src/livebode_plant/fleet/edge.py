@@ -16,9 +16,9 @@ import numpy as np
 from livebode.core import FleetError
 from livebode.sources.live import AnyBatch, Batch, LiveBlock, LiveSource, LiveSpectra, SpectraBatch
 from livebode_plant.fleet.edge_buffer import EdgeBuffer
+from livebode_plant.fleet.fleet_settings import EdgeSection, LogSection
 from livebode_plant.fleet.log import FleetLog, OtherLastError
 from livebode_plant.fleet.message import message_id, write_message
-from livebode_plant.fleet.settings import EdgeSection, LogSection
 from livebode_plant.fleet.subjects import EDGE, axis_path
 
 QUIET_S = 2.0

@@ -9,8 +9,8 @@ from urllib.parse import quote
 
 from livebode.core import FleetError, on_loopback
 from livebode.sources.live import FRAME_BYTES_MAX
+from livebode_plant.fleet.fleet_settings import FleetSettings, ServerSection, UsersSection
 from livebode_plant.fleet.page_status import NAMES, VIEW
-from livebode_plant.fleet.settings import FleetSettings, ServerSection, UsersSection
 from livebode_plant.fleet.subjects import ACTS_STREAM, API, EDGE, STATUS_STREAM, VIEW_API, axis_path
 
 _FLEET, _VIEW = "FLEET", "VIEW"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from livebode.configuration import Axis
-    from livebode_plant.fleet.settings import LogSection
+    from livebode_plant.fleet.fleet_settings import LogSection
 
 SILENT_S = 4.0
 """Time without a sign of life after which a worker is frozen."""

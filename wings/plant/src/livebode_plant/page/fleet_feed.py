@@ -8,9 +8,9 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from livebode.core import FleetError
-from livebode_plant.fleet.connecting import connected
+from livebode_plant.fleet.connection import connected
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.page_status import NAMES, VIEW
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.subjects import ACTS, ACTS_STREAM, VIEW_API, axis_token
 from livebode_plant.page.fleet_alarms import FleetAct
 

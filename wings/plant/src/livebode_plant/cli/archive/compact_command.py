@@ -15,7 +15,7 @@ def compact_command(archive: LakeOf, as_json: Json = False) -> None:
     with results that are not complete is left as it is.
     """
     from livebode.records import to_json
-    from livebode_plant.archive.settings import lake_url
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.lake import Lake, compact
 
     found = compact(Lake(lake_url(archive)))

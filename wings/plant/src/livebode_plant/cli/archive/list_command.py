@@ -21,8 +21,8 @@ def list_command(
 ) -> None:
     """List the runs of a lake by machine, and the recordings in quarantine."""
     from livebode.records import to_json
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.archive.contents import machines, quarantine
-    from livebode_plant.archive.settings import lake_url
     from livebode_plant.lake import Lake
 
     lake = Lake(lake_url(archive))

@@ -23,7 +23,7 @@ def query_command(
 
     A query has no access to files, and does not see results that are not complete.
     """
-    from livebode_plant.archive.settings import lake_url
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.lake import Lake
     from livebode_plant.lake.query import query_lake
 

@@ -34,8 +34,8 @@ def report_command(
     from livebode.cli import write_documents
     from livebode.language import in_language
     from livebode.records import to_json
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.archive.contents import alarms_of, path_of, quarantine
-    from livebode_plant.archive.settings import lake_url
     from livebode_plant.lake import Lake
     from livebode_plant.report.hall_report import Hall
     from livebode_plant.trending import assess, histories

@@ -44,7 +44,7 @@ def trend_command(
     of the machines marked, at most 5 % are expected to be unchanged.
     """
     from livebode.records import to_json
-    from livebode_plant.archive.settings import lake_url
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.lake import Lake
     from livebode_plant.trending import assess, history
 

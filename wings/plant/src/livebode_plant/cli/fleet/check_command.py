@@ -16,8 +16,8 @@ def check_command(fleet: Fleet, as_json: Json = False) -> None:
     from livebode.records import to_json
     from livebode_plant.cli.fleet.verdict import require_exact, verdict
     from livebode_plant.fleet.check import CheckResult, check_results
+    from livebode_plant.fleet.fleet_settings import FleetSettings
     from livebode_plant.fleet.log import FleetLog
-    from livebode_plant.fleet.settings import FleetSettings
 
     settings = FleetSettings.read(fleet)
     axes = settings.read_axes()

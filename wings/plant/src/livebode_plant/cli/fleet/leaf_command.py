@@ -21,8 +21,8 @@ def leaf_command(
     It has public keys and paths, no secrets.
     """
     from livebode.records import to_json
+    from livebode_plant.fleet.fleet_settings import FleetSettings
     from livebode_plant.fleet.server_config import leaf_configuration
-    from livebode_plant.fleet.settings import FleetSettings
 
     text = leaf_configuration(FleetSettings.read(fleet), host=host, port=port)
     print(to_json({"configuration": text}) + "\n" if as_json else text, end="")

@@ -32,9 +32,9 @@ def replay_command(
 
     from livebode.core import FleetError, nearest_name
     from livebode.records import to_json
+    from livebode_plant.fleet.fleet_settings import FleetSettings
     from livebode_plant.fleet.log import FleetLog
     from livebode_plant.fleet.replay import replayed, write_replayed
-    from livebode_plant.fleet.settings import FleetSettings
     from livebode_plant.fleet.subjects import axis_path
 
     settings = FleetSettings.read(fleet)

@@ -27,11 +27,11 @@ def server_command(
     reads it at `nats-server --signal reload`.
     """
     from livebode.records import to_json
+    from livebode_plant.fleet.fleet_settings import FleetSettings
     from livebode_plant.fleet.partition_count import check_store
     from livebode_plant.fleet.server_access import server_access
     from livebode_plant.fleet.server_cluster import cluster_member
     from livebode_plant.fleet.server_config import server_configuration
-    from livebode_plant.fleet.settings import FleetSettings
 
     settings = FleetSettings.read(fleet)
     check_store(store, settings.partitions)

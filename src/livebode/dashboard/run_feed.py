@@ -20,7 +20,7 @@ _MEANS = 2000
 _RECENT_S = 600.0
 
 
-class Viewed:
+class RunFeed:
     """Passes the responses, parameters and events of a run directory, or of an entry of a matrix run, to a State."""
 
     def __init__(self, directory: Path, entry: str | None = None) -> None:
