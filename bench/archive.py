@@ -39,14 +39,20 @@ from livebode.core import Lines
 from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
 from livebode_plant.archive.alone import handle_alone
+from livebode_plant.archive.archive_settings import ArchiveSettings, ClusterSection
 from livebode_plant.archive.clusters import Cluster, started
 from livebode_plant.archive.coordinator import Committer
-from livebode_plant.archive.distributing import Distribution
-from livebode_plant.archive.grouping import RecordingGroups
+from livebode_plant.archive.distribution import Distribution
+from livebode_plant.archive.groups import RecordingGroups
 from livebode_plant.archive.job import Job
-from livebode_plant.archive.recordings import ArchivedRecording, RecordingPlace, file_rows, find_places, longest_first
-from livebode_plant.archive.results import Handled, Tracked, each_result, lost
-from livebode_plant.archive.settings import ArchiveSettings, ClusterSection
+from livebode_plant.archive.recording_places import (
+    ArchivedRecording,
+    RecordingPlace,
+    file_rows,
+    find_places,
+    longest_first,
+)
+from livebode_plant.archive.results import RecordingResults, TrackedResult, each_result, lost
 from livebode_plant.archive.tasks import handle, handle_one
 from livebode_plant.archive.template import Template
 from livebode_plant.lake import RUNS, Lake
@@ -94,15 +100,15 @@ def job_of(lake: Path, fit: bool) -> Job:
     return Job.of({"": axis}, str(lake), 2_000_000_000)
 
 
-def timed(job: Job, results: Callable[[], Iterable[Handled]], recordings: int) -> Cost:
+def timed(job: Job, results: Callable[[], Iterable[RecordingResults]], recordings: int) -> Cost:
     """Costs until all results are in the lake."""
     committer = Committer(Lake(job.lake), job)
     began, before_s = time.perf_counter(), processor_s()
     found = each_result(results())
-    committer.take(found)
+    committer.add(found)
     committer.commit()
     cost = Cost(time.perf_counter() - began, processor_s() - before_s)
-    assert sum(isinstance(one, Tracked) for one in found) == recordings, found[:2]
+    assert sum(isinstance(one, TrackedResult) for one in found) == recordings, found[:2]
     return cost
 
 
@@ -112,10 +118,10 @@ def processor_s() -> float:
     return sum(sum(one.cpu_times()[:2]) for one in (own, *own.children(recursive=True)))
 
 
-def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> Iterator[Handled]:
+def by_dask(cluster: Cluster, job: Job, recordings: list[ArchivedRecording]) -> Iterator[RecordingResults]:
     """As the coordinator does it."""
     groups = RecordingGroups(recordings)
-    work: Distribution[ArchivedRecording, Handled] = Distribution(
+    work: Distribution[ArchivedRecording, RecordingResults] = Distribution(
         cluster, groups, partial(handle, job), partial(handle_alone, job), lambda _: False, lost
     )
     for pairs in work.results():
@@ -146,7 +152,7 @@ def _print_lengths(folder: Path, rounds: int, pool: Pool, cluster: Cluster) -> N
         for fit in (False, True):
             recipes = tuple(job_of(own, fit).recipes)
             recordings = longest_first(ArchivedRecording(place, recipes) for place in places)
-            ways: dict[str, Callable[[Job], Iterable[Handled]]] = {
+            ways: dict[str, Callable[[Job], Iterable[RecordingResults]]] = {
                 "loop": lambda job, all_=recordings: (handle_one(job, one) for one in all_),
                 "pool": lambda job, all_=recordings: pool.imap_unordered(partial(handle_one, job), all_),
                 "dask": lambda job, all_=recordings: by_dask(cluster, job, all_),

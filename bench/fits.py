@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 
 from livebode.configuration import FitSection
 from livebode.core import PID, Lines, Loop, Responses
-from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit_together, two_masses
+from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit_each, two_masses
 from livebode.runtime import Fits
 from livebode_plant.fleet.fits_together import process_together
 
@@ -75,13 +75,13 @@ def axes_together(model: TwoMass, axes: int) -> Callable[[], float]:
 
     def run() -> float:
         fitters = [Fitter(model) for _ in range(axes)]
-        fit_together(fitters, [every[:16]] * axes)
+        fit_each(fitters, [every[:16]] * axes)
         times = []
         for i in range(16, 26):
             start = time.thread_time()
-            found = fit_together(fitters, [every[i : i + 1]] * axes)
+            found, _errors = fit_each(fitters, [every[i : i + 1]] * axes)
             times.append((time.thread_time() - start) / axes)
-            assert all(one.ok.all() for one in found)
+            assert all(found[axis].ok.all() for axis in range(axes))
         return statistics.median(times)
 
     return run

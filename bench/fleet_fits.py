@@ -50,7 +50,7 @@ def owner_cost(axis: Axis, messages: list[bytes], block_s: float, axes: int) -> 
         now_s = number * block_s
         begun = time.thread_time()
         for stream in streams:
-            stream.take(message, number, 1e9 + now_s)
+            stream.add(message, number, 1e9 + now_s)
         middle = time.thread_time()
         done = 0
         if now_s >= due_s - 1e-9:

@@ -12,8 +12,8 @@ from livebode.core import Channel, Lines, SpectraLayout
 from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 from livebode.sources.live import AnyBatch, Batch, SpectraBatch
+from livebode_plant.fleet.fleet_settings import machine_key
 from livebode_plant.fleet.message import write_message
-from livebode_plant.fleet.settings import machine_key
 
 RATE_HZ, WINDOW, FREQUENCIES = 4000.0, 400, "20:140:20"
 NAMES = ("w", "u", "velocity")

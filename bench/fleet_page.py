@@ -87,7 +87,7 @@ def board_cost(plant: Plant, seconds: int) -> None:
     """Take the messages of some seconds in the ticks of a page."""
     board, began_s = FleetBoard(), time.time()
     before = time.thread_time()
-    board.take(plant.names, began_s)
+    board.process(plant.names, began_s)
     print(f"names of {len(board.axes)} axes, once: {time.thread_time() - before:.2f} s of a core")
     before = time.thread_time()
     _ = board.looks
@@ -101,7 +101,7 @@ def board_cost(plant: Plant, seconds: int) -> None:
         status_bytes = sum(map(len, messages))
         for tick, part in enumerate(np.array_split(np.arange(len(messages)), ticks)):
             before = time.thread_time()
-            board.take([messages[i] for i in part], now_s + tick * TICK_S)
+            board.process([messages[i] for i in part], now_s + tick * TICK_S)
             board.refresh(now_s + tick * TICK_S)
             looks = board.looks
             sizes.append(len(tiles_frame(board.layout, looks, last)))

@@ -25,12 +25,12 @@ from bench.fleet_loads import SAMPLES_100, SAMPLES_500, SPECTRA, AxisLoad
 from bench.fleet_path import LOAD, state_every_s
 from livebode.sources.live import Sequencer, SourceEvents
 from livebode_plant.fleet.axis_stream import AxisStream, stacked_together
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message
 from livebode_plant.fleet.reader import Reader
 from livebode_plant.fleet.result_message import PendingResults
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM
 
 _MESSAGES, _ROUNDS, _AXES, _WARM = 96, 5, 50, 16
@@ -103,7 +103,7 @@ class MessageCosts:
     def _track_s(self, together: int) -> float:
         stream, spent_s = AxisStream(self._axis, 1), 0.0
         for number, message in enumerate(self._messages, 1):
-            stream.take(message, number, 0.0)
+            stream.add(message, number, 0.0)
             if number % together == 0:
                 began_s = time.thread_time()
                 stream.output()
@@ -137,7 +137,7 @@ class MessageCosts:
             for first in range(0, _OWNED, each):
                 part, began = slice(first, first + each), time.thread_time()
                 for stream, message in zip(streams[part], messages[part]):
-                    stream.take(message, number + 1, number * self._load.period_s)
+                    stream.add(message, number + 1, number * self._load.period_s)
                 taken = time.thread_time()
                 stacks, outputs = stacked_together(streams[part])
                 tracked, pending = time.thread_time(), PendingResults()

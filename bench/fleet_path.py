@@ -31,12 +31,12 @@ import psutil
 from bench.fleet_generator import Generated, generate
 from bench.fleet_loads import MOTION, SAMPLES_100, SAMPLES_500, SPECTRA, AxisLoad
 from livebode.sources.live import read_header
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.partition import STATE_S_MIN, STATE_SHARE
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.status import status_of
 from livebode_plant.fleet.subjects import LOG, LOG_STREAM, RESULT_STREAM, RESULTS, STATE_STREAM, key_of
 from livebode_plant.fleet.worker import own_partitions

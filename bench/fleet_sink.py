@@ -19,9 +19,9 @@ from livebode.core import Lines, Parameters, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
+from livebode_plant.fleet.fleet_settings import SinkSection
 from livebode_plant.fleet.log import StoredMessage
 from livebode_plant.fleet.result_message import ResultMessage
-from livebode_plant.fleet.settings import SinkSection
 from livebode_plant.fleet.sink_tables import SinkTables
 from livebode_plant.fleet.wide_rows import AxisFits, AxisRows, grid_of, parameter_table, response_table
 from livebode_plant.lake import Lake

@@ -32,7 +32,7 @@ EVERY_S = 0.2
 class NoTap(SignalTap):
     """Takes nothing."""
 
-    def take(self, block: Block, now_s: float) -> None:
+    def add(self, block: Block, now_s: float) -> None:
         """Nothing."""
 
 
@@ -54,7 +54,7 @@ def cost_s(hub: Hub, stream: list[Block], settings: Settings) -> float:
             hub(responses)
         hub(TrackerResults(block, block.stop, None))
     spent = time.thread_time() - began
-    hub.take()
+    hub.drain()
     return spent
 
 
@@ -67,7 +67,7 @@ def alone_s(stream: list[Block], *, watched: bool) -> float:
             tap.watch()
         now_s, began = time.monotonic(), time.thread_time()
         for block in stream:
-            tap.take(block, now_s)
+            tap.add(block, now_s)
         costs.append((time.thread_time() - began) / len(stream))
     return min(costs)
 

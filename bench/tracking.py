@@ -103,7 +103,7 @@ def timed(spent: dict[str, float]) -> Iterator[None]:
 def with_twin() -> Iterator[None]:
     """Trackers whose line stage and verdicts on lines are NumPy's."""
     process = patch.object(line_stage, "process_lines", line_twin.process_lines)
-    with process, patch.object(Judge, "take", repeating_twin.take):
+    with process, patch.object(Judge, "process", repeating_twin.process):
         yield
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Lines, Responses
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit
-from livebode.fitting.extended import LAG, MODE, Extended
+from livebode.fitting.extended_model import LAG, MODE, ExtendedModel
 from livebode.simulation import BeltAxis, Mechanics
 from studies.result import Verdict
 
@@ -66,7 +66,7 @@ def belt(**others: float) -> Complex:
 
 def with_extra(extra: str, **others: float) -> Complex:
     """Two masses with something beside them."""
-    model = Extended(BELT, (extra,), LINES.frequency_hz[-1])
+    model = ExtendedModel(BELT, (extra,), LINES.frequency_hz[-1])
     return model.at([(TRUTH | others).get(name, 0.0) for name in model.names], EvaluationGrid.of(LINES))
 
 

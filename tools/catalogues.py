@@ -25,7 +25,7 @@ from babel.messages.pofile import read_po, write_po
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.estimation.verdicts import KINDS as DOUBTS
 from livebode.fitting import model_named
-from livebode.fitting.extended import LAG, MODE, RESIDUAL, Extended
+from livebode.fitting.extended_model import LAG, MODE, RESIDUAL, ExtendedModel
 from livebode.fitting.models import MODELS
 from livebode.margins._margins import NAMES as MARGINS
 from livebode.monitoring import ALARMS, RETURNS, UNMONITORED
@@ -78,7 +78,7 @@ def _names() -> set[str]:
     """Names that are data: of quantities, parameters, margins and alarms."""
     found = {*QUANTITIES, *DIRECTIONS, *ALARMS, *RETURNS, *UNMONITORED, *CAUSES, *DOUBTS, *VALUES}
     for model in map(model_named, MODELS):
-        extended = Extended(model, (LAG, RESIDUAL, MODE), 100.0)
+        extended = ExtendedModel(model, (LAG, RESIDUAL, MODE), 100.0)
         found |= {name.replace("_", " ") for name in (*extended.names, *model.derived_names)}
     return found | {name.replace("_", " ") for name in MARGINS}
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from livebode.configuration import axis_schema
 from livebode_design.experiment_schema import experiment_schema, matrix_experiment_schema
-from livebode_plant.archive.settings import archive_schema
+from livebode_plant.archive.archive_settings import archive_schema
 
 HEAD = """# Configuration
 

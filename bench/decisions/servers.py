@@ -33,7 +33,7 @@ import asyncio, sys, uvicorn
 from flooded import app
 from livebode.dashboard.dashboard import listening
 from livebode.dashboard.server import Server
-from livebode.dashboard.settings import Serving
+from livebode.dashboard.server_settings import Serving
 config = uvicorn.Config(app, lifespan="off", log_config=None)
 asyncio.run(Server(config, listening(Serving("127.0.0.1", int(sys.argv[1]))), print).serve())
 """

@@ -22,7 +22,7 @@ from livebode.core import LivebodeError
 from livebode.publishing.outbox import Outbox
 from livebode.records import RunDirectory
 from livebode.runtime.segmented import make_way
-from livebode_plant.fleet.settings import SinkSection
+from livebode_plant.fleet.fleet_settings import SinkSection
 from livebode_plant.fleet.sink_tables import SinkTables
 from livebode_plant.lake import TABLES
 from tests.support.archives import coordinator, loop, write_archive

@@ -9,7 +9,7 @@ import pytest
 
 import livebode as package
 from livebode.configuration import read_serve_section
-from livebode.core.installing import _clone, _packages
+from livebode.core.optional_packages import _clone, _packages
 from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_csv, write_parquet
 from tests.support.terminals import on_terminal

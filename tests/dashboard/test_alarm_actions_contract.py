@@ -79,7 +79,7 @@ def test_a_shelf_is_recorded_and_survives_a_restart(watched: Watched) -> None:
     again.refresh()
     assert state_of(again) == "shelved"
     notice = again.notices.named("change: stiffness")
-    again.take([unshelving("change: stiffness", 1, 1.0, notice, "Bea")])
+    again.add([unshelving("change: stiffness", 1, 1.0, notice, "Bea")])
     assert state_of(again) == "acknowledged"
 
 
@@ -140,7 +140,7 @@ def test_the_run_that_continues_after_an_edit_has_the_shelf(tmp_path: Path) -> N
         found = next_control.take_recorded()
         assert [event.details["cause"] for event in found] == ["change: stiffness"] * shelved
         for event in found:
-            state.take([event])
+            state.add([event])
 
 
 def test_the_verdict_names_what_matters_most(tmp_path: Path) -> None:

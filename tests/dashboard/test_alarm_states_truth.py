@@ -90,30 +90,30 @@ def test_states_are_those_of_the_definition_and_of_a_record_that_is_read_again(c
         event = event_of(step, i, notices, first)
         done.append(step)
         if event is not None:
-            notices.take(event)
+            notices.add(event)
             record.append(Event(**from_line(to_line(asdict(event)))))
         for kind, cause in CAUSES.items():
             notice = notices.named(cause)
             assert (None if notice is None else notices.state(notice)) == expected(done, kind, now[0]), (kind, done)
     again = EventCauses(lambda: now[0])
     for event in [*record, *(one for one in record if one.kind in CAUSES)]:  # what was read is not counted twice
-        again.take(event)
+        again.add(event)
     assert [n | {"changed": 0} for n in again.since(0)] == [n | {"changed": 0} for n in notices.since(0)]
 
 
 def test_an_alarm_of_a_machine_that_is_not_ready_is_suppressed_and_one_of_its_source_is_not() -> None:
     notices = EventCauses()
-    notices.take(Event("change", 1, 1.0, "softer", {"what": "stiffness"}))
-    notices.take(Event("disconnected", 2, 2.0, "no connection"))
-    notices.take(Event(SUPPRESSED, 3, 3.0, "not ready", {"since_s": 2.5}))
-    notices.take(Event("baseline-unknown", 4, 4.0, "of a sample before", {"reason": "fast"}))
+    notices.add(Event("change", 1, 1.0, "softer", {"what": "stiffness"}))
+    notices.add(Event("disconnected", 2, 2.0, "no connection"))
+    notices.add(Event(SUPPRESSED, 3, 3.0, "not ready", {"since_s": 2.5}))
+    notices.add(Event("baseline-unknown", 4, 4.0, "of a sample before", {"reason": "fast"}))
     states = {notice.cause: state for notice, _, state in notices.alarms()}
     assert states == {CAUSES["change"]: "suppressed", SOURCE: "unacknowledged", "baseline-unknown: fast": "suppressed"}
     assert notices.suppressed_s == 2.5
-    notices.take(Event(ENDED, 5, 5.0, "ready"))
+    notices.add(Event(ENDED, 5, 5.0, "ready"))
     for i in range(6, 26, 2):  # a drive that is switched off in each cycle
-        notices.take(Event(SUPPRESSED, i, float(i), "not ready"))
-        notices.take(Event(ENDED, i + 1, i + 1.0, "ready"))
+        notices.add(Event(SUPPRESSED, i, float(i), "not ready"))
+        notices.add(Event(ENDED, i + 1, i + 1.0, "ready"))
     assert {state for _, _, state in notices.alarms()} == {"unacknowledged"}
     rows = [(row["what"], row["state"]) for row in notices.history.since(0) if row["cause"] == CAUSES["change"]]
     assert rows == [("raised", "unacknowledged"), ("suppressed", "suppressed"), ("unsuppressed", "unacknowledged")]
@@ -127,55 +127,55 @@ def test_every_alarm_has_an_end_and_every_end_an_alarm() -> None:
 def test_what_is_lost_in_a_silence_belongs_to_the_silence() -> None:
     notices = EventCauses()
     group = {"group": "connection@400", "first_s": 0.4, "last_s": 0.4}
-    notices.take(Event("disconnected", 400, 0.4, "the connection broke", group | {"count": 1}))
-    notices.take(Event("connected", 400, 0.4, "connected", group | {"count": 2}))
+    notices.add(Event("disconnected", 400, 0.4, "the connection broke", group | {"count": 1}))
+    notices.add(Event("connected", 400, 0.4, "connected", group | {"count": 2}))
     for kind, count in (("loss", 1), ("gap", 2)):
         details = {"missing_samples": 600, "group": "loss@1000", "count": count}
-        notices.take(Event(kind, 1000, 1.0, "600 samples were lost", details))
+        notices.add(Event(kind, 1000, 1.0, "600 samples were lost", details))
     assert [(n["cause"], n["count"], n["alarm"]["state"]) for n in notices.since(0)] == [(SOURCE, 4, "returned")]
-    notices.take(Event("loss", 3000, 3.0, "7 lost", {"missing_samples": 7, "group": "loss@1000", "count": 3}))
+    notices.add(Event("loss", 3000, 3.0, "7 lost", {"missing_samples": 7, "group": "loss@1000", "count": 3}))
     assert [n["cause"] for n in notices.since(0)] == [SOURCE, "loss"]
 
 
 def test_an_unknown_difference_ends_when_it_is_identified() -> None:
     notices = EventCauses()
-    notices.take(Event("change", 1, 1.0, "far", {"what": "machine"}))
-    notices.take(Event("change", 2, 2.0, "stiffness", {"what": "stiffness", "amount_percent": -9.0}))
+    notices.add(Event("change", 1, 1.0, "far", {"what": "machine"}))
+    notices.add(Event("change", 2, 2.0, "stiffness", {"what": "stiffness", "amount_percent": -9.0}))
     assert notices.changed == {"stiffness"}
-    notices.take(Event("change", 3, 3.0, "at a place", {"what": "stiffness", "place_m": 0.35}))
-    notices.take(Event("change-cleared", 4, 4.0, "as before", {"what": "stiffness"}))
+    notices.add(Event("change", 3, 3.0, "at a place", {"what": "stiffness", "place_m": 0.35}))
+    notices.add(Event("change-cleared", 4, 4.0, "as before", {"what": "stiffness"}))
     assert notices.changed == {"stiffness"}, "the one at a place is still there"
 
 
 def test_an_alarm_that_comes_and_goes_is_one_row_of_the_history_that_counts() -> None:
     notices = EventCauses()
     for i in range(30):
-        notices.take(Event("backlog", i, float(i), "behind"))
-        notices.take(Event("backlog-cleared", i, i + 0.5, "caught up"))
+        notices.add(Event("backlog", i, float(i), "behind"))
+        notices.add(Event("backlog-cleared", i, i + 0.5, "caught up"))
     (notice,) = notices.since(0)
     assert notice["alarm"]["chatters_until_s"] == 29.0 - (CHATTER_TIMES - 1) + CHATTER_S
     rows = notices.history.since(0)
     assert [row["what"] for row in rows] == ["raised", "returned", "raised", "returned", "chattering"]
     assert rows[-1]["count"] == 28
-    notices.take(Event("backlog", 99, 200.0, "behind"))
+    notices.add(Event("backlog", 99, 200.0, "behind"))
     assert notices.history.since(0)[-1]["what"] == "raised"
     assert notices.since(0)[0]["alarm"]["chatters_until_s"] is None
 
 
 def test_a_flood_of_causes_forgets_first_what_needs_nothing() -> None:
     notices = EventCauses()
-    notices.take(Event("change", 0, 0.0, "stiffness", {"what": "stiffness"}))
+    notices.add(Event("change", 0, 0.0, "stiffness", {"what": "stiffness"}))
     for i in range(3 * CAUSES_MAX):
-        notices.take(Event("steps", i, float(i), "steps", {"channel": f"channel {i}"}))
+        notices.add(Event("steps", i, float(i), "steps", {"channel": f"channel {i}"}))
     found = notices.since(0)
     assert len(found) == CAUSES_MAX
     assert "change: stiffness" in [n["cause"] for n in found]
     for i in range(CAUSES_MAX):
-        notices.take(Event("roles-doubtful", i, float(i), "doubtful", {"reason": f"cause {i}"}))
+        notices.add(Event("roles-doubtful", i, float(i), "doubtful", {"reason": f"cause {i}"}))
     assert "change: stiffness" in [n["cause"] for n in notices.since(0)], "it has the highest priority"
     assert len(notices.forgotten(notices.version - 1)) == 1
     for i in range(3 * CAUSES_MAX):
-        notices.take(Event("change", i, float(i), "changed", {"what": f"part {i}"}))
+        notices.add(Event("change", i, float(i), "changed", {"what": f"part {i}"}))
     assert len(notices.since(0)) == CAUSES_MAX
     assert len(notices.history.since(0)) == ROWS_MAX
 

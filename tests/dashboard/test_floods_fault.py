@@ -103,13 +103,13 @@ def test_an_operator_takes_the_place_of_the_oldest_viewer_and_nobody_that_of_an_
     gone = list[str]()
     places = Places(open=False)
     viewers = [ClientPlace("viewer", f"192.0.2.{n}", lambda n=n: gone.append(f"viewer {n}")) for n in range(PLACES)]
-    assert all(map(places.take, viewers))
-    assert not places.take(ClientPlace("viewer", "::1", lambda: None))
+    assert all(map(places.enter, viewers))
+    assert not places.enter(ClientPlace("viewer", "::1", lambda: None))
     operators = [ClientPlace("operator", "::1", lambda n=n: gone.append(f"operator {n}")) for n in range(PLACES + 1)]
-    assert [places.take(one) for one in operators] == [True] * PLACES + [False]
+    assert [places.enter(one) for one in operators] == [True] * PLACES + [False]
     assert gone == [f"viewer {n}" for n in range(PLACES)]
     places.leave(operators[0])
-    assert places.take(operators[-1])
+    assert places.enter(operators[-1])
 
 
 def test_a_client_that_does_not_read_delays_no_other(watched: Watched) -> None:
@@ -302,7 +302,7 @@ def test_internal_errors_of_the_server_are_reported_once_a_minute() -> None:
         try:
             raise ValueError("odd")
         except ValueError as error:
-            faults.take(error)
+            faults.report(error)
     assert len(messages) == 1
     assert "internal error in the dashboard: ValueError('odd') at" in messages[0]
 

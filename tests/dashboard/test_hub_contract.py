@@ -116,10 +116,10 @@ def test_memory_is_bounded_and_losses_are_counted_when_nobody_reads() -> None:
         hub(many)
         hub(Event("gap", 0, 0.0, "a gap"))
     assert hub._values <= VALUES_MAX
-    items = hub.take()
+    items = hub.drain()
     assert sum(isinstance(item, Responses) for item in items) + hub.given_up == batches
     assert sum(isinstance(item, Event) for item in items) <= EVENTS_MAX
-    assert hub.take() == []
+    assert hub.drain() == []
     control = RunControl()
     hub(RunStarted(Path("run"), {}, control, Overview()))
     assert all(hub.record(Event("acknowledged", 0, 0.0, "seen")) for _ in range(64))
@@ -134,8 +134,8 @@ def test_taking_and_publishing_at_once_loses_nothing() -> None:
     writing = threading.Thread(target=lambda: [hub(one) for _ in range(20_000)])
     writing.start()
     while writing.is_alive():
-        seen += len(hub.take())
-    assert seen + len(hub.take()) + hub.given_up == 20_000
+        seen += len(hub.drain())
+    assert seen + len(hub.drain()) + hub.given_up == 20_000
 
 
 def tracked(block: Block) -> TrackerResults:
@@ -154,7 +154,7 @@ def test_the_mailbox_is_bounded_for_batches_of_one_response() -> None:
     hub, one = Hub("axis"), made(1, LINES)
     for _ in range(ITEMS_MAX + 100):
         hub(one)
-    assert len(hub.take()) == ITEMS_MAX
+    assert len(hub.drain()) == ITEMS_MAX
     assert hub.given_up == 100
 
 
@@ -208,34 +208,34 @@ def test_a_trend_is_evenly_thinned_however_it_came(sizes: list[int]) -> None:
 def test_notices_are_bounded_and_known_again() -> None:
     notices = EventCauses()
     for i in range(CAUSES_MAX + 500):
-        notices.take(Event("change", i, float(i), "changed", {"what": f"part {i}"}))
+        notices.add(Event("change", i, float(i), "changed", {"what": f"part {i}"}))
     assert len(notices.since(0)) == CAUSES_MAX
     notices = EventCauses()
     event = Event("change", 7, 1.0, "changed")
-    notices.take(event)
-    notices.take(event)
+    notices.add(event)
+    notices.add(event)
     assert notices.counts["change"] == 1
     before = notices.version
-    notices.take(Event("acknowledged", 9, 2.0, "seen", {"event": event_id(event), "count": 1}))
+    notices.add(Event("acknowledged", 9, 2.0, "seen", {"event": event_id(event), "count": 1}))
     assert [(n["id"], n["count"], n["seen"]) for n in notices.since(before)] == [(event_id(event), 1, 1)]
-    notices.take(Event("acknowledged", 9, 2.0, "seen", {"event": "unknown"}))
+    notices.add(Event("acknowledged", 9, 2.0, "seen", {"event": "unknown"}))
 
 
 def test_events_of_one_cause_are_one_notice_and_acknowledged_up_to_the_one_that_was_seen() -> None:
     notices = EventCauses()
     events = [Event("change", i, float(i), f"stiffness less, {i}", {"what": "stiffness"}) for i in range(1000)]
     for event in events:
-        notices.take(event)
-    notices.take(Event("change", 5, 5.0, "inertia more", {"what": "inertia"}))
+        notices.add(event)
+    notices.add(Event("change", 5, 5.0, "inertia more", {"what": "inertia"}))
     stiffness, inertia = notices.since(0)
     assert (stiffness["count"], stiffness["first_s"], stiffness["last_s"]) == (1000, 0.0, 999.0)
     assert stiffness["message"] == "stiffness less, 999"
     assert inertia["count"] == 1
     notice, count = notices.of(event_id(events[900]))  # type: ignore[misc]
-    notices.take(acknowledgement(notice, event_id(events[900]), count, 1000, 10.0))
+    notices.add(acknowledgement(notice, event_id(events[900]), count, 1000, 10.0))
     assert [n["seen"] for n in notices.since(0)] == [901, 0]
     assert notices.changed == {"stiffness", "inertia"}
-    notices.take(Event("change-cleared", 1001, 11.0, "stiffness as learned", {"what": "stiffness"}))
+    notices.add(Event("change-cleared", 1001, 11.0, "stiffness as learned", {"what": "stiffness"}))
     assert notices.changed == {"inertia"}
 
 
@@ -243,8 +243,8 @@ def test_groups_that_the_run_made_are_counted_by_what_they_say() -> None:
     """Their repeats share lines; after a pause the same cause begins another group."""
     notices = EventCauses()
     for sample, name, count in ((0, "loss@0", 1), (10, "loss@0", 2), (40, "loss@0", 8), (900, "loss@900", 1)):
-        notices.take(Event("gap", sample, sample / 10, "a gap", {"group": name, "count": count, "first_s": 0.0}))
-    notices.take(Event("overflow", 950, 95.0, "dropped", {"group": "loss@900", "count": 2, "first_s": 90.0}))
+        notices.add(Event("gap", sample, sample / 10, "a gap", {"group": name, "count": count, "first_s": 0.0}))
+    notices.add(Event("overflow", 950, 95.0, "dropped", {"group": "loss@900", "count": 2, "first_s": 90.0}))
     (notice,) = notices.since(0)
     assert (notice["cause"], notice["kind"], notice["count"], notice["last_s"]) == ("loss", "overflow", 10, 95.0)
 

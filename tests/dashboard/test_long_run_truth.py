@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from livebode.dashboard import Past
+from livebode.dashboard.run_feed import RunFeed
 from livebode.dashboard.state import State
-from livebode.dashboard.viewed import Viewed
 from livebode.records import RunRecord, thinned
 from tests.support.long_runs import PLANT, noisy_responses, record_long
 
@@ -19,7 +19,7 @@ RESPONSES = noisy_responses(1500, seed=5)
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A finished run of 25 min in segments of 100 s, that is long enough."""
-    monkeypatch.setattr("livebode.dashboard.viewed._LONG_BYTES", 1)
+    monkeypatch.setattr("livebode.dashboard.run_feed._LONG_BYTES", 1)
     monkeypatch.setattr("livebode.dashboard.past._READ_BYTES", 1)
     record_long(tmp_path, 100.0, RESPONSES)
     return tmp_path
@@ -27,7 +27,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_the_page_has_means_of_the_whole_run_and_its_newest_responses(run: Path) -> None:
     state = State("axis", 0)
-    Viewed(run).fill(state)
+    RunFeed(run).fill(state)
     whole, recent = state.overview.responses(), state.recent.all()
     assert recent is not None
     assert state.newest is not None

@@ -56,7 +56,7 @@ def test_the_tap_has_the_newest_second_however_the_samples_arrive(pieces: list[t
     for n, gap in pieces:
         at += gap
         truth[:, at : at + n] = rng.normal(size=(2, n))
-        tap.take(block_of(truth[:, at : at + n], at), 0.0)
+        tap.add(block_of(truth[:, at : at + n], at), 0.0)
         at += n
     found = tap.newest()
     assert found is not None
@@ -97,7 +97,7 @@ def test_a_source_of_spectra_is_recognised() -> None:
     tap = SignalTap()
     tap.watch()
     sums, state = np.zeros((2, 3, len(layout.bins)), complex), np.zeros(3, np.uint32)
-    tap.take(Spectra(np.zeros((2, 3)), CHANNELS, 4000.0, layout=layout, sums=sums, state=state, place=0), 0.0)
+    tap.add(Spectra(np.zeros((2, 3)), CHANNELS, 4000.0, layout=layout, sums=sums, state=state, place=0), 0.0)
     assert tap.spectra
     assert tap.newest() is None
 

@@ -87,6 +87,6 @@ def test_a_tracker_gives_the_bits_of_its_twins(drawn, seed, faults, edges, missi
     made, pieces = possible(drawn), blocks(seed, faults, edges, missing)
     found = responses(made, pieces)
     process = patch.object(line_stage, "process_lines", line_twin.process_lines)
-    with process, patch.object(Judge, "take", repeating_twin.take):
+    with process, patch.object(Judge, "process", repeating_twin.process):
         expected = responses(made, pieces)
     assert found.equals(expected)

@@ -176,7 +176,7 @@ def assert_same_bits(one: tuple, other: tuple) -> None:
 def judged_in_pieces(case: Case, judge: Judge, periods: PeriodSpectra) -> tuple[PeriodVerdicts, PeriodState]:
     state, before, begun, every = empty_state(judge), None, 0, []
     for count in case.pieces:
-        before, *numbers = judge.take(state, some(periods, begun, begun + count, before))
+        before, *numbers = judge.process(state, some(periods, begun, begun + count, before))
         state = state._replace(largest=numbers[0], step=numbers[1])
         every.append(before)
         begun += count
@@ -196,7 +196,7 @@ def test_verdicts_and_state_have_the_bits_of_the_twin_however_the_periods_are_di
     periods = periods_of(case, judge)
     found, state = judged_in_pieces(case, judge, periods)
     of_twin = empty_state(judge)
-    expected, largest, step = repeating_twin.take(judge, of_twin, periods)
+    expected, largest, step = repeating_twin.process(judge, of_twin, periods)
     assert_same_bits(found, without_unjudged(expected))
     assert_same_bits(state, of_twin._replace(largest=largest, step=step))
 
@@ -222,7 +222,7 @@ def test_an_error_in_what_is_rarely_needed_is_raised():
         raise ArithmeticError("no step")
 
     with pytest.raises(ArithmeticError, match="no step"):
-        judge.take(empty_state(judge), periods_of(case, judge)._replace(step_of=failing))
+        judge.process(empty_state(judge), periods_of(case, judge)._replace(step_of=failing))
 
 
 def settings_of(judge: Judge) -> RepeatingSettings:

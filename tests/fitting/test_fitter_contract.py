@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from livebode.core import Event, FitError, GridError, Lines, Parameters, Responses, SignalError, UsageError
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit, model_named
-from livebode.fitting.weighing import epsilon_for
+from livebode.fitting.weights import epsilon_for
 from tests.support.errors import refused
 from tests.support.fitted import LINES, TRUTH, noisy
 from tests.support.found import with_events

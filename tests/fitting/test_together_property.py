@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Event, Lines, Parameters, Responses, SignalError
-from livebode.fitting import EvaluationGrid, Fitter, PhysicalModel, Rigid, TwoMass, fit_together
+from livebode.fitting import EvaluationGrid, Fitter, PhysicalModel, Rigid, TwoMass, fit_each
 from tests.support.errors import refused
 from tests.support.fitted import LINES, TRUTH, noisy
 
@@ -50,7 +50,8 @@ def test_each_axis_gets_what_it_would_get_alone(steps: list[list[int]]) -> None:
     expected: list[list[Event]] = [[] for _ in HALL]
     for step in steps:
         batches = [every[a : a + n] for every, a, n in zip(HALL, at, step)]
-        found = fit_together(together, batches, [one.append for one in events])
+        found, errors = fit_each(together, batches, [one.append for one in events])
+        assert not errors
         for i, fitter in enumerate(alone):
             same(found[i], fitter.process(batches[i], expected[i].append))
         at = [a + n for a, n in zip(at, step)]
@@ -59,8 +60,10 @@ def test_each_axis_gets_what_it_would_get_alone(steps: list[list[int]]) -> None:
 
 def test_an_axis_that_cannot_be_fitted_is_refused_as_alone() -> None:
     loop = Responses(**{**vars(HALL[1]), "quantity": "open loop"})
+    found, errors = fit_each([Fitter(BELT), Fitter(BELT)], [HALL[0], loop])
+    assert list(found) == [0]
     with refused(SignalError, "wrong-quantity"):
-        fit_together([Fitter(BELT), Fitter(BELT)], [HALL[0], loop])
+        raise errors[1]
 
 
 def test_a_parameter_that_only_one_row_fixes_at_zero_has_no_slope() -> None:

@@ -11,8 +11,8 @@ import pytest
 
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.fitting import model_named
-from livebode.fitting.extended import WORDS as EFFECTS
-from livebode.fitting.extended import Extended
+from livebode.fitting.extended_model import WORDS as EFFECTS
+from livebode.fitting.extended_model import ExtendedModel
 from livebode.fitting.models import MODELS
 from livebode.fitting.rows import SENTENCES as FITS
 from livebode.language import available
@@ -114,7 +114,7 @@ def kinds() -> set[str]:
 def test_kinds_parameters_statuses_and_margins_have_names() -> None:
     shown = {*QUANTITIES, *DIRECTIONS, *WHAT.values(), *EFFECTS.values(), *FITS, *MARGIN_WORDS.values(), *kinds()}
     for model in map(model_named, MODELS):
-        extended = Extended(
+        extended = ExtendedModel(
             model, tuple(e for e in EFFECTS if e in ("lag", "residual compliance", "further mode")), 100.0
         )
         shown |= {name.replace("_", " ") for name in (*extended.names, *model.derived_names)} | {model.name}

@@ -18,8 +18,8 @@ from livebode.cli.app import app
 from livebode.configuration import axis_schema
 from livebode.plugins import named
 from livebode_design.experiment_schema import experiment_schema, matrix_experiment_schema
-from livebode_plant.archive.settings import archive_schema
-from livebode_plant.fleet.settings import FleetSettings
+from livebode_plant.archive.archive_settings import archive_schema
+from livebode_plant.fleet.fleet_settings import FleetSettings
 from tests.support.sentences import literals, made, templates, text_of
 
 COMMAND = re.compile(r"\blivebode ((?:[a-z]+(?:-[a-z]+)*)(?: [a-z]+)?)([^`;()]*)")
@@ -33,7 +33,7 @@ ELSEWHERE = {
     ("cli/inspect_command.py", "--estimator"): "the sentence is about the run that follows",
     ("cli/inspect_command.py", "--output-only"): "of run, friction and orders, which the sentence names",
     ("cli/configuration_dialog.py", "--output-only"): "of the command line of run that is composed of it",
-    ("core/installing.py", "--editable"): "of pip",
+    ("core/optional_packages.py", "--editable"): "of pip",
 }
 """Options that do not belong to the command whose module names them, and why."""
 ATTRIBUTES = {("loop", "feedback"), ("loop", "entry")}

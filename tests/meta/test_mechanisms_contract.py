@@ -25,7 +25,7 @@ SOURCES = (ROOT / "src/livebode", *ROOT.glob("wings/*/src"))
             r"(TemporaryDirectory|NamedTemporaryFile)\(",
             {
                 *("cli/validate_command.py", "dashboard/app.py", "export/universal.py", "livebode_reports/pdf.py"),
-                *(f"livebode_plant/{name}.py" for name in ("archive/alone", "archive/tracking", "lake/compaction")),
+                *(f"livebode_plant/{name}.py" for name in ("archive/alone", "archive/tasks", "lake/compaction")),
                 "livebode_plant/cli/fleet/demo_command.py",
             },
         ),

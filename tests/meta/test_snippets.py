@@ -19,8 +19,8 @@ from livebode.configuration import Axis, tables_of
 from livebode.configuration.axes import merged
 from livebode_design import Experiment, MatrixExperiment
 from livebode_design.matrix.matrix_experiment import TABLES
-from livebode_plant.archive.settings import ArchiveSettings
-from livebode_plant.fleet.settings import FleetSettings
+from livebode_plant.archive.archive_settings import ArchiveSettings
+from livebode_plant.fleet.fleet_settings import FleetSettings
 from tests.support.pages import PAGES, ROOT, steps_of
 
 ARCHIVE = {"inputs": ["*.csv"], "recipe": "recipe.toml", "lake": "lake"}

@@ -103,9 +103,9 @@ def test_a_query_has_a_row_of_each_entry_and_line_for_each_mean(directory: Path)
 
 
 def test_the_page_of_an_entry_has_means_of_a_long_run(directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("livebode.dashboard.viewed._LONG_BYTES", 1)
-    monkeypatch.setattr("livebode.dashboard.viewed._MEANS", SECONDS // 2)
-    monkeypatch.setattr("livebode.dashboard.viewed._RECENT_S", 10.0)
+    monkeypatch.setattr("livebode.dashboard.run_feed._LONG_BYTES", 1)
+    monkeypatch.setattr("livebode.dashboard.run_feed._MEANS", SECONDS // 2)
+    monkeypatch.setattr("livebode.dashboard.run_feed._RECENT_S", 10.0)
     views = views_of(directory)
     assert [state.entry for state, _ in views] == [f"{output}/{input}" for output, input in ENTRIES]
     state = views[2][0]

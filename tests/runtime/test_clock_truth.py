@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from livebode.configuration import Axis
 from livebode.core import ConfigError, Event, RunClock, UsageError, date_and_time, moment, moment_of_start, moments_by
+from livebode.dashboard.run_feed import RunFeed
 from livebode.dashboard.state import State
-from livebode.dashboard.viewed import Viewed
 from livebode.records import RUN, RunRecord, query
 from livebode.records.summary_file import to_document
 from livebode.runtime import Destination, run
@@ -137,7 +137,7 @@ def test_a_live_run_whose_sender_numbers_from_0_is_dated_everywhere_the_same(tmp
     shown = f"{datetime.fromtimestamp(unix_s + gap.time_s).astimezone():%Y-%m-%d %H:%M:%S %Z}"
     assert query(run, "SELECT moment FROM events WHERE kind = 'gap'", 1).rows == [(shown,)]
     state = State("axis", 0)
-    Viewed(session.run).fill(state)
+    RunFeed(session.run).fill(state)
     assert state.span()["clock"] == [(0.0, unix_s)]
     assert livebode("report", session.run).code == 0
     assert shown in (session.run / "report.html").read_text()

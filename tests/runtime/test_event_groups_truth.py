@@ -166,7 +166,7 @@ class Page:
 
     def __call__(self, document: Document) -> None:
         if isinstance(document, Event):
-            self.notices.take(document)
+            self.notices.add(document)
 
 
 class Gaps:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from bench.fleet_sink import BEGIN_S, messages, tracked
-from livebode_plant.fleet.settings import SinkSection
+from livebode_plant.fleet.fleet_settings import SinkSection
 from livebode_plant.fleet.sink_tables import SinkTables
 from livebode_plant.lake import Lake
 

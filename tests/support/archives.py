@@ -15,11 +15,17 @@ import pyarrow.parquet as pq
 from deltalake import DeltaTable
 from distributed import LocalCluster
 
+from livebode_plant.archive.archive_settings import ArchiveSettings
 from livebode_plant.archive.coordinator import Committer, Coordinator, Progress
 from livebode_plant.archive.job import Job
-from livebode_plant.archive.recordings import ArchivedRecording, RecordingPlace, find_places, known_contents, untracked
-from livebode_plant.archive.results import Hashed, each_result
-from livebode_plant.archive.settings import ArchiveSettings
+from livebode_plant.archive.recording_places import (
+    ArchivedRecording,
+    RecordingPlace,
+    find_places,
+    known_contents,
+    untracked,
+)
+from livebode_plant.archive.results import HashedContent, each_result
 from livebode_plant.archive.tasks import handle
 from livebode_plant.lake import TABLES, Lake
 
@@ -108,8 +114,8 @@ def loop(archive: Path, lake: str) -> Lake:
     job = Job.of(settings.axes(), lake, 10**12, settings.baselines)
     contents = contents_of(job, find_places(settings.templates))
     committer = Committer(into, job)
-    committer.take(Hashed(place, content) for place, content in contents)
-    committer.take(each_result(handle(job, untracked(contents, job.recipes, into.keys("runs")))))
+    committer.add(HashedContent(place, content) for place, content in contents)
+    committer.add(each_result(handle(job, untracked(contents, job.recipes, into.keys("runs")))))
     committer.commit()
     assert set(known_contents(into)[0].values()) >= {content for _, content in contents}
     return into
@@ -118,7 +124,7 @@ def loop(archive: Path, lake: str) -> Lake:
 def contents_of(job: Job, places: list[RecordingPlace]) -> list[tuple[RecordingPlace, str]]:
     """The content at each place."""
     found = each_result(handle(job, [ArchivedRecording(place) for place in places]))
-    return [(one.place, one.content) for one in found if isinstance(one, Hashed)]
+    return [(one.place, one.content) for one in found if isinstance(one, HashedContent)]
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ import pytest
 
 from livebode.configuration import FitSection, RecordSection
 from livebode.core import DamageWarning, Event, LivebodeError, RecordError, UsageError
+from livebode.dashboard.run_feed import RunFeed
 from livebode.dashboard.state import State
-from livebode.dashboard.viewed import Viewed
 from livebode.estimation import Tracker
 from livebode.records import RunRecord, query
 from livebode.runtime import Document, Fits, TrackerResults
@@ -124,7 +124,7 @@ def commands(path: Path, out: Path) -> dict[str, Callable[[], Any]]:
         "export": command("export", path, "--to", "csv", "--out", out / "a.csv", "--force"),
         "parameters": command("export", path, "--to", "csv", "--parameters", "--out", out / "b.csv", "--force"),
         "fit": command("fit", path),
-        "view": lambda: Viewed(path).fill(State(path.name, 0)),
+        "view": lambda: RunFeed(path).fill(State(path.name, 0)),
         "report": lambda: run_report(path, None, made=datetime(2026, 1, 1, tzinfo=UTC)),
     }
 

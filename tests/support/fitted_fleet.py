@@ -13,9 +13,9 @@ import livebode
 from livebode.configuration import Axis
 from livebode.core import Channel
 from livebode.sources.live import Batch
+from livebode_plant.fleet.fleet_settings import LogSection, machine_key
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import message_id, write_message
-from livebode_plant.fleet.settings import LogSection, machine_key
 from livebode_plant.fleet.subjects import EDGE
 
 RATE_HZ, SAMPLES = 4000.0, 400

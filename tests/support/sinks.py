@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 from pathlib import Path
 
+from livebode_plant.fleet.fleet_settings import LogSection, SinkSection
 from livebode_plant.fleet.log import FleetLog
-from livebode_plant.fleet.settings import LogSection, SinkSection
 from livebode_plant.fleet.sink import Sink
 from livebode_plant.fleet.sink_tables import SinkTotals
 

@@ -1,4 +1,4 @@
-"""The NumPy twin of the verdicts on lines: the readable definition of what `Judge.take` computes in C.
+"""The NumPy twin of the verdicts on lines: the readable definition of what `Judge.process` computes in C.
 
 Period by period, with the same operations in the same order for each line, so C must agree with it to the bit (except
 for the sign and payload of NaN). `Distortion` and `Mains` have the definitions of their parts.
@@ -38,7 +38,7 @@ _DISTORTED = 0.5  # of |G|: from where on the value is not that of a linear mach
 _STEPS = 0.5  # amplitude in steps of the sensor below which a line may not be seen at all
 
 
-def take(judge: Judge, state: PeriodState, periods: PeriodSpectra) -> tuple[PeriodVerdicts, float, float]:
+def process(judge: Judge, state: PeriodState, periods: PeriodSpectra) -> tuple[PeriodVerdicts, float, float]:
     """The verdicts after each of some periods, and `largest` and `step` of the state after them."""
     twin = _Twin(judge, state, periods)
     with np.errstate(all="ignore"):

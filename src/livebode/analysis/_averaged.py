@@ -116,7 +116,7 @@ def averaged(run: RunRecord) -> Averaged:
     SignalError, RecordError
         If no line is ever valid, or the run cannot be read.
     """
-    mean, overview, counted = running_mean(run), Overview(), _Counted(run)
+    mean, overview, counted = running_mean(run), Overview(), _RunProperties(run)
     for part in run.steady_batches():
         mean.add(part)
         overview.add(part)
@@ -167,7 +167,7 @@ def mean_of(run: RunRecord) -> Responses:
     return mean.response()
 
 
-class _Counted:
+class _RunProperties:
     """Further properties of a run's responses."""
 
     def __init__(self, run: RunRecord) -> None:

@@ -30,7 +30,7 @@ def fit_run(directory: Path, section: FitSection, entry: str | None = None) -> t
 
 
 def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
-    """The same for the average of a run."""
+    """Model fitted to the average of a run, and its sentence."""
     words = of.words
     if not of.response.unit:
         words = Message("{mean}; the run has no units: N m, and rad/s or rad are assumed", mean=words)

@@ -66,10 +66,10 @@ from livebode.core.document import PrintedTable as PrintedTable
 from livebode.core.document import Section as Section
 from livebode.core.document import Tone as Tone
 from livebode.core.document import document_function as document_function
-from livebode.core.ending import ENDING as ENDING
-from livebode.core.ending import Handler as Handler
-from livebode.core.ending import calls_at_end as calls_at_end
-from livebode.core.ending import handled as handled
+from livebode.core.end_signals import ENDING as ENDING
+from livebode.core.end_signals import Handler as Handler
+from livebode.core.end_signals import calls_at_end as calls_at_end
+from livebode.core.end_signals import handled as handled
 from livebode.core.errors import ArchiveError as ArchiveError
 from livebode.core.errors import BaselineError as BaselineError
 from livebode.core.errors import ConfigError as ConfigError
@@ -102,10 +102,6 @@ from livebode.core.files import whole_file as whole_file
 from livebode.core.files import whole_files as whole_files
 from livebode.core.files import write_all as write_all
 from livebode.core.files import write_whole as write_whole
-from livebode.core.installing import install_command as install_command
-from livebode.core.installing import needing as needing
-from livebode.core.installing import not_installed as not_installed
-from livebode.core.installing import packages_of as packages_of
 from livebode.core.lines import WINDOW_MAX as WINDOW_MAX
 from livebode.core.lines import Lines as Lines
 from livebode.core.lines import check_window as check_window
@@ -121,6 +117,10 @@ from livebode.core.model import Algebra as Algebra
 from livebode.core.model import Gain as Gain
 from livebode.core.model import Model as Model
 from livebode.core.model import as_model as as_model
+from livebode.core.optional_packages import install_command as install_command
+from livebode.core.optional_packages import needing as needing
+from livebode.core.optional_packages import not_installed as not_installed
+from livebode.core.optional_packages import packages_of as packages_of
 from livebode.core.parameters import OK as OK
 from livebode.core.parameters import Parameters as Parameters
 from livebode.core.parameters import half_width as half_width

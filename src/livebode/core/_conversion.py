@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from livebode.core.installing import not_installed
+from livebode.core.optional_packages import not_installed
 
 if TYPE_CHECKING:
     from pandas import DataFrame

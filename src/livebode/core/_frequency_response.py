@@ -44,7 +44,7 @@ class FrequencyResponse:
     unit: str
 
     def _batch(self) -> Responses:
-        """The same as Responses."""
+        """This response as Responses."""
         raise NotImplementedError
 
     def __call__(self, frequency_hz: ArrayLike) -> Any:

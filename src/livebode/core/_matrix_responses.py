@@ -96,7 +96,7 @@ class MatrixResponses(RowArrays):
 
     @property
     def frequency_hz(self) -> Floats:
-        """Of the lines, shape (lines,)."""
+        """Frequencies of the lines, shape (lines,)."""
         return self.lines.frequency_hz
 
     @property
@@ -118,7 +118,9 @@ class MatrixResponses(RowArrays):
 
     @property
     def singular_values(self) -> Floats:
-        """Of each matrix, descending, shape (rows, lines, least of outputs and inputs); NaN where a column is invalid.
+        """Singular values of each matrix, descending; NaN where a column is invalid.
+
+        The shape is (rows, lines, least of outputs and inputs).
 
         They depend on the units of inputs and outputs: scale these first where the units differ.
         """

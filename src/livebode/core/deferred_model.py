@@ -22,6 +22,6 @@ class DeferredModel(BaseModel):
 
     @classmethod
     def model_rebuild(cls, *, _parent_namespace_depth: int = 2, **options: Any) -> bool | None:
-        """As pydantic does it; a thread that comes second waits and finds the model complete."""
+        """Build the model; a thread that comes second waits and finds it complete."""
         with _building:
             return super().model_rebuild(_parent_namespace_depth=_parent_namespace_depth + 1, **options)

@@ -40,18 +40,18 @@ class Algebra:
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         raise NotImplementedError
 
-    def __mul__(self, other: object) -> Combined:
-        return Combined(np.multiply, self, as_model(other))
+    def __mul__(self, other: object) -> CombinedModel:
+        return CombinedModel(np.multiply, self, as_model(other))
 
-    def __add__(self, other: object) -> Combined:
-        return Combined(np.add, self, as_model(other))
+    def __add__(self, other: object) -> CombinedModel:
+        return CombinedModel(np.add, self, as_model(other))
 
     __rmul__ = __mul__
     __radd__ = __add__
 
 
 @dataclass(frozen=True)
-class Combined(Algebra):
+class CombinedModel(Algebra):
     """Two Models combined at each frequency."""
 
     operation: Callable[..., Any]
@@ -67,7 +67,7 @@ class Combined(Algebra):
 
 @dataclass(frozen=True)
 class Gain(Algebra):
-    """The same response at every frequency."""
+    """A response that is equal at every frequency."""
 
     value: float
 

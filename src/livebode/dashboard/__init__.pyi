@@ -21,5 +21,5 @@ from livebode.dashboard.plugin_pages import Order as Order
 from livebode.dashboard.plugin_pages import PluginPages as PluginPages
 from livebode.dashboard.quantities import Quantities as Quantities
 from livebode.dashboard.queries import json_object as json_object
-from livebode.dashboard.settings import Serving as Serving
+from livebode.dashboard.server_settings import Serving as Serving
 from livebode.dashboard.trials import LoopTrialAnswers as LoopTrialAnswers

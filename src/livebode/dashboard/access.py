@@ -14,7 +14,7 @@ from math import ceil
 from typing import Any, Literal
 
 from livebode.core import ServerError
-from livebode.dashboard.settings import Serving
+from livebode.dashboard.server_settings import Serving
 from livebode.language import Message, for_page
 
 Role = Literal["operator", "viewer"]

@@ -25,7 +25,7 @@ async def serve_browser(board: Board, socket: WebSocket, client_of: Callable[[Ro
         return
     client = client_of(role)
     place = ClientPlace(role, address, client.displace)
-    if not board.places.take(place):
+    if not board.places.enter(place):
         await socket.close(1013)
         return
     try:

@@ -29,7 +29,7 @@ from livebode.dashboard.past import Past
 from livebode.dashboard.plugin_pages import PluginPages
 from livebode.dashboard.queries import SavedChange
 from livebode.dashboard.runs_pages import RunsPages
-from livebode.dashboard.settings import Serving
+from livebode.dashboard.server_settings import Serving
 from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
 from livebode.dashboard.trials import loop_trials

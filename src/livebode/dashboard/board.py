@@ -14,9 +14,9 @@ from livebode.dashboard.alarm import AlarmShelf
 from livebode.dashboard.alarm_requests import Act, AlarmRequest, acknowledgement, shelving, unshelving
 from livebode.dashboard.notices import Notice
 from livebode.dashboard.places import Places
+from livebode.dashboard.run_feed import RunFeed
 from livebode.dashboard.state import State
 from livebode.dashboard.verdict import verdict
-from livebode.dashboard.viewed import Viewed
 from livebode.language import Message
 
 
@@ -56,7 +56,7 @@ class Board:
         The access control.
     """
 
-    def __init__(self, states: list[State], viewed: dict[int, Viewed], access: Access) -> None:
+    def __init__(self, states: list[State], viewed: dict[int, RunFeed], access: Access) -> None:
         self.states, self.access = states, access
         self.places = Places(access.open)
         self.pulse = Pulse()
@@ -159,7 +159,7 @@ class Board:
                 items, rows, summary, finished = await self.elsewhere(viewed.more)
             except LivebodeError:
                 continue  # it is just being closed; the next look reads it
-            state.take(items)
+            state.add(items)
             for model, name, unit, new in rows:
                 state.trends.add(model, [name], [unit], new)
             state.renewed(summary, finished)

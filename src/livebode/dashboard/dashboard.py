@@ -18,9 +18,9 @@ from livebode.dashboard.hub import Hub
 from livebode.dashboard.matrix_group import MatrixGroup
 from livebode.dashboard.matrix_hub import MatrixHub
 from livebode.dashboard.matrix_view import views_of
-from livebode.dashboard.settings import Serving
+from livebode.dashboard.run_feed import RunFeed
+from livebode.dashboard.server_settings import Serving
 from livebode.dashboard.state import State
-from livebode.dashboard.viewed import Viewed
 
 if TYPE_CHECKING:
     from livebode.dashboard.plugin_pages import PluginPages
@@ -57,7 +57,7 @@ class Dashboard:
     def __init__(self, serving: Serving, report: Callable[[str], None] = lambda _: None) -> None:
         self._serving, self._hears = serving, report
         self._states: list[State] = []
-        self._viewed: dict[int, Viewed] = {}
+        self._viewed: dict[int, RunFeed] = {}
         self._hubs: dict[str, Hub | MatrixHub] = {}
         self._runs: Path | None = None
         self._others: PluginPages | None = None
@@ -230,7 +230,7 @@ class Dashboard:
         try:
             await self._application(scope, receive, send)
         except Exception as error:
-            self._faults.take(error)
+            self._faults.report(error)
 
 
 def listening(serving: Serving) -> socket.socket:

@@ -99,11 +99,11 @@ class Hub:
         now_s = time.monotonic()
         self.intervals_s.append(now_s - self.followed_s)
         self.followed_s = now_s
-        self.signals.take(block, now_s)
+        self.signals.add(block, now_s)
         if isinstance(block, LiveBlock):
             self.delays_s.append(self.followed_s - block.arrived_s)
 
-    def take(self) -> list[Item]:
+    def drain(self) -> list[Item]:
         """Data since the last call, events last."""
         with self._lock:
             rows, self._rows, self._values = self._rows, deque(), 0

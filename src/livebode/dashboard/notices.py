@@ -55,7 +55,7 @@ class Notice:
     kinds: set[str] = field(default_factory=set)
     alarm: AlarmStatus | None = None
 
-    def take(self, event: Event, times: int, key: str) -> None:
+    def add(self, event: Event, times: int, key: str) -> None:
         """Add an event, or as many like it."""
         if self.seen >= self.count:
             self.kinds = set()
@@ -105,8 +105,8 @@ class EventCauses:
         alarms = [one.alarm for one in self._shown.values() if one.cause.partition(":")[0] == "change"]
         return {str(one.facts.get("what", "machine")) for one in alarms if one is not None and one.active}
 
-    def take(self, event: Event) -> None:
-        """Take an event, or an action of a person."""
+    def add(self, event: Event) -> None:
+        """Add an event, or an action of a person."""
         self.version += 1
         if event.kind == ACKNOWLEDGED:
             self._acknowledge(event)
@@ -201,7 +201,7 @@ class EventCauses:
             began_s = event.time_s if first_s is None else first_s
             notice = self._shown[cause] = Notice(cause, began_s, event.time_s)
         key = event_id(line, cause)
-        notice.take(event, times, key)
+        notice.add(event, times, key)
         self.counts[event.kind] = self.counts.get(event.kind, 0) + times
         self._judge(notice, event, times)
         self._touch(notice)

@@ -40,7 +40,7 @@ class Places:
     def __len__(self) -> int:
         return len(self._taken)
 
-    def take(self, place: ClientPlace) -> bool:
+    def enter(self, place: ClientPlace) -> bool:
         """Whether there is a place, which `leave` must return; another browser may be displaced."""
         if len(self._taken) >= PLACES:
             oldest = self._displaceable(place)

@@ -54,7 +54,7 @@ class ClientMessage:
 
 
 @dataclass(frozen=True)
-class SignalsAsked:
+class SignalsRequest:
     """A query for raw signals: axis, picture, and the time in the record; None for the newest ones."""
 
     axis: int
@@ -112,7 +112,7 @@ def moment(query: Mapping[str, str]) -> float | None:
     return _time(query["at"]) if "at" in query else None
 
 
-def signals_asked(query: Mapping[str, str], axes: int) -> SignalsAsked:
+def signals_asked(query: Mapping[str, str], axes: int) -> SignalsRequest:
     """Parse a query for raw signals; LivebodeError if it is invalid.
 
     >>> signals_asked({"axis": "0", "picture": "log", "at": "2.5"}, axes=1).at_s
@@ -129,7 +129,7 @@ def signals_asked(query: Mapping[str, str], axes: int) -> SignalsAsked:
             allowed=list(get_args(Picture)),
         )
     axis = whole_number(query.get("axis", "0"), 0, axes - 1, "axis")
-    return SignalsAsked(axis, cast(Picture, picture), moment(query))
+    return SignalsRequest(axis, cast(Picture, picture), moment(query))
 
 
 def client_message(text: str, axes: int) -> ClientMessage:

@@ -40,7 +40,7 @@ def runs_in(directory: Path) -> list[str]:
 
 
 @dataclass
-class _Cached(Generic[T]):
+class _CacheEntry(Generic[T]):
     """Values by name, with the number of the change that brought them."""
 
     values: dict[str, tuple[Any, int, T]] = field(default_factory=dict)
@@ -73,8 +73,8 @@ class RunCatalogue:
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
-        self._rows: _Cached[RunEntry] = _Cached()
-        self._trends: _Cached[dict[str, Any]] = _Cached()
+        self._rows: _CacheEntry[RunEntry] = _CacheEntry()
+        self._trends: _CacheEntry[dict[str, Any]] = _CacheEntry()
         self._scanned_s = float("-inf")
         self._lock = threading.Lock()
 

@@ -90,7 +90,7 @@ class Faults:
         self._report = report
         self._count, self._reported_s = 0, float("-inf")
 
-    def take(self, error: BaseException | None, what: str = "") -> None:
+    def report(self, error: BaseException | None, what: str = "") -> None:
         """Report an error."""
         self._count += 1
         now_s = time.monotonic()
@@ -106,4 +106,4 @@ class Faults:
     def handler(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """Handler for `loop.set_exception_handler`."""
         error = context.get("exception")
-        self.take(error, f"{context.get('message', '')} ({error!r})")
+        self.report(error, f"{context.get('message', '')} ({error!r})")

@@ -43,7 +43,7 @@ class _Stream:
 class SignalTap:
     """The newest samples that an axis tracked.
 
-    The thread that tracks calls `take`. Nothing is copied unless `watch` was called within `WATCHED_S`.
+    The thread that tracks calls `add`. Nothing is copied unless `watch` was called within `WATCHED_S`.
     """
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class SignalTap:
         """Retain samples from now on; called again and again as long as they are of use."""
         self._until_s = time.monotonic() + WATCHED_S
 
-    def take(self, block: Block, now_s: float) -> None:
+    def add(self, block: Block, now_s: float) -> None:
         """Retain a copy of these samples, if somebody looks; `now_s` is `time.monotonic()`."""
         if now_s > self._until_s:
             if self._stream is not None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.core import Block, Lines
 from livebode.dashboard.board import Board
-from livebode.dashboard.queries import SignalsAsked
+from livebode.dashboard.queries import SignalsRequest
 from livebode.dashboard.signal_answer import Picture, answer, why_not
 from livebode.dashboard.signal_tap import SignalTap, span_samples
 from livebode.dashboard.state import State
@@ -47,7 +47,7 @@ def recorded_block(run: RunRecord, at_s: float) -> Block | None:
     return Block(data, channels, lines.rate_hz, start, float(time_s[0]) - start / lines.rate_hz)
 
 
-async def signals(board: Board, state: State, asked: SignalsAsked) -> bytes:
+async def signals(board: Board, state: State, asked: SignalsRequest) -> bytes:
     """The signals of an axis whose run has begun.
 
     A request for the newest signals of a live run makes its tap retain samples from now on.

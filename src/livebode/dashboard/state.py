@@ -44,7 +44,7 @@ _SENT = 90  # responses that were sent in three seconds: one that a person freez
 class State:
     """Newest, recent and thinned responses of an axis, its parameters and events, and the health of its source.
 
-    Used only in the server's thread; data come from a Hub (`refresh`) or from a record (`take`).
+    Used only in the server's thread; data come from a Hub (`refresh`) or from a record (`add`).
     """
 
     def __init__(self, name: str, axis: int, hub: Hub | None = None) -> None:
@@ -112,7 +112,7 @@ class State:
         return self._summary
 
     def refresh(self) -> None:
-        """Take new data from the hub."""
+        """Add new data from the hub."""
         hub = self.hub
         if hub is None:
             return
@@ -125,16 +125,16 @@ class State:
             if continues:
                 self._shelve_again(shelves)
         ended = hub.ended
-        self.take(hub.take())
+        self.add(hub.drain())
         if ended is not None and not self.finished:
             self.finished, self._summary = True, json.loads(to_json(dict(ended)))
 
     def _before(self) -> None:
-        """Take the earlier events of a continued run."""
+        """Add the earlier events of a continued run."""
         if "record" not in self._summary or self.directory is None:
             return
         with suppress(LivebodeError):  # it has just started
-            self.take(list(RunRecord.open(self.directory, entry=self.entry).events()))
+            self.add(list(RunRecord.open(self.directory, entry=self.entry).events()))
 
     def _shelve_again(self, shelves: Mapping[str, AlarmShelf]) -> None:
         """Shelve in a run that continues another one what is shelved there."""
@@ -159,21 +159,21 @@ class State:
         return (0, 0.0) if newest is None else (int(newest.sample[0]), float(newest.time_s[0]))
 
     def renewed(self, summary: Mapping[str, Any], finished: bool) -> None:
-        """Take the current run.json."""
+        """Replace the run.json by the current one."""
         self._summary, self.finished = summary, finished
 
-    def take(self, items: list[Item]) -> None:
-        """Take responses, parameters and events in the order of arrival."""
+    def add(self, items: list[Item]) -> None:
+        """Add responses, parameters and events in the order of arrival."""
         for item in items:
             if isinstance(item, Responses):
                 self._take_responses(item)
             elif isinstance(item, Event):
-                self.notices.take(item)
+                self.notices.add(item)
             else:
-                self.trends.take(item)
+                self.trends.add_parameters(item)
 
-    def take_past(self, first: Responses, means: Responses, newest: Responses, count: int) -> None:
-        """Take a long run: its first responses, means of the whole run, the newest responses, the number of all."""
+    def add_past(self, first: Responses, means: Responses, newest: Responses, count: int) -> None:
+        """Add a long run: its first responses, means of the whole run, the newest responses, the number of all."""
         self.overview.add(means)
         self._take_times(first)
         self._seen += count - len(newest)

@@ -82,14 +82,14 @@ class Trends:
         self._trends: dict[tuple[str, tuple[str, ...]], ModelTrend] = {}
         self._count = 0
 
-    def take(self, parts: tuple[Parameters, ...]) -> None:
-        """Take the published parameters of a run."""
+    def add_parameters(self, parts: tuple[Parameters, ...]) -> None:
+        """Add the published parameters of a run."""
         for part in parts:
             rows = TrendRows(part.time_s, part.schedule, part.value, part.sigma, part.status)
             self.add(part.model, part.names, part.units, rows)
 
     def add(self, model: str, names: Sequence[str], units: Sequence[str], rows: TrendRows) -> None:
-        """Take rows of parameters of a model."""
+        """Add rows of parameters of a model."""
         key = (model, tuple(names))
         if key not in self._trends:
             if self._count + len(names) > TRENDS_MAX:

@@ -88,7 +88,7 @@ def verdict(axis: State) -> AxisVerdict:
 def _of_alarm(
     tone: Tone, word: str, found: list[tuple[Notice, AlarmStatus, AlarmState]], clock: RunClock
 ) -> AxisVerdict:
-    """Of the most important of these alarms; among equal ones the oldest."""
+    """Verdict of the most important of these alarms; among equal ones the oldest."""
     notice, alarm, _ = min(found, key=lambda one: (PRIORITIES.index(one[1].kind.priority), one[1].since_s))
     since_s = alarm.since_s
     return AxisVerdict(

@@ -21,11 +21,6 @@ from livebode.estimation.repeating import hum_events as hum_events
 from livebode.estimation.ripple import RippleOrder as RippleOrder
 from livebode.estimation.ripple import RippleSpeed as RippleSpeed
 from livebode.estimation.ripple import ripple_power as ripple_power
-from livebode.estimation.settings import DETECTION_LINES_MIN as DETECTION_LINES_MIN
-from livebode.estimation.settings import WINDOWS as WINDOWS
-from livebode.estimation.settings import Settings as Settings
-from livebode.estimation.settings import default_hop as default_hop
-from livebode.estimation.settings import nearest_hop as nearest_hop
 from livebode.estimation.silence_search import SilenceSearch as SilenceSearch
 from livebode.estimation.silence_search import SilentStretch as SilentStretch
 from livebode.estimation.silence_search import hum_spans as hum_spans
@@ -40,6 +35,11 @@ from livebode.estimation.successive import SuccessiveTrackers as SuccessiveTrack
 from livebode.estimation.tracker import NOTHING as NOTHING
 from livebode.estimation.tracker import Tracker as Tracker
 from livebode.estimation.tracker import contains as contains
+from livebode.estimation.tracker_settings import DETECTION_LINES_MIN as DETECTION_LINES_MIN
+from livebode.estimation.tracker_settings import WINDOWS as WINDOWS
+from livebode.estimation.tracker_settings import Settings as Settings
+from livebode.estimation.tracker_settings import default_hop as default_hop
+from livebode.estimation.tracker_settings import nearest_hop as nearest_hop
 from livebode.estimation.uneven import UnevenSpectra as UnevenSpectra
 from livebode.estimation.uneven import UnevenTracker as UnevenTracker
 from livebode.estimation.uneven import UnevenWindow as UnevenWindow

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core import GridError, Lines
 from livebode.estimation.products import power, scaled, times
-from livebode.estimation.settings import DETECTION_LINES_MIN
+from livebode.estimation.tracker_settings import DETECTION_LINES_MIN
 
 _BESIDE = 4  # detection lines on each side of a line, and at most as many beyond the outermost lines
 _POWERLESS = 1e-4  # of the excitation's power at its lines: a bin with more counts as excited

@@ -49,7 +49,7 @@ class SilentHum(StatefulBase):
 
     @property
     def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """The state, which `Judge.take` changes in place: as the last ones of `PeriodState`."""
+        """The state, which `Judge.process` changes in place: as the last ones of `PeriodState`."""
         return self._power, self._found, self._low, self._counts
 
     def interrupt(self) -> None:
@@ -165,7 +165,7 @@ def _tones(signals: Mapping[str, Floats], rate_hz: float, parts: int) -> dict[fl
 
 
 def _spectra(x: Floats, count: int) -> Complex:
-    """Of the parts, so scaled that a sine of amplitude A has the power A² in the bins that it reaches."""
+    """Spectra of the parts, so scaled that a sine of amplitude A has the power A² in the bins that it reaches."""
     n = x.size // count
     parts = x[: n * count].reshape(count, n)
     slope = np.arange(n) - (n - 1) / 2

@@ -55,7 +55,7 @@ class PlausibleRange(StatefulBase):
         return np.asarray(~(every > limits).any(axis=1)), every
 
     @staticmethod
-    def take_each(ranges: Sequence[PlausibleRange], every: Floats) -> None:
+    def process_each(ranges: Sequence[PlausibleRange], every: Floats) -> None:
         """Continue ranges of one length with a plausible sample each, as `process` would."""
         for one, largest, limit in zip(ranges, every, _limits(every)):
             one._at += 1
@@ -67,7 +67,7 @@ class PlausibleRange(StatefulBase):
                 one._largest[:] = largest
 
     def _found(self, data: Floats, every: Floats) -> list[NDArray[np.intp]]:
-        """The same, in pieces that begin a period, or continue the one that has begun."""
+        """Implausible samples, in pieces that begin a period, or continue the one that has begun."""
         every[:, 0] = np.maximum(self._largest, every[:, 0])
         limits = np.empty(every.shape)
         limits[:, 0], limits[:, 1:] = self._limit, _limits(every[:, :-1])
@@ -93,6 +93,6 @@ class PlausibleRange(StatefulBase):
 
 
 def _limits(largest: Floats) -> Floats:
-    """Of the next period. A signal that was zero gives no scale for what is too large."""
+    """Limits of the next period. A signal that was zero gives no scale for what is too large."""
     with np.errstate(over="ignore"):  # there is no larger number
         return np.where(largest > 0, _FACTOR * largest, np.inf)

@@ -13,8 +13,8 @@ from livebode.arrays import Complex, Floats
 from livebode.core import Lines, Stage, StatefulBase, f_quantile, meets_mains
 from livebode.estimation.detection import Interpolation
 from livebode.estimation.products import power
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
+from livebode.estimation.tracker_settings import Settings
 from livebode.language import Message
 
 Bins = NDArray[np.int64]
@@ -135,7 +135,7 @@ class DistortionLevels(StatefulBase):
         self._now, self._mean = 0, np.zeros((3, self._at.size), dtype=np.complex128)
         self._spread = np.zeros((3, self._at.size), dtype=np.complex128)  # Σ|δY|², Σ|δU|², ΣδY·conj(δU)
 
-    def take(self, spectra: Complex) -> None:
+    def process(self, spectra: Complex) -> None:
         """Process the spectra of a complete period, all bins of all signals: shape (signals, bins)."""
         if not self.bins.size:
             return

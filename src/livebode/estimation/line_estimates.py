@@ -8,7 +8,7 @@ import numpy as np
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.estimation.quantities import from_plant
-from livebode.estimation.settings import Settings
+from livebode.estimation.tracker_settings import Settings
 from livebode.kernel import LineRows
 
 

@@ -19,8 +19,8 @@ from livebode.estimation.movement import Movement
 from livebode.estimation.periodicity import Periodicity
 from livebode.estimation.products import power, times
 from livebode.estimation.repeating import Repeating
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import Hann, SpectraRows, check_instruction_set
+from livebode.estimation.tracker_settings import Settings
 from livebode.kernel import (
     NOISE_LARGER,
     NOISE_MOVING,

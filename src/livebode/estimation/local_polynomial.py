@@ -70,7 +70,7 @@ class LocalPolynomial(StatefulBase):
         self._power = np.zeros((places, bins.size))
         self._weights = np.zeros((places, 2))
 
-    def take(self, samples: Floats, place: int) -> Quotient:
+    def process(self, samples: Floats, place: int) -> Quotient:
         """Quotients of a window, or of it and those before it at its place.
 
         `samples` is the window of the reference and of the signals, shape (1 + signals, window).

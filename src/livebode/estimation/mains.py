@@ -17,7 +17,7 @@ _BESIDE = np.array([-4, -3, -2, -1, 1, 2, 3, 4])
 _CHANCE = 1e-8  # of noise alone to be taken for a tone: (1 + r/n)^-n for a power of r times the mean of n neighbours
 
 _MATTERS = 1e-8
-"""Of the strongest line's power: hum below a ten-thousandth of the response, and rounding, do not matter."""
+"""Share of the strongest line's power: hum below a ten-thousandth of the response, and rounding, do not matter."""
 
 
 class Mains:

@@ -101,7 +101,7 @@ class PeriodMoments(StatefulBase):
         return Moments(self._means, self._scatter, self.weights.after(self._count))
 
     def forget(self) -> None:
-        """As before the first window."""
+        """Return to the state before the first window."""
         for part in (self._count, self._means, self._scatter, self._moment):
             part[:] = 0
 

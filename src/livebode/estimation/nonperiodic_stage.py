@@ -15,8 +15,8 @@ from livebode.estimation.line_stage import response_unit
 from livebode.estimation.local_polynomial import LocalPolynomial
 from livebode.estimation.quantities import from_plant
 from livebode.estimation.quotient import Quotient
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
+from livebode.estimation.tracker_settings import Settings
 from livebode.estimation.welch_average import WelchAverage
 
 _EXCITED = 1e-12  # of the largest power so far, as for a LineStage
@@ -87,7 +87,7 @@ class NonPeriodicStage(StatefulBase):
         """NaN, shape (lines,): the excitation need not repeat."""
         return np.full(self._power.size, np.nan)
 
-    def take(self, samples: Floats | None, hops: int, sample: int, moment: Floats) -> Row:
+    def process(self, samples: Floats | None, hops: int, sample: int, moment: Floats) -> Row:
         """The response of a window, or of it and those before it at its place.
 
         Parameters
@@ -116,7 +116,7 @@ class NonPeriodicStage(StatefulBase):
             self._moments[place, 2] = moment[2] if self._weights[place] == 1 else self._moments[place, 2]
             moment = self._moments[place].copy()
         with np.errstate(all="ignore"):  # a line that cannot be determined becomes NaN
-            quotient = self._quotients.take(signals, place)
+            quotient = self._quotients.process(signals, place)
             return Row(sample, moment, quotient.dof, self._at_lines(quotient))
 
     def _nothing(self) -> dict[str, NDArray[Any]]:

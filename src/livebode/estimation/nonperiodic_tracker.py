@@ -11,9 +11,9 @@ from livebode.arrays import Floats
 from livebode.core import Block, Emit, Event, Responses, Stage, StatefulBase, UsageError, hand_over, ignore
 from livebode.estimation.centre import Centre
 from livebode.estimation.nonperiodic_stage import NonPeriodicStage, Row
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.stream_estimator import StreamEstimator, signals_of
+from livebode.estimation.tracker_settings import Settings
 from livebode.estimation.watch import InputStatistics
 
 
@@ -118,7 +118,7 @@ class NonPeriodicTracker(StreamEstimator[InputStatistics]):
         if self._watch.starts(block):
             self._restart()
         finite = np.isfinite(data.sum(axis=0))
-        self._watch.take(block, _not_finite(finite))
+        self._watch.count(block, _not_finite(finite))
         rows: list[Row] = []
         for stretch in _stretches(finite):
             if finite[stretch.start]:
@@ -148,7 +148,7 @@ class NonPeriodicTracker(StreamEstimator[InputStatistics]):
             moment = np.array([block.origin_s + (sample - (span - 1) / 2) / block.rate_hz, value, sample - span + 1])
             whole = self._newest.count >= span
             hops = (self._newest.count - span) // hop
-            rows.append(self._lines.take(self._newest.window if whole else None, hops, sample, moment))
+            rows.append(self._lines.process(self._newest.window if whole else None, hops, sample, moment))
         self._newest.add(data[:, done:])
         return rows
 

@@ -17,9 +17,9 @@ from livebode.estimation.levels import DistortionLevels
 from livebode.estimation.moments import PeriodMoments
 from livebode.estimation.movement import PLACES, Movement
 from livebode.estimation.periods import PeriodCutter, Periods
-from livebode.estimation.settings import Settings
 from livebode.estimation.silence_search import HumSpan, SilenceSearch, SilentStretch, updated
 from livebode.estimation.spectra import SpectraRows
+from livebode.estimation.tracker_settings import Settings
 from livebode.estimation.verdicts import HUM, KINDS, Verdict, judge_of, reason
 from livebode.kernel import ADDED, FORGOTTEN, NEWS, NEWS_GONE, PeriodSpectra, PeriodState, PeriodVerdicts
 from livebode.language import Message
@@ -227,7 +227,7 @@ class RepeatingErrors(PeriodCutter):
         )
         moments = self._moments.arrays
         state = PeriodState(self._largest, self._step, *moments[:3], self._output, *self._silence.arrays, self._told)
-        found, self._largest, self._step = self._judge.take(state, now)
+        found, self._largest, self._step = self._judge.process(state, now)
         self._now = Verdict(found.distortion[-1].copy(), found.against[-1].copy())
         happened = found.happened.tolist()
         if self.levels.bins.size:
@@ -248,7 +248,7 @@ class RepeatingErrors(PeriodCutter):
             if what & FORGOTTEN:
                 self.levels.end_stretch()
             if what & ADDED:
-                self.levels.take(spectra[:, period])
+                self.levels.process(spectra[:, period])
 
     def _report(
         self, found: PeriodVerdicts, period: int, block: Block, sample: int, output: QuantityKind | None

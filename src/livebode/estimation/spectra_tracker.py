@@ -31,9 +31,9 @@ from livebode.core import (
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.ripple import HopSpeed, ripple_power
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import SpectraRows, after
 from livebode.estimation.stream_estimator import StreamCounters, StreamEstimator
+from livebode.estimation.tracker_settings import Settings
 from livebode.language import Message
 
 DRIVE = {
@@ -52,7 +52,7 @@ class SpectraInputStatistics(StreamCounters):
         super().__init__(events, sentences, -(1 << 62), also=("spectra",))
         self._window, self._sentences = window, sentences
 
-    def take(self, block: Spectra, marked: dict[str, NDArray[np.bool_]]) -> None:
+    def count(self, block: Spectra, marked: dict[str, NDArray[np.bool_]]) -> None:
         """Count these, of each kind those that are `marked`; SignalError where they overlap the previous ones."""
         first = self._next < 0
         missing = 0 if first else block.start - self._next
@@ -97,8 +97,8 @@ class SpectraInputStatistics(StreamCounters):
         """Whether this is the sample after the previous spectra."""
         return self._next == start
 
-    def take_whole(self, hop: int) -> None:
-        """Count a spectrum that is whole and follows the previous one, as `take` would."""
+    def count_whole(self, hop: int) -> None:
+        """Count a spectrum that is whole and follows the previous one, as `count` would."""
         self._next += hop
         self.counts["samples"] += min(hop, self._window)
         self.counts["spectra"] += 1
@@ -222,7 +222,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
         implausible[self._range.process(size)] = True
         not_whole, spike = (block.state & NOT_WHOLE != 0) | ~finite, block.state & SPIKE != 0
         left_out = block.state & LEFT_OUT != 0
-        self._watch.take(block, {"not-whole": not_whole, "implausible": implausible, "spike": spike})
+        self._watch.count(block, {"not-whole": not_whole, "implausible": implausible, "spike": spike})
         whole = ~(not_whole | implausible)
         rows = SpectraRows(spectrum, sample, whole, whole & ~(spike | left_out), _NONE, _NONE, _NONE)
         place = (block.place + hop * np.arange(len(block))) % window
@@ -239,7 +239,7 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
 
     @property
     def kind(self) -> object:
-        """The same object for trackers that `process_each` computes together; None for one that it does not support."""
+        """One object for all trackers that `process_each` computes together; None for one that it does not support."""
         plain = self._lines.is_plain and self._speed is None and bool(np.all(self._after == 1))
         return _kind(self._identity) if plain else None
 
@@ -285,9 +285,9 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
         stages = [tracker._lines for tracker in usual]
         centre, place = np.stack([time_s, schedule]), spectra.place[at]
         responses = LineStage.process_each(stages, spectrum[:, at], sample, place, centre, spectra.channels)
-        PlausibleRange.take_each([tracker._range for tracker in usual], every[at])
+        PlausibleRange.process_each([tracker._range for tracker in usual], every[at])
         for tracker in usual:
-            tracker._watch.take_whole(layout.hop)
+            tracker._watch.count_whole(layout.hop)
             tracker._ends_with(responses)
         return responses, taken
 

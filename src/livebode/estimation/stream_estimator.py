@@ -7,7 +7,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from livebode.arrays import Floats, Integers
 from livebode.core import Block, Emit, Event, Responses, SignalError, Stateful, StatefulBase, ignore, same_rate
-from livebode.estimation.settings import Settings
+from livebode.estimation.tracker_settings import Settings
 
 
 class StreamCounters(StatefulBase):

@@ -50,7 +50,7 @@ class SuccessiveTrackers(StatefulBase):
         return {name: sum(counts[name] for counts in each) for name in each[0]}
 
     def found(self) -> dict[str, Any]:
-        """As of the newest recording, with the lines that are invalid in any of them."""
+        """Results of the newest recording, with the lines that are invalid in any of them."""
         each = [tracker.found() for tracker in self._begun]
         reasons: dict[str, set[float]] = {}
         for found in each:

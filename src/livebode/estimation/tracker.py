@@ -14,11 +14,11 @@ from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.repeating import RepeatingErrors
 from livebode.estimation.ripple import RippleSpeed, ripple_power
-from livebode.estimation.settings import Settings
 from livebode.estimation.silence_search import HumSpan
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
 from livebode.estimation.stream_estimator import StreamEstimator, signals_of
+from livebode.estimation.tracker_settings import Settings
 from livebode.estimation.watch import InputStatistics
 
 NOTHING: Integers = np.zeros((0, 2), dtype=np.int64)
@@ -167,7 +167,7 @@ class Tracker(StreamEstimator[InputStatistics]):
             if self._repeating is not None:
                 self._repeating.restart(block.start, block.origin_s + block.start / block.rate_hz)
         rows = self._spectra.process(channels)
-        self._watch.take(block, rows)
+        self._watch.count(block, rows)
         centre = np.empty((2, len(rows.sample)))
         centre[0] = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
         centre[1] = self._centre.at(schedule, rows.sample - block.start)

@@ -13,8 +13,8 @@ from livebode.core import Lines, QuantityKind
 from livebode.estimation.distortion import Distortion, reached
 from livebode.estimation.estimators import Role
 from livebode.estimation.mains import Neighbours, mains_of
-from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import after
+from livebode.estimation.tracker_settings import Settings
 from livebode.kernel import (
     REASONS,
     PeriodSpectra,
@@ -144,7 +144,7 @@ class Judge:
             )
         )
 
-    def take(self, state: PeriodState, periods: PeriodSpectra) -> tuple[PeriodVerdicts, float, float]:
+    def process(self, state: PeriodState, periods: PeriodSpectra) -> tuple[PeriodVerdicts, float, float]:
         """The verdicts after each of some periods, and `largest` and `step` of the state after them."""
         return judge_periods(self._plan, state, periods)
 

@@ -55,7 +55,7 @@ class InputStatistics(StreamCounters):
             self._exclude("gap", block, block.start, message, missing_samples=missing)
         return first or gap
 
-    def take(self, block: Block, rows: SpectraRows) -> None:
+    def count(self, block: Block, rows: SpectraRows) -> None:
         """Count the excluded samples; one Event for all that are within a window of each other."""
         found = {"non-finite": rows.not_finite, "implausible": rows.implausible, "spike": rows.spikes}
         new: list[tuple[int, str]] = []

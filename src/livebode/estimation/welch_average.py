@@ -7,7 +7,7 @@ import numpy as np
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, Stage, StatefulBase
 from livebode.estimation.quotient import Quotient, triangular
-from livebode.estimation.settings import WINDOWS
+from livebode.estimation.tracker_settings import WINDOWS
 
 
 class WelchAverage(StatefulBase):
@@ -37,7 +37,7 @@ class WelchAverage(StatefulBase):
         self._triangle = np.zeros((places, self._bins.size, 1 + signals, 1 + signals), dtype=np.complex128)
         self._weights = np.zeros((places, 2))
 
-    def take(self, samples: Floats, place: int) -> Quotient:
+    def process(self, samples: Floats, place: int) -> Quotient:
         """Quotients of a stretch, or of it and those before it at its place.
 
         `samples` is the stretch of the reference and of the signals, shape (1 + signals, WINDOWS·window).

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from livebode.core import UsageError
 
-NODE_MAX = 9_999_999_999  # ten digits in UFF 58
 _WRITTEN = re.compile(r"(?P<node>\d{1,10})(?:(?P<sign>[+-])(?P<direction>R?[XYZ]))?")
 _DIRECTIONS = ("X", "Y", "Z", "RX", "RY", "RZ")
 

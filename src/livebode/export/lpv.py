@@ -65,7 +65,7 @@ class LpvModel:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the parameters: Js, JL or mL, Keff, bs, B, BL, delay."""
+        """Names of the parameters: Js, JL or mL, Keff, bs, B, BL, delay."""
         return ("Js", "JL" if self.radius_m is None else "mL", "Keff", "bs", "B", "BL", "delay")
 
     @property

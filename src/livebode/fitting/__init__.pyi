@@ -19,6 +19,8 @@ from livebode.fitting.fitter import Fitter as Fitter
 from livebode.fitting.least_squares import minimise as minimise
 from livebode.fitting.mean import RunningMean as RunningMean
 from livebode.fitting.mean import mean_response as mean_response
+from livebode.fitting.mean_of_recordings import Between as Between
+from livebode.fitting.mean_of_recordings import RecordingsMean as RecordingsMean
 from livebode.fitting.models import model_named as model_named
 from livebode.fitting.once import Fit as Fit
 from livebode.fitting.once import best_of as best_of
@@ -39,13 +41,10 @@ from livebode.fitting.problem import described as described
 from livebode.fitting.rational import Rational as Rational
 from livebode.fitting.rational import fit_rational as fit_rational
 from livebode.fitting.rational import rational_of as rational_of
-from livebode.fitting.recordings import Between as Between
-from livebode.fitting.recordings import RecordingsMean as RecordingsMean
 from livebode.fitting.separable import Outputs as Outputs
 from livebode.fitting.separable import Separated as Separated
 from livebode.fitting.separable import pole_price as pole_price
 from livebode.fitting.separable import solve as solve
 from livebode.fitting.together import fit_each as fit_each
-from livebode.fitting.together import fit_together as fit_together
 from livebode.fitting.transfer import Transfer as Transfer
 from livebode.fitting.two_masses import scan as scan

@@ -79,7 +79,7 @@ class Chain(PhysicalModel):
 
     @property
     def lever(self) -> float:
-        """Of the output: metres per radian for a load that moves along."""
+        """Lever of the output: metres per radian for a load that moves along."""
         return self.radius_m if self.radius_m is not None and self.side == "load" else 1.0
 
     def _load(self, name: str) -> Parameter:

@@ -20,7 +20,7 @@ from livebode.fitting.pole_search import ORDER_MAX, Kind, possible, search
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import EPSILON_MAX, NO_FIT, NO_RESPONSE, NOT_CONVERGED, NOT_SEEN, SENTENCES
 from livebode.fitting.separable import Outputs, Separated, whole_covariance
-from livebode.fitting.weighing import chi_squared, squares
+from livebode.fitting.weights import chi_squared, squares
 from livebode.language import Message
 
 POLE_MODELS = ("modal", "rational")

@@ -13,7 +13,7 @@ from livebode.core import OK, Stage, StatefulBase
 from livebode.fitting.physical import DELAY
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FRICTION, FittedRows, fit_rows
-from livebode.fitting.weighing import misfit
+from livebode.fitting.weights import misfit
 
 SHOWN = 10.0
 """Decrease of −2·ln(likelihood) from which a delay is fitted: 3.2 sigma of the delay, by chance once in 640 fits."""

@@ -29,7 +29,7 @@ from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, FittedRows
 from livebode.fitting.tasks import FitTask
-from livebode.fitting.weighing import epsilon_for, squares
+from livebode.fitting.weights import epsilon_for, squares
 
 _GROUP = 16  # rows that share a start and an ε, however they arrive
 _MEMORY = 64  # rows that ε is taken from
@@ -116,7 +116,7 @@ class Fitter(StatefulBase):
 
     @property
     def derived_names(self) -> tuple[str, ...]:
-        """Of `derived`."""
+        """Names of the quantities of `derived`."""
         return self.model.derived_names
 
     def process(self, responses: Responses, emit: Emit = ignore) -> Parameters:
@@ -135,14 +135,14 @@ class Fitter(StatefulBase):
         first = 0
         while not parts or first < len(responses):
             task = self.task(responses[first:] if first else responses)
-            parts.append(self.take(task, task.fitted(), emit))
+            parts.append(self.finish(task, task.fitted(), emit))
             first += len(task.responses)
         return parts[0] if len(parts) == 1 else Parameters.join(parts)
 
     def task(self, responses: Responses) -> FitTask:
-        """The fit of the first of these Responses, as many as the group still lacks; `take` accepts its result.
+        """The fit of the first of these Responses, as many as the group still lacks; `finish` accepts its result.
 
-        The errors are those of `process`. See `fit_together`, which fits the tasks of several fitters at once.
+        The errors are those of `process`. See `fit_each`, which fits the tasks of several fitters at once.
         """
         if responses.quantity != "plant":
             raise SignalError(
@@ -159,7 +159,7 @@ class Fitter(StatefulBase):
         start = None if self._start is None else np.repeat(problem.with_held(self._start)[np.newaxis], rows, axis=0)
         return FitTask(part, problem, *measured_of(part, use), start, epsilon)
 
-    def take(self, task: FitTask, found: FittedRows, emit: Emit = ignore) -> Parameters:
+    def finish(self, task: FitTask, found: FittedRows, emit: Emit = ignore) -> Parameters:
         """Parameters of a task from its fitted rows; the next task starts from them."""
         found = self._delay.weigh(self._seen // _GROUP, task.measured, task.noise_dof, found)
         good = np.flatnonzero(found.status == OK)
@@ -193,7 +193,7 @@ class Fitter(StatefulBase):
 
     @property
     def problem(self) -> Problem:
-        """As the user specified it."""
+        """Problem as the user specified it."""
         return self._delay.held
 
     @property

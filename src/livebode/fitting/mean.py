@@ -233,7 +233,7 @@ class RunningMean:
 
 
 def _without(one: Responses, lines: NDArray[np.bool_]) -> Responses:
-    """The same with these lines invalid."""
+    """The responses with these lines invalid."""
     nothing = complex(np.nan, np.nan)
     return replace(
         one,

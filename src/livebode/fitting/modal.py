@@ -11,7 +11,7 @@ from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.transfer import Transfer
 
 QUALITY = 10.0
-"""Of the scanned resonances; Table I of Nevaranta 2016 has it."""
+"""Quality factor of the scanned resonances; Table I of Nevaranta 2016 has it."""
 
 _SCANNED = {0: 1, 1: 48, 2: 20}
 _TRIED = {0: 1, 1: 4, 2: 16}

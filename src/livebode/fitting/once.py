@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import FitError, Parameters, Response, Responses, not_installed
-from livebode.fitting.competing import Allowed, Competitor, compete, competitor, mixed, positive
-from livebode.fitting.extended import WORDS
+from livebode.fitting.competitors import AllowedChanges, Competitor, compete, competitor, mixed, positive
+from livebode.fitting.extended_model import WORDS
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.hold import to_discrete
 from livebode.fitting.mean import mean_response
@@ -92,7 +92,7 @@ class Fit:
         return self.refusal or SENTENCES[self.status]
 
     def refused(self, reason: str) -> Fit:
-        """The same without numbers, for a reason that is its sentence."""
+        """This fit without numbers, for a reason that is its sentence."""
         part = self.parameters
         status = np.full(1, NO_FIT, dtype=part.status.dtype)
         blank = [
@@ -271,7 +271,7 @@ def best_of(fitter: Fitter, parameters: Parameters, measured: Responses) -> Fit:
     fitted = fit_rows(problem, rows, noise_dof, parameters.value)
     if fitted.status[0] != "ok":
         return found
-    allowed = Allowed(fitter.fixed, fitter.may_take_delay(), found.band_hz[1])
+    allowed = AllowedChanges(fitter.fixed, fitter.may_take_delay(), found.band_hz[1])
     late = (DELAY,) if problem is not fitter.problem else ()
     every = compete(competitor(problem, rows, noise_dof, fitted, late), rows, noise_dof, allowed)
     return _chosen(found, every, rows, noise_dof)

@@ -39,7 +39,7 @@ class Structure:
 
     @property
     def linear(self) -> int:
-        """Of each output."""
+        """Number of linear coefficients of each output."""
         return 2 * self.pairs + self.single + self.integrators + self.direct
 
     @property

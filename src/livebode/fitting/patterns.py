@@ -9,7 +9,7 @@ import numpy as np
 from livebode.arrays import Complex, Floats
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FittedRows
-from livebode.fitting.weighing import misfit, weights
+from livebode.fitting.weights import misfit, weights
 
 LACKS = 10.0
 """Decrease of −2·ln(likelihood) by an ε from which noise alone does not explain the residuals."""

@@ -157,7 +157,7 @@ class PhysicalModel:
         return np.repeat(np.array(tried)[:, np.newaxis], len(value), axis=1)
 
     def shown(self, values: Floats, grid: EvaluationGrid) -> Floats:  # noqa: ARG002  for those who look
-        """The same values (..., parameters), with frictions that may be zero at the smallest visible value."""
+        """These values (..., parameters), with frictions that may be zero at the smallest visible value."""
         return values
 
     @cached_property
@@ -184,7 +184,7 @@ class PhysicalModel:
 
     @property
     def derived_names(self) -> tuple[str, ...]:
-        """Of `derived`: frequency, damping ratio and quality factor of each mode, and of each pair of zeros."""
+        """Names in `derived`: frequency, damping ratio and quality factor of each mode, and of each pair of zeros."""
         return tuple(n + end for n in self._pairs() for end in ("", "_damping", "_q"))
 
     @property

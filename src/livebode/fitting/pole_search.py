@@ -94,7 +94,7 @@ def possible(outputs: Outputs, of: Separated, kind: Kind) -> bool:
 
 
 def _delayed(outputs: Outputs, of: Separated) -> list[Separated]:
-    """The same with a delay of each output."""
+    """This model with a delay of each output."""
     wider = replace(of.structure, delays=True)
     if of.structure.delays or np.max(of.epsilon) > _ROUGH or not outputs.enough_for(wider):
         return []

@@ -150,7 +150,7 @@ class Problem:
         free: Sequence[str] = (),
         held: Mapping[str, float] | None = None,
     ) -> Problem:
-        """The same with another model, some parameters freed, and some held."""
+        """This problem with another model, some parameters freed, and some held."""
         model = model or self.model
         rest = {name: value for name, value in self.held.items() if name not in free} | dict(held or {})
         return Problem(model, self.grid, rest, [name for name in model.names if name not in rest])

@@ -15,7 +15,7 @@ from livebode.fitting.hold import to_continuous
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import NO_RESPONSE, NOT_SEEN
 from livebode.fitting.transfer import Transfer
-from livebode.fitting.weighing import chi_squared, own_epsilon, squares, weights
+from livebode.fitting.weights import chi_squared, own_epsilon, squares, weights
 
 Method = Literal["levy", "sanathanan-koerner", "maximum likelihood"]
 
@@ -201,7 +201,7 @@ def _covariance(equations: _Equations, theta: Floats, weight: Floats, eps: Float
 
 
 def _noise_weights(measured: Measured, size: Floats, eps: Floats) -> Floats:
-    """As `weights`; by size where no noise is known."""
+    """Weights as those of `weights`; by size where no noise is known."""
     found = weights(measured.sigma, size, eps)
     unknown = ~((found > 0) & measured.use).any(axis=1)
     found[unknown] = weights(measured.sigma[unknown], size[unknown], np.ones(np.count_nonzero(unknown)))
@@ -240,7 +240,7 @@ def _ratio(equations: _Equations, theta: Floats) -> Complex:
 
 
 def _gradient(equations: _Equations, theta: Floats) -> Complex:
-    """Of B/A by the coefficients, (rows, lines, n)."""
+    """Gradient of B/A by the coefficients, (rows, lines, n)."""
     powers, count = equations.powers, equations.above
     below = 1 / _below(equations, theta)[..., np.newaxis]
     ratio = _ratio(equations, theta)[..., np.newaxis]

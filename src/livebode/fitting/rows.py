@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core import OK
 from livebode.fitting.problem import Measured, Problem, Solution
-from livebode.fitting.weighing import chi_squared, lacks_more_than, own_epsilon, squares, weights
+from livebode.fitting.weights import chi_squared, lacks_more_than, own_epsilon, squares, weights
 from livebode.kernel import FitModel, FitRows, fit
 from livebode.language import Message
 

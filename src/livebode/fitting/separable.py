@@ -14,7 +14,7 @@ from livebode.fitting.partial_fractions import PartialFractions, Structure
 from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.problem import Measured, Solution
 from livebode.fitting.rows import covariance
-from livebode.fitting.weighing import epsilon_for, misfit_by, squares, weights
+from livebode.fitting.weights import epsilon_for, misfit_by, squares, weights
 
 _FIRST_EPSILON = 0.1
 _SAME = 0.01
@@ -85,7 +85,7 @@ def solve(
     epsilon = np.full(structure.outputs, _FIRST_EPSILON)
     theta, dof = start, _dof(outputs, structure)
     for _ in range(rounds):
-        problem = _Weighted(outputs, structure, _weights(measured, epsilon))
+        problem = _WeightedFit(outputs, structure, _weights(measured, epsilon))
         theta, settled = problem.minimised(theta, evaluations)
         linear, response = problem.at(theta)
         rest, noise, _ = squares(measured, response)
@@ -113,7 +113,7 @@ def whole_covariance(outputs: Outputs, of: Separated) -> Floats:
 
     The noise of different outputs is taken as independent.
     """
-    problem = _Weighted(outputs, of.structure, of.weight)
+    problem = _WeightedFit(outputs, of.structure, of.weight)
     slope = problem.slopes(of.theta, of.linear)
     measured = outputs.measured
     sigma = np.where(measured.sigma > 0, measured.sigma, 0.0)
@@ -129,7 +129,7 @@ def whole_covariance(outputs: Outputs, of: Separated) -> Floats:
 
 def left_over(outputs: Outputs, of: Separated) -> tuple[Floats, list[Floats]]:
     """Weighted residuals, real above imaginary parts, (outputs, 2·lines), and the basis of each output's columns."""
-    problem = _Weighted(outputs, of.structure, of.weight)
+    problem = _WeightedFit(outputs, of.structure, of.weight)
     rest = of.weight * np.where(outputs.measured.use, outputs.measured.value - of.response, 0.0)
     return stacked(rest.T).T, [q for q, *_ in problem.factors(of.theta)]
 
@@ -139,7 +139,7 @@ def stacked(values: NDArray[Any]) -> Floats:
     return np.concatenate([values.real, values.imag])
 
 
-class _Weighted:
+class _WeightedFit:
     """The least squares of one structure with given weights, and its solution at the last poles."""
 
     def __init__(self, outputs: Outputs, structure: Structure, weight: Floats) -> None:
@@ -227,7 +227,7 @@ def _unknown(measured: Measured) -> Any:
 
 
 def _weights(measured: Measured, epsilon: Floats) -> Floats:
-    """Of each line; by its size where neither noise nor ε is known.
+    """Weight of each line; by its size where neither noise nor ε is known.
 
     The size is the measured one: that of a model with too few poles is wrong by orders of magnitude between them.
     """

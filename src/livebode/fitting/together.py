@@ -10,13 +10,14 @@ from livebode.fitting.rows import FittedRows
 from livebode.fitting.tasks import FitTask, fitted_together
 
 
-def fit_together(
+def fit_each(
     fitters: Sequence[Fitter], batches: Sequence[Responses], emits: Sequence[Emit] | None = None
-) -> list[Parameters]:
-    """Parameters of each batch, to rounding as `process` of its fitter gives them; a fitter may be there once.
+) -> tuple[dict[int, Parameters], dict[int, Exception]]:
+    """Parameters of each batch by the position of its fitter, and the errors of the others, which disturb no fitter.
 
-    Fitters with the same model, lines and free parameters share the computation of their rows where NumPy fits them: a
-    call for one row costs nearly what it costs for sixteen (`python -m bench.fits`).
+    The parameters are to rounding those of `process` of the fitter; a fitter may be there once. Fitters with the same
+    model, lines and free parameters share the computation of their rows where NumPy fits them: a call for one row costs
+    nearly what it costs for sixteen (`python -m bench.fits`).
 
     Parameters
     ----------
@@ -25,27 +26,11 @@ def fit_together(
     emits
         For each axis, what receives its events.
 
-    Raises
-    ------
-    LivebodeError
-        As `Fitter.process`; the other fitters have taken their rows.
-
     Examples
     --------
-    >>> from livebode.fitting import Fitter, TwoMass
-    >>> fit_together([], [])
-    []
+    >>> fit_each([], [])
+    ({}, {})
     """
-    found, errors = fit_each(fitters, batches, emits)
-    for error in errors.values():
-        raise error
-    return [found[i] for i in range(len(fitters))]
-
-
-def fit_each(
-    fitters: Sequence[Fitter], batches: Sequence[Responses], emits: Sequence[Emit] | None = None
-) -> tuple[dict[int, Parameters], dict[int, Exception]]:
-    """As `fit_together`, by the position of the fitter; and why others raise, which disturbs no other fitter."""
     emits = emits or [ignore] * len(fitters)
     parts: list[list[Parameters]] = [[] for _ in fitters]
     done = [0] * len(fitters)
@@ -60,7 +45,7 @@ def fit_each(
                 errors[i] = error
         for i, found in _fitted(tasks, errors).items():
             try:
-                parts[i].append(fitters[i].take(tasks[i], found, emits[i]))
+                parts[i].append(fitters[i].finish(tasks[i], found, emits[i]))
             except Exception as error:
                 errors[i] = error
             done[i] += len(tasks[i].responses)

@@ -57,7 +57,7 @@ def fit_windows(value: Complex, weight: Floats, z: Complex, rate_hz: float, star
 
 
 def scan(value: Complex, weight: Floats, z: Complex, rate_hz: float) -> tuple[Floats, Floats]:
-    """The same without a start: ten resonances from half the lowest to twice the highest line, the best of ten fits.
+    """Best fit without a start: ten resonances from half the lowest to twice the highest line, the best of ten fits.
 
     A fit that starts at twice or half the stiffness ends in a false minimum, so each of the ten is tried. For a given
     resonance the response is linear in 1/(Js + m) and 1/Js − 1/(Js + m), which gives its two inertias.

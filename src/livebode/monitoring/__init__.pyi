@@ -11,7 +11,6 @@ from livebode.monitoring.alarm_kinds import Priority as Priority
 from livebode.monitoring.alarm_kinds import cause_of as cause_of
 from livebode.monitoring.baseline import Baseline as Baseline
 from livebode.monitoring.baseline import signals_of as signals_of
-from livebode.monitoring.baseline_version import BaselineVersion as BaselineVersion
 from livebode.monitoring.baseline_version import file_of as file_of
 from livebode.monitoring.baseline_version import retained_file as retained_file
 from livebode.monitoring.charts import DEFAULT_INTERVAL_S as DEFAULT_INTERVAL_S

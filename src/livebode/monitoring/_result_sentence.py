@@ -10,7 +10,7 @@ from livebode.language import Message
 
 
 def result_sentence(summary: Mapping[str, Any], together: Sequence[Message] = ()) -> Message:
-    """Of judged time and changes as in run.json; `together` has the amounts of the active ones."""
+    """Sentence of judged time and changes as in run.json; `together` has the amounts of the active ones."""
     return Message.sentences([_changes(summary, together), *_torque(summary), *_not_monitored(summary)])
 
 

@@ -64,7 +64,7 @@ class Alarm:
         return self
 
     def row(self) -> list[float]:
-        """As numbers, for a snapshot."""
+        """Numbers of this alarm, for a snapshot."""
         earliest_s = np.nan if self.date.earliest_s is None else self.date.earliest_s
         date = [self.date.since_sample, self.date.since_s, earliest_s, self.date.latest_s]
         rest = [*date, *self.way_m, self.now, self.bound, self.height, self.announced]

@@ -33,7 +33,7 @@ class InputAmplitude:
 
     @classmethod
     def unlimited(cls, lines: int) -> InputAmplitude:
-        """Of runs whose amplitude is not known yet."""
+        """Amplitude of runs for which it is not known yet."""
         return cls(np.zeros(lines), np.zeros(lines), np.full(lines, np.inf))
 
     @classmethod

@@ -36,7 +36,7 @@ _NUMBERS = "inertia", "offset", "turn"
 
 
 def torque_plain(learned: LearnedTorque) -> dict[str, Any]:
-    """As plain data, for JSON."""
+    """Friction and orders as plain data, for JSON."""
     model = learned.model
     return {
         "kind": model.kind,

@@ -40,7 +40,7 @@ class ChangeDate:
     latest_s: float
 
     def plain(self) -> dict[str, Any]:
-        """As details of an event."""
+        """Details of an event."""
         return {
             "since_s": self.since_s,
             "since_sample": self.since_sample,

@@ -68,7 +68,7 @@ class Charts(StatefulBase):
     def __init__(self, smallest: Floats, allowed: Floats, threshold: float) -> None:
         self.threshold = threshold
         self.sums = np.zeros((2, smallest.size))
-        """Of every component, up and down, shape (2, components)."""
+        """Sums of every component, up and down, shape (2, components)."""
         self.since = np.full((2, smallest.size), -1)
         """Mark of the step at which each sum last left zero: the beginning of the change, if there is one."""
         self._gain = smallest - allowed

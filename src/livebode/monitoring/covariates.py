@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from livebode.arrays import Floats
 from livebode.core import BaselineError
 
-COVARIATES_MAX = 4
 _MARGIN = 0.1  # of the learned range, beyond which the influence is unknown
 _CONSTANT = 1e-6  # of the mean: a smaller range is rounding
 _NOISE = 10.0  # standard deviations of a channel's noise: in 100,000 windows it alone ranges over nine

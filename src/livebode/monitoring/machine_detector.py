@@ -341,7 +341,7 @@ class MachineMonitor(StatefulBase):
         return self._judged(self._stretches.finish(), look)
 
     def finish(self, look: Look | None = None) -> list[Event]:
-        """The same, and a change that was found but not yet separated from others."""
+        """Events as those of `process`, and a change that was found but not yet separated from others."""
         return self.rest(look) + self.detector.finish()
 
     def standing(self) -> list[dict[str, Any]]:

@@ -62,7 +62,7 @@ def normal(parts: Sequence[Evidence], machine: LearnedMachine, rate_hz: float) -
 
 
 def normal_of(seen: Evidence, machine: LearnedMachine, rate_hz: float) -> tuple[Floats, Floats]:
-    """The same of one run's windows, (unknowns + 1,), (unknowns + 1, unknowns + 1)."""
+    """Normal equations of one run's windows, (unknowns + 1,), (unknowns + 1, unknowns + 1)."""
     design = _design(seen, machine)
     gradient = np.append(np.einsum("rju,rj->u", design, seen.score), seen.late_score.sum() / rate_hz)
     matrix = np.zeros((gradient.size, gradient.size))
@@ -74,7 +74,7 @@ def normal_of(seen: Evidence, machine: LearnedMachine, rate_hz: float) -> tuple[
 
 
 def step_of(normal: tuple[Floats, Floats], machine: LearnedMachine) -> Floats:
-    """Of the unknowns, and of the delay in samples."""
+    """Step of the unknowns, and of the delay in samples."""
     gradient, matrix = normal
     model, slopes = machine.model, machine.covariates.slope * machine.covariates.half_range
     k, b = len(model.log_stiffness.weights), len(model.log_damping.weights)

@@ -57,7 +57,7 @@ class ScoredWindows:
     position_m: Floats
 
     def without(self, known: list[int]) -> ScoredWindows:
-        """The same with changes of any size in these directions allowed for."""
+        """These windows with changes of any size in these directions allowed for."""
         if not known:
             return self
         if len(known) == 1:  # the usual case, without small linear algebra

@@ -9,7 +9,7 @@ import numpy as np
 from livebode.arrays import Floats
 
 FAR = 0.2
-"""Of a logarithm: beyond it, it may be another machine, with differences that are not identified."""
+"""Difference of a logarithm: beyond it, it may be another machine, with differences that are not identified."""
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class RunOffset(StatefulBase):
         self._inflation = float(held.inflation[along].max())
         spread = np.array([0.0 if between is None else between.spread])
         self.chart = Charts(4 * spread, 2 * spread, threshold)
-        """Of the offset itself."""
+        """Chart of the offset itself."""
         self._sums = np.zeros(3)  # score and information along the direction, and windows
         self._queue = np.zeros((0, 3))  # mark, score, information of windows that may belong to a change
         self._fixed = False
@@ -91,7 +91,7 @@ class RunOffset(StatefulBase):
         return self._between.projected(score, information, self._held.smallest)
 
     def segment(self, segment: ScoredWindows) -> ScoredWindows:
-        """The same of a segment."""
+        """Evidence of a segment as `judged` gives it."""
         return ScoredWindows(*self.judged(segment.score, segment.information), segment.position_m)
 
     def step(self, score: Floats, information: Floats, mark: int, time_s: float) -> None:

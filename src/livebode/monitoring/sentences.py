@@ -62,7 +62,7 @@ def far_away(alarm: Alarm, sample: int, time_s: float) -> Event:
 
 
 def about_far(alarm: Alarm) -> dict[str, Any]:
-    """The same as plain data: only the time and the range of positions are known."""
+    """Details of such an alarm as plain data: only the time and the range of positions are known."""
     unknown = {"amount_percent": None, "bound_percent": None, "place_m": None, "place_width_m": None}
     return about(alarm) | unknown | {"what": "machine", "may_also_be": None}
 

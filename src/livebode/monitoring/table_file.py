@@ -14,7 +14,7 @@ from livebode.monitoring.table import ScheduleTable
 
 
 def table_plain(table: ScheduleTable) -> dict[str, Any]:
-    """As plain data, for JSON."""
+    """Plain data of it, for JSON."""
     return {
         "what": table.what,
         "names": [name.plain() if isinstance(name, Message) else name for name in table.names],
@@ -54,7 +54,7 @@ def table_of(data: BaselinePart) -> ScheduleTable:
 
 
 def accuracy_plain(known: ChangeAccuracy) -> dict[str, Any]:
-    """As plain data, for JSON."""
+    """Plain data of it, for JSON."""
     return {name: as_list(getattr(known, name)) for name in ChangeAccuracy.__dataclass_fields__}
 
 

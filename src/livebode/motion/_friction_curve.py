@@ -136,7 +136,7 @@ class FrictionCurve:
         return slope
 
     def plain(self) -> dict[str, Any]:
-        """As plain data, for JSON; bounds of 95 %."""
+        """Plain data of the curve, for JSON; bounds of 95 %."""
         bound = self.bound()
         found: dict[str, Any] = {
             name: {"value": float(self.value[i]), "bound": float(bound[i]), "unit": self.units[i]}

@@ -135,7 +135,7 @@ class PendingResponses(StatefulBase):
     def append(self, responses: Responses) -> None:
         self._parts.append(responses)
 
-    def take(self, stop: int) -> Responses:
+    def pop(self, stop: int) -> Responses:
         """Remove and return those whose newest sample is before `stop`."""
         whole = Responses.join(self._parts)
         count = int(np.searchsorted(whole.sample, stop))

@@ -13,7 +13,7 @@ from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, S
 from livebode.estimation import NOTHING, Settings, Tracker, contains
 from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, PendingResponses, RecentSamples
-from livebode.motion.learner import Learner, Replayed, frozen
+from livebode.motion.learner import Learner, ReplayResult, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.orders import RippleMonitor
 from livebode.motion.replay import by_excitation, drive_of
@@ -161,11 +161,11 @@ class MotionCorrection(StatefulBase):
         }
 
     def excitation_power(self) -> Floats:
-        """As `Tracker.excitation_power`."""
+        """Power of the excitation, as `Tracker.excitation_power` gives it."""
         return self._tracker.excitation_power()
 
     def repeatability(self) -> Floats:
-        """As `Tracker.repeatability`."""
+        """Repeatability, as `Tracker.repeatability` gives it."""
         return self._tracker.repeatability()
 
     def process(self, block: Block, emit: Emit = ignore) -> Responses:
@@ -232,7 +232,7 @@ class MotionCorrection(StatefulBase):
 
     def _corrected(self, stop: int) -> Responses:
         """Responses up to the sample before `stop`, and their fit; drops what no later chunk needs."""
-        tracked = self._waiting.take(stop)
+        tracked = self._waiting.pop(stop)
         end = min(stop + self.settings.lines.window, self._recorded.stop)
         chunk = self._recorded.chunk(self._from, stop, end)
         self._from = stop
@@ -242,7 +242,7 @@ class MotionCorrection(StatefulBase):
         return self._correct(tracked, chunk.at_rows(self.settings.lines, tracked.sample))
 
     def _correct(self, tracked: Responses, chunk: Chunk) -> Responses:
-        def replay(model: MovingModel) -> Replayed:
+        def replay(model: MovingModel) -> ReplayResult:
             return self._replayed(model, tracked, chunk)
 
         now = self._learner.learn(tracked, chunk, replay)
@@ -265,7 +265,7 @@ class MotionCorrection(StatefulBase):
         valid = tracked.valid & seen.valid & np.isfinite(value)
         scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
         if not aside:
-            self._ripple.take(left, chunk, now.model)
+            self._ripple.process(left, chunk, now.model)
         with np.errstate(invalid="ignore", divide="ignore"):
             ripple = np.abs(value) * np.sqrt(self._ripple.power(chunk, tracked.sample)) / chunk.torque
         return replace(
@@ -276,12 +276,12 @@ class MotionCorrection(StatefulBase):
             valid=valid,
         )
 
-    def _replayed(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> Replayed:
+    def _replayed(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> ReplayResult:
         left = residual(model, chunk, self.settings)
         seen = _rows_of(self._scatter.once(left.velocity, chunk), tracked)
-        return Replayed(model, left, seen, frozen(model, tracked.schedule, self.settings) + seen.value)
+        return ReplayResult(model, left, seen, frozen(model, tracked.schedule, self.settings) + seen.value)
 
-    def _value(self, now: Replayed, tracked: Responses, chunk: Chunk) -> Complex:
+    def _value(self, now: ReplayResult, tracked: Responses, chunk: Chunk) -> Complex:
         """The tracked responses plus the model's difference to its frozen response; NaN without a whole window."""
         if self._drive is None and not self._quotient:
             return now.value

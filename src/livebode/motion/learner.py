@@ -20,7 +20,7 @@ from livebode.motion.standstill import turns
 
 
 @dataclass(frozen=True, eq=False)
-class Replayed:
+class ReplayResult:
     """A model driven through a chunk: its residual, R/U of the residual, and the corrected responses (rows, lines)."""
 
     model: MovingModel
@@ -29,7 +29,7 @@ class Replayed:
     value: Complex
 
 
-Replay = Callable[[MovingModel], Replayed]
+Replay = Callable[[MovingModel], ReplayResult]
 
 _ROWS_MIN = 12
 _OVERLAP = 4  # windows of a period in the fit: more windows share their samples without new information
@@ -58,7 +58,7 @@ class Learner(StatefulBase):
         """Whether the model was fitted to the machine in motion."""
         return self.model is not None and len(self.model.log_stiffness.weights) > 1
 
-    def learn(self, tracked: Responses, chunk: Chunk, replay: Replay) -> Replayed | None:
+    def learn(self, tracked: Responses, chunk: Chunk, replay: Replay) -> ReplayResult | None:
         """The model after this chunk's steady motion; None while there is too little to fit."""
         usable = self._usable(tracked)
         steady = usable[steady_rows(tracked.sample[usable], chunk, self._settings.lines.window)]
@@ -70,13 +70,13 @@ class Learner(StatefulBase):
             return self._learn(tracked, usable, chunk, replay)
         return None if self.model is None else replay(self.model)
 
-    def widened(self, tracked: Responses, chunk: Chunk, now: Replayed) -> MovingModel:
+    def widened(self, tracked: Responses, chunk: Chunk, now: ReplayResult) -> MovingModel:
         """The model over all positions of the chunk, with the stiffness and damping of all responses."""
         rows, fit, model = self._over_all(tracked, now)
         wide = fit.refine(self._rows(tracked, rows, chunk, now), model, masses_known=True)
         return wide if self._sound(wide) else now.model
 
-    def completed(self, tracked: Responses, chunk: Chunk, replay: Replay, now: Replayed) -> Replayed:
+    def completed(self, tracked: Responses, chunk: Chunk, replay: Replay, now: ReplayResult) -> ReplayResult:
         """The model fitted to all responses, for a chunk in which friction never stops the axis."""
         rows, fit, model = self._over_all(tracked, now)
         model = fit.refine(self._rows(tracked, rows, chunk, now), model)
@@ -85,13 +85,15 @@ class Learner(StatefulBase):
         self.model = model
         return replay(model)
 
-    def _over_all(self, tracked: Responses, now: Replayed) -> tuple[NDArray[np.intp], MotionFitOptions, MovingModel]:
+    def _over_all(
+        self, tracked: Responses, now: ReplayResult
+    ) -> tuple[NDArray[np.intp], MotionFitOptions, MovingModel]:
         rows = self._thinned(tracked, self._usable(tracked))
         at = np.append(tracked.schedule[rows], (now.model.low_m, now.model.high_m))
         fit = self._fit(len(now.model.log_stiffness.weights), len(now.model.log_damping.weights))
         return rows, fit, fit.follow(now.model, float(at.min()), float(at.max()))
 
-    def _learn(self, tracked: Responses, rows: NDArray[np.intp], chunk: Chunk, replay: Replay) -> Replayed | None:
+    def _learn(self, tracked: Responses, rows: NDArray[np.intp], chunk: Chunk, replay: Replay) -> ReplayResult | None:
         rows = self._thinned(tracked, rows)
         at = tracked.schedule[rows]
         splines = self._splines if self.travels else (1, 1)
@@ -116,13 +118,13 @@ class Learner(StatefulBase):
     def _refined(
         self,
         fit: MotionFitOptions,
-        now: Replayed,
+        now: ReplayResult,
         tracked: Responses,
         used: NDArray[np.intp],
         chunk: Chunk,
         replay: Replay,
         passes: int,
-    ) -> tuple[Replayed, float]:
+    ) -> tuple[ReplayResult, float]:
         rows = self._rows(tracked, used := self._onward(tracked, used, chunk, now), chunk, now)
         for _ in range(passes):
             model = fit.refine(rows, now.model)
@@ -132,7 +134,7 @@ class Learner(StatefulBase):
             rows = self._rows(tracked, used, chunk, now)
         return now, fit.misfit(rows, now.model)
 
-    def _onward(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> NDArray[np.intp]:
+    def _onward(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: ReplayResult) -> NDArray[np.intp]:
         """Rows whose window has no reversal of motor or cart, where friction would bias them; all, if few remain."""
         where, newest = turns(now.left, chunk, chunk.start), tracked.sample[used]
         inside = np.searchsorted(where, newest, "right") - np.searchsorted(
@@ -141,7 +143,7 @@ class Learner(StatefulBase):
         onward = used[inside == 0]
         return onward if onward.size >= max(_ROWS_MIN, used.size // 4) else used
 
-    def _rows(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> WeightedResponses:
+    def _rows(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: ReplayResult) -> WeightedResponses:
         # The error of a response is n/|U|: white noise on y divided by the torque at the line.
         weight = chunk.torque[used]
         value = np.where(np.isfinite(now.value[used]), now.value[used], tracked.value[used])

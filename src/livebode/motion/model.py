@@ -106,7 +106,7 @@ class MovingModel:
         return np.asarray(np.exp(self.log_damping(position_m)))
 
     def plain(self) -> dict[str, Any]:
-        """As plain data: masses and radius, and the belt at eleven positions of the range."""
+        """Plain data of the model: masses and radius, and the belt at eleven positions of the range."""
         at = np.linspace(self.low_m, self.high_m, _SHOWN)
         return {
             "inertia_kg_m2": self.inertia_kg_m2,

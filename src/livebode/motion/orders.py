@@ -230,7 +230,7 @@ class RippleMonitor(StatefulBase):
         self.orders = settings.ripple
         """The known orders."""
 
-    def take(self, residual: Floats, chunk: Chunk, model: MovingModel) -> None:
+    def process(self, residual: Floats, chunk: Chunk, model: MovingModel) -> None:
         """Process a model's residual of a chunk, (samples,)."""
         if self._settings.ripple:
             return

@@ -63,7 +63,7 @@ def by_excitation(model: MovingModel, drive: Drive, w: Floats, position_m: Float
 
 
 def late(velocity: Floats, samples: float) -> Floats:
-    """The same by so many samples, whole or not, later: a cubic spline, exact to 1e-5 at a tenth of the rate.
+    """The velocity by so many samples, whole or not, later: a cubic spline, exact to 1e-5 at a tenth of the rate.
 
     Shape (samples,) or (rows, samples), finite, at least one sample; beyond the ends they continue constant. The bits
     are those of SciPy's `ndimage.shift` with its mode "nearest", and do not depend on the other rows.

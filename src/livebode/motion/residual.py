@@ -49,7 +49,7 @@ class Scatter(StatefulBase):
         return Tracker(self._settings, repeating=False).process(self._block(velocity, chunk))
 
     def then(self, velocity: Floats, chunk: Chunk) -> tuple[Responses, bytes]:
-        """The same with its sigma, and the memory for `keep`."""
+        """Corrected responses with their sigma, and the memory for `keep`."""
         tracker, block = Tracker(self._settings, repeating=False), self._block(velocity, chunk)
         if self._memory:
             tracker.restore(self._memory)

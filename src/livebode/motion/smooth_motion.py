@@ -81,7 +81,7 @@ class SmoothKernel:
 
     @property
     def correlation(self) -> Floats:
-        """Of smoothed white noise at lags of 0, 1, … steps, shape (lags,)."""
+        """Correlation of smoothed white noise at lags of 0, 1, … steps, shape (lags,)."""
         return np.asarray(np.exp(-((np.arange(_LAGS) * self.step / self.sigma) ** 2) / 4))
 
     def smooth(self, signal: Floats, derivative: int = 0) -> Floats:

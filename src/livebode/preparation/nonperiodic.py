@@ -88,7 +88,7 @@ def suits_lpm(reference: NDArray[np.float64], rate_hz: float) -> bool:
     except SignalError:
         return False
     with np.errstate(all="ignore"):
-        found = LocalPolynomial(lines, 1, 0, 1.0).take(np.array([samples, samples]), 0)
+        found = LocalPolynomial(lines, 1, 0, 1.0).process(np.array([samples, samples]), 0)
     return bool(separable(found).any())
 
 

@@ -7,6 +7,10 @@ from livebode.simulation._linear import StateSpace as StateSpace
 from livebode.simulation._linear import linear as linear
 from livebode.simulation._open_belt import Pair as Pair
 from livebode.simulation._open_belt import open_belt as open_belt
+from livebode.simulation.axis_settings import Drive as Drive
+from livebode.simulation.axis_settings import Friction as Friction
+from livebode.simulation.axis_settings import Limits as Limits
+from livebode.simulation.axis_settings import Sensor as Sensor
 from livebode.simulation.closed_loop import ClosedLoop as ClosedLoop
 from livebode.simulation.configuration import BeltAxis as BeltAxis
 from livebode.simulation.configuration import engine_settings as engine_settings
@@ -24,7 +28,6 @@ from livebode.simulation.gantry import Gantry as Gantry
 from livebode.simulation.gantry import GantryLoop as GantryLoop
 from livebode.simulation.mechanics import Mechanics as Mechanics
 from livebode.simulation.mechanics import Spans as Spans
-from livebode.simulation.mechanism import LinearMechanism as LinearMechanism
 from livebode.simulation.modal import ModalLoop as ModalLoop
 from livebode.simulation.modal import ModalMachine as ModalMachine
 from livebode.simulation.motion import Motion as Motion
@@ -32,10 +35,6 @@ from livebode.simulation.motion import Standstill as Standstill
 from livebode.simulation.motion import Strokes as Strokes
 from livebode.simulation.motion import StrokeSequence as StrokeSequence
 from livebode.simulation.motor_loop import MotorLoop as MotorLoop
-from livebode.simulation.settings import Drive as Drive
-from livebode.simulation.settings import Friction as Friction
-from livebode.simulation.settings import Limits as Limits
-from livebode.simulation.settings import Sensor as Sensor
 from livebode.simulation.source import SimulatedAxis as SimulatedAxis
 from livebode.simulation.truth import Truth as Truth
 from livebode.simulation.two_mass_loop import TwoMassLoop as TwoMassLoop

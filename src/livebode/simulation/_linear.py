@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Algebra
+from livebode.simulation.axis_settings import Friction
 from livebode.simulation.hold import held
 from livebode.simulation.mechanics import Mechanics, Spans
-from livebode.simulation.settings import Friction
 
 Output = Literal["velocity", "position", "cart"]
 
@@ -73,11 +73,11 @@ class StateSpace(Algebra):
         return _resolvent(self.a, self.b, self.c, np.asarray(s, dtype=np.complex128))
 
     def sampled(self, rate_hz: float) -> Sampled:
-        """The same behind a zero-order hold, read at the ticks: exact."""
+        """This model behind a zero-order hold, read at the ticks: exact."""
         return Sampled(*held(self.a, self.b, 1 / rate_hz), self.c, rate_hz)
 
     def out(self, output: Output) -> StateSpace:
-        """The same plant with another output: motor velocity, rad/s, motor angle, rad, or cart position, m."""
+        """This plant with another output: motor velocity, rad/s, motor angle, rad, or cart position, m."""
         c = np.zeros(len(self.b))
         c[{"velocity": 1, "position": 0, "cart": -2}[output]] = 1.0
         return replace(self, c=c)
@@ -131,7 +131,7 @@ def _two_masses(mechanics: Mechanics, spans: Spans, load_kg: float) -> tuple[Flo
 
 
 def _three_masses(mechanics: Mechanics, spans: Spans, load_kg: float) -> tuple[Floats, Floats, Floats]:
-    """The same of φ1, φ2, x (8)–(10): each span pulls with its elongation."""
+    """Matrices of φ1, φ2, x (8)–(10): each span pulls with its elongation."""
     r = mechanics.radius_m
     elongations = np.array([[r, 0.0, -1.0], [0.0, -r, 1.0], [-r, r, 0.0]])
     pulls = [np.outer(e, e) for e in elongations]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from livebode.arrays import Complex, Floats
 from livebode.core import Algebra
 from livebode.simulation._linear import StateSpace
-from livebode.simulation.settings import Drive, Sensor
+from livebode.simulation.axis_settings import Drive, Sensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class ClosedLoop:
     --------
     >>> from livebode.simulation._linear import linear
     >>> from livebode.simulation.mechanics import Mechanics, Spans
-    >>> from livebode.simulation.settings import Friction
+    >>> from livebode.simulation.axis_settings import Friction
     >>> belt = Mechanics()
     >>> loop = ClosedLoop(linear(belt, Friction(), Spans.of(belt, 0.8), belt.load_kg), Drive())
     >>> loop.spectral_radius < 1

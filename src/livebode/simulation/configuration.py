@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from livebode.arrays import Floats
 from livebode.core import SimulationError, UsageError
 from livebode.simulation._linear import StateSpace, linear
+from livebode.simulation.axis_settings import Drive, Friction, Limits, Sensor
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.faults import Condition, Fault, SoftSpot, condition_at
 from livebode.simulation.mechanics import Mechanics, Spans
 from livebode.simulation.motion import Motion, Standstill
-from livebode.simulation.settings import Drive, Friction, Limits, Sensor
 from livebode.simulation.values import count, nonnegative
 
 SPOTS_MAX = 16

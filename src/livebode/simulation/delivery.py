@@ -65,7 +65,7 @@ def delivered(
 
 
 def paced(blocks: Iterable[Block], clock: Callable[[], float], sleep: Callable[[float], object]) -> Iterator[Block]:
-    """The same Blocks, each at its time after the first request; a late one is delivered at once."""
+    """These Blocks, each at its time after the first request; a late one is delivered at once."""
     began = clock()
     for block in blocks:
         if (wait := began + block.stop / block.rate_hz - clock()) > 0:

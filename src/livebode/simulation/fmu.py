@@ -14,12 +14,12 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Block, Channel, SimulationError, UsageError, nearest_name, not_installed, remove_created
+from livebode.simulation.axis_settings import Drive, Limits, Sensor
 from livebode.simulation.configuration import controller_settings
 from livebode.simulation.controller import Controller, Now
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
 from livebode.simulation.divergence import diverged
 from livebode.simulation.motion import Motion, Standstill
-from livebode.simulation.settings import Drive, Limits, Sensor
 from livebode.simulation.values import positive
 
 _NO_FAULT = (1.0, 1.0, 1.0, 0.0, 1.0, 0.0)  # the FMU has its own

@@ -13,7 +13,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import UsageError
-from livebode.simulation.settings import Limits
+from livebode.simulation.axis_settings import Limits
 from livebode.simulation.values import NonNegative, Positive, nonnegative, positive
 
 

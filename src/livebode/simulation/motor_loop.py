@@ -62,7 +62,7 @@ class MotorLoop(ABC):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Of `simulate`: w and u of each motor, then the outputs."""
+        """Channels of `simulate`: w and u of each motor, then the outputs."""
         numbers = range(1, self.mechanism.motors + 1)
         torques = [Channel(f"{role}{i}", "N m") for role in "wu" for i in numbers]
         return (*torques, *(Channel(name, unit) for name, unit in self.mechanism.outputs))
@@ -128,7 +128,7 @@ class MotorLoop(ABC):
         return self.continued(inputs)[0]
 
     def continued(self, inputs: Floats, state: Floats | None = None) -> tuple[Floats, Floats]:
-        """The same from a state, shape (states, runs), and the state after the last sample; None: from rest."""
+        """Signals from a state, shape (states, runs), and the state after the last sample; None: from rest."""
         motors = self.mechanism.motors
         flat = inputs.reshape(*inputs.shape[:2], -1)
         begin = np.zeros((len(self.matrices[0]), flat.shape[2])) if state is None else state
@@ -192,7 +192,7 @@ class MotorLoop(ABC):
 def _advanced(
     inputs: Floats, state: Floats, rows: Floats, forward: Floats, entry: Floats, ticks: int
 ) -> tuple[Floats, Floats]:
-    """The same in steps of some ticks, each a product with the powers of Φ: a tick alone costs a call of NumPy."""
+    """Outputs and state in steps of some ticks, by the powers of Φ: a tick alone costs a call of NumPy."""
     powers = [np.eye(len(forward))]
     for _ in range(ticks):
         powers.append(forward @ powers[-1])

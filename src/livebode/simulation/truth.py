@@ -42,12 +42,12 @@ class Truth:
 
     @property
     def position_m(self) -> Floats:
-        """Of the cart."""
+        """Position of the cart, m."""
         return np.asarray(self.states[-2])
 
     @property
     def speed_m_per_s(self) -> Floats:
-        """Of the cart."""
+        """Speed of the cart, m/s."""
         return np.asarray(self.states[-1])
 
     @property
@@ -76,7 +76,7 @@ class Truth:
         return self.axis.linear(*self._place(sample))
 
     def sampled(self, sample: int) -> Sampled:
-        """The same from the logged u to the logged velocity: with the hold, and as the sensor forms the velocity.
+        """Model from the logged u to the logged velocity: with the hold, and as the sensor forms the velocity.
 
         A play counts as closed, on one of its sides.
         """
@@ -86,7 +86,7 @@ class Truth:
         return plant.sampled(self.axis.drive.rate_hz)
 
     def closed_loop(self, sample: int) -> ClosedLoop:
-        """The same in its loop: Y/W, U/W."""
+        """Responses in its loop: Y/W, U/W."""
         return self.axis.closed_loop(*self._place(sample))
 
     def _place(self, sample: int) -> tuple[float, float]:

@@ -49,7 +49,7 @@ class TwoMassPlant:
         return a, np.array([0, 1 / JS, 0, 0])
 
     def discrete(self) -> tuple[Floats, Floats]:
-        """The same for one tick of 4 kHz, with zero-order hold."""
+        """A and B for one tick of 4 kHz, with zero-order hold."""
         return held(*self.continuous(), 1 / RATE_HZ)
 
     def response(self, frequency_hz: Floats) -> Complex:
@@ -87,7 +87,7 @@ class TwoMassLoop:
         return self.under(w, sigma * rng.standard_normal((periods * w.size, runs)))
 
     def under(self, w: Floats, noise: Floats) -> tuple[Floats, Floats]:
-        """The same with this noise on y, shape (ticks, runs). One period of w is an even number of ticks."""
+        """Signals with this noise on y, shape (ticks, runs). One period of w is an even number of ticks."""
         rows = np.zeros((noise.shape[1], 8))
         rows[:, :6] = self._settled(w)
         u, y = np.empty((2, *noise.shape))

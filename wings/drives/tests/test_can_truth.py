@@ -55,7 +55,7 @@ def test_samples_are_put_together_by_the_times_of_frames(seed, ppm, jitter, begi
     for place, (number, identity, delay, data) in enumerate(order):
         if place not in lost:
             time_s = STAMP_S + number / RATE_HZ * (1 + ppm * 1e-6) + delay + jitter / RATE_HZ * rng.random()
-            found += samples.take((identity, False), data, time_s)
+            found += samples.process((identity, False), data, time_s)
     assert samples.problems == []
     rows = np.array([sample.row for sample in found])
     assert (rows == rows[:, :1]).all()  # of one period
@@ -68,23 +68,23 @@ def test_samples_are_put_together_by_the_times_of_frames(seed, ppm, jitter, begi
 
 def test_a_frame_whose_number_is_not_certain_is_not_a_sample():
     clock = FrameClock(1000.0)
-    assert [clock.take(t) for t in (0.0, 0.00105, 0.0024, 0.00245, 0.0041)] == [True, True, True, False, True]
+    assert [clock.add(t) for t in (0.0, 0.00105, 0.0024, 0.00245, 0.0041)] == [True, True, True, False, True]
     assert clock.number == 4
     samples = odrive(["Vel_Estimate"])
     for n in range(200):
-        samples.take((ENCODER, False), bytes(8), n / 1000)
+        samples.process((ENCODER, False), bytes(8), n / 1000)
     assert samples.problems == []
-    later = [s for n in range(60) for s in samples.take((ENCODER, False), bytes(8), 0.20047 + n / 1000)]
+    later = [s for n in range(60) for s in samples.process((ENCODER, False), bytes(8), 0.20047 + n / 1000)]
     assert "more than 0.4 periods" in samples.problems[0]
     assert {sample.epoch for sample in later} == {1}  # numbering begins again rather than never
-    gone = [s for n in range(60) for s in samples.take((ENCODER, False), bytes(8), 9 + n / 1000)]
+    gone = [s for n in range(60) for s in samples.process((ENCODER, False), bytes(8), 9 + n / 1000)]
     assert {sample.epoch for sample in gone} == {2}
 
 
 def test_a_bus_that_is_set_to_half_its_rate_is_reported():
     samples = odrive(["Vel_Estimate"])
     for n in range(100):
-        samples.take((ENCODER, False), bytes(8), n / 2000)
+        samples.process((ENCODER, False), bytes(8), n / 2000)
     assert "check source.rate_hz" in samples.problems[0]
 
 
@@ -149,7 +149,7 @@ def test_a_moteus_answer_of_can_fd_is_decoded():
     found = []
     for n in range(100):
         data = b"\x2f\x01" + struct.pack("<fff", 0.25, n, -n) + b"\x50\x50"  # padded to a length of CAN FD
-        found += samples.take((0x100, False), data, n / RATE_HZ)
+        found += samples.process((0x100, False), data, n / RATE_HZ)
     np.testing.assert_array_equal([sample.row for sample in found], [(-n, n) for n in range(SETTLED, 100)])
 
 

@@ -90,18 +90,18 @@ def test_a_device_in_the_network_that_goes_is_connected_again(monkeypatch):
 def test_samples_of_several_signals_are_put_together_by_number():
     together = TogetherByNumber(2)
     together.add(0, np.arange(10, 20), np.arange(10.0, 20.0))
-    assert together.take() == []
+    assert together.pop() == []
     together.add(1, np.array([12, 13, 15, 16, 17]), -np.array([12.0, 13, 15, 16, 17]))
-    runs = together.take()
+    runs = together.pop()
     assert [first for first, _ in runs] == [12, 15]
     for first, data in runs:
         np.testing.assert_array_equal(data[0], first + np.arange(data.shape[1]))
         np.testing.assert_array_equal(data[1], -data[0])
     together.add(1, np.array([18]), np.array([-18.0]))
-    assert together.take()[0][0] == 18
+    assert together.pop()[0][0] == 18
     together.add(0, np.arange(100, 101 + BEHIND_MAX), np.zeros(1 + BEHIND_MAX))
     assert together.dropped == 2
-    assert together.take() == []
+    assert together.pop() == []
 
 
 def signal(delta: int) -> SimpleNamespace:

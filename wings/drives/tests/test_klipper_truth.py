@@ -67,7 +67,7 @@ def test_interpolation_is_as_good_as_it_says(part, error):
     time_s = np.arange(4000) / rate_hz
     grid, found = OnGrid(RATE_HZ, 1), []
     for a in range(0, 4000, 321):
-        found += grid.take(time_s[a : a + 321], np.cos(2 * np.pi * part * rate_hz * time_s[None, a : a + 321]))
+        found += grid.process(time_s[a : a + 321], np.cos(2 * np.pi * part * rate_hz * time_s[None, a : a + 321]))
     numbers = np.concatenate([first + np.arange(values.shape[1]) for first, values in found])
     np.testing.assert_array_equal(np.diff(numbers), 1)
     truth = np.cos(2 * np.pi * part * rate_hz * numbers / RATE_HZ)
@@ -76,7 +76,7 @@ def test_interpolation_is_as_good_as_it_says(part, error):
 
 def test_nothing_is_interpolated_across_missing_samples():
     time_s = np.delete(np.arange(400) / RATE_HZ, slice(200, 230))
-    runs = OnGrid(RATE_HZ, 1).take(time_s, time_s[None] * RATE_HZ)
+    runs = OnGrid(RATE_HZ, 1).process(time_s, time_s[None] * RATE_HZ)
     assert [(first, values.shape[1]) for first, values in runs] == [(2, 195), (232, 165)]
     for first, values in runs:
         np.testing.assert_allclose(values[0], first + np.arange(values.shape[1]))

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from livebode.core import Channel, SourceError
-from livebode_drives.live.numbered import Numbered
-from livebode_drives.live.opcua import INCOMPLETE_MAX, Gathered
+from livebode_drives.live.opcua import INCOMPLETE_MAX, StampCollector
 from livebode_drives.live.ring import FILETIME_1970, HEADER, MAGIC, Ring, new_rows, read_ring, ring_batch
+from livebode_drives.live.stamp_numbers import StampNumbers
 from tests.support.damaged_bytes import damaged, one_sentence
 from tests.support.errors import refused
 
@@ -87,7 +87,7 @@ def test_rings_that_are_refused(ring, size, facts):
 
 @given(st.lists(st.floats(-0.2, 0.2), min_size=2, max_size=200))
 def test_jitter_of_stamps_makes_neither_gaps_nor_repeats(jitter):
-    numbered = Numbered(CHANNELS, 4000.0)
+    numbered = StampNumbers(CHANNELS, 4000.0)
     row = np.zeros(2).tobytes()
     samples = [numbered.sample(1.7e9 + (k + e) / 4000.0, row) for k, e in enumerate(jitter)]
     assert len(numbered.batches(samples)) == 1
@@ -101,14 +101,14 @@ VALUES = [
 
 def test_any_value_of_an_opc_ua_variant_gives_a_batch_or_a_sentence():
     rng = random.Random(2)
-    gathered = Gathered({"w [N m]": "a", "y": "b"}, 4000.0, "n")
+    gathered = StampCollector({"w [N m]": "a", "y": "b"}, 4000.0, "n")
     found = 0
     for _ in range(CASES):
         stamp = rng.choice([None, NOW + timedelta(milliseconds=rng.randrange(100)), datetime(1601, 1, 1)])
         key = rng.choice("abn")
         value = rng.choice([rng.choice(VALUES), rng.randrange(1000) if key == "n" else [1.0, 2.0]])
         try:
-            found += gathered.take(key, value, stamp) is not None
+            found += gathered.add(key, value, stamp) is not None
         except SourceError as error:
             one_sentence(error)
         assert len(gathered._moments) <= INCOMPLETE_MAX

@@ -41,7 +41,7 @@ def test_every_loss_is_exact_whatever_wraps(lost, kept, modulus, first):
     counter, found = Counter(1000.0, modulus), []
     for number in truth:
         count = number if modulus is None else number % modulus
-        found += counter.take(count, 5.0 + number / 1000, np.array([number]))
+        found += counter.process(count, 5.0 + number / 1000, np.array([number]))
     assert found
     offset = found[0].row[0] - found[0].number
     assert [sample.row[0] for sample in found] == truth[: len(found)]
@@ -56,7 +56,7 @@ def test_a_single_wrong_counter_drops_only_its_sample(at, wrong, modulus):
     counter, found = Counter(1000.0, modulus), []
     for number in range(200, 300):
         count = wrong if number == 200 + at else number
-        found += counter.take(count, number / 1000, np.array([number]))
+        found += counter.process(count, number / 1000, np.array([number]))
     assert {sample.epoch for sample in found} == {0}
     assert all(sample.number == sample.row[0] for sample in found if sample.row[0] != 200 + at)
     assert {sample.row[0] for sample in found} >= set(range(200, 299)) - {200 + at}
@@ -66,7 +66,7 @@ def test_a_single_wrong_counter_drops_only_its_sample(at, wrong, modulus):
 def test_a_device_that_was_reset_is_another_epoch(modulus):
     counter, found = Counter(1000.0, modulus), []
     for k, count in enumerate([*range(30_000, 30_010), *range(20)]):
-        found += counter.take(count, k / 1000, np.array([count]))
+        found += counter.process(count, k / 1000, np.array([count]))
     assert [(s.epoch, s.number) for s in found] == [(0, n) for n in range(30_000, 30_010)] + [(1, n) for n in range(20)]
 
 
@@ -116,7 +116,7 @@ def test_a_device_that_is_slower_than_its_rate_is_reported():
         rate = ArrivalRate(events, 1000.0)
         for number in range(int(30 * true_hz)):
             if rng.random() < 0.2:
-                rate.take(number, number / true_hz + rng.random() * 0.2)  # a computer that is busy
+                rate.add(number, number / true_hz + rng.random() * 0.2)  # a computer that is busy
         found = events.take()
         assert [event.kind for event in found] == ["wrong-rate"] * reported
         if reported:

@@ -9,7 +9,7 @@ from scipy.special import ndtri
 
 from livebode.core import Block, Event, Parameters
 from livebode_modes import ModeTracker, OutputOnlySettings, Tracks, WindowModes, reduced
-from livebode_modes.settings import window_of
+from livebode_modes.output_only_settings import window_of
 from tests.support.ringing import DAMPING, FREQUENCY_HZ, RATE_HZ, moving_mode, two_modes
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ def windows(y: Floats, of: OutputOnlySettings, events: list[Event] | None = None
 
 def tracked(found: list[WindowModes], of: OutputOnlySettings) -> dict[str, Parameters]:
     tracks, rows = Tracks(of.hops), dict[str, list[Parameters]]()
-    for parts in [*map(tracks.take, found), tracks.finish()]:
+    for parts in [*map(tracks.process, found), tracks.finish()]:
         for part in parts:
             rows.setdefault(part.model, []).append(part)
     return {name: Parameters.join(parts) for name, parts in rows.items()}

@@ -22,7 +22,7 @@ TWINCAT = re.compile(
 """First two lines of a TwinCAT export: of its file, or of its channels where the file's own lines were left out."""
 CODESYS = re.compile(rb"(?:\xef\xbb\xbf)?\[key\];[ \t]*\[value\]\s*\n")
 SCOPE_HEAD = struct.Struct("<QQI")
-"""Of a Scope project: offset and length of its XML, number of acquisitions."""
+"""Head of a Scope project: offset and length of its XML, number of acquisitions."""
 SCOPE_ENTRY = struct.Struct("<QQI")
 """Offset and length of an acquisition, and its handle."""
 _BAG = "livebode_drives.recordings.ros:parts_of"

@@ -12,7 +12,7 @@ from livebode.core import ConfigError, Lines, UsageError, counted
 from livebode.excitation import Waveform
 from livebode.sources.live import named_channels
 from livebode.structured_text import SMALLEST, check_rate
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 from livebode_drives.structured_text.project import Project, check_signals
 
 _SAME_RATE = 1e-6

@@ -17,7 +17,9 @@ _CAN = {"rate_hz", "dbc", "channels", "counter", "bitrate", "can_fd"}
 
 
 def _kind(source: str, keys: set[str], **given: Any) -> SourceKind:
-    return SourceKind(f"livebode_drives.live.{source}", frozenset(keys), "livebode_drives.settings:DriveKeys", **given)
+    return SourceKind(
+        f"livebode_drives.live.{source}", frozenset(keys), "livebode_drives.source_settings:DriveKeys", **given
+    )
 
 
 SOURCES: Mapping[str, SourceKind] = {

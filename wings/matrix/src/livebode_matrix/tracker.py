@@ -146,7 +146,7 @@ class MatrixTracker(StatefulBase):
             self._spectra.restart(block.start)
             self._complete[:] = False
         rows = self._spectra.process(data)
-        self._watch.take(block, rows)
+        self._watch.count(block, rows)
         if len(self._aside):
             not_ready = contains(self._aside, rows.sample - s.settled_window + 1, rows.sample)
             rows = replace(rows, clean=rows.clean & ~not_ready)

@@ -2,9 +2,9 @@ from livebode_modes.curves import ModeCurve as ModeCurve
 from livebode_modes.estimate import Tracks as Tracks
 from livebode_modes.mode_tracker import ModeTracker as ModeTracker
 from livebode_modes.mode_tracker import WindowModes as WindowModes
+from livebode_modes.output_only_settings import OutputOnlySettings as OutputOnlySettings
+from livebode_modes.output_only_settings import reduced as reduced
+from livebode_modes.output_only_settings import window_of as window_of
 from livebode_modes.recording import proposed_band as proposed_band
 from livebode_modes.reduction import lost_samples as lost_samples
-from livebode_modes.settings import OutputOnlySettings as OutputOnlySettings
-from livebode_modes.settings import reduced as reduced
-from livebode_modes.settings import window_of as window_of
 from livebode_modes.stabilisation import Mode as Mode

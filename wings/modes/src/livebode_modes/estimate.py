@@ -18,7 +18,7 @@ from livebode.language import Message
 from livebode.records import PARAMETERS
 from livebode.runtime import Document, Estimate, FitResults, Outcome, versions
 from livebode_modes.mode_tracker import ModeTracker, WindowModes
-from livebode_modes.settings import OutputOnlySettings
+from livebode_modes.output_only_settings import OutputOnlySettings
 from livebode_modes.stabilisation import Mode
 
 Kind = Literal["mode", "harmonic"]
@@ -72,7 +72,7 @@ class _Track:
             return np.inf
         return float(abs(mode.frequency_hz - self.last.frequency_hz) / max(reach, _SIGMAS * sigma))
 
-    def take(self, row: _Row) -> None:
+    def add(self, row: _Row) -> None:
         self.waiting.append(row)
         if row.mode is None:
             self.missed += 1
@@ -127,7 +127,7 @@ class Tracks:
         self._tracks: list[_Track] = []
         self._numbers: dict[Kind, int] = {"mode": 0, "harmonic": 0}
 
-    def take(self, window: WindowModes) -> list[Parameters]:
+    def process(self, window: WindowModes) -> list[Parameters]:
         """The rows to publish after a window, a Parameters for each track."""
         self._windows += 1
         self._assign(window)
@@ -152,11 +152,11 @@ class Tracks:
             if distance <= 1 and i not in taken and j not in taken.values():
                 taken[i] = j
         for i, track in enumerate(self._tracks):
-            track.take(rows[taken[i]] if i in taken else _Row(window))
+            track.add(rows[taken[i]] if i in taken else _Row(window))
         for j, row in enumerate(rows):
             if j not in taken.values() and row.mode is not None:
                 self._tracks.append(_Track(row.mode))
-                self._tracks[-1].take(row)
+                self._tracks[-1].add(row)
 
     def _published(self, least: int) -> list[Parameters]:
         found = []
@@ -190,7 +190,7 @@ class ModeSummaries:
     def __init__(self) -> None:
         self._tracks: dict[str, dict[str, Any]] = {}
 
-    def take(self, rows: Parameters) -> None:
+    def add(self, rows: Parameters) -> None:
         """Rows of one track."""
         track = self._tracks.setdefault(rows.model, {"name": rows.model, "rows": 0, "found": 0})
         track["rows"] += len(rows)
@@ -314,13 +314,13 @@ class OutputOnly(Estimate):
     def documents(self, results: list[WindowModes]) -> Iterator[Document]:
         for window in results:
             self._windows[window.status] += 1
-            yield from self._rows(self._tracks.take(window))
+            yield from self._rows(self._tracks.process(window))
 
     def _rows(self, parts: list[Parameters]) -> Iterator[Document]:
         if parts:
             yield FitResults(tuple(parts))
             for part in parts:
-                self._summaries.take(part)
+                self._summaries.add(part)
 
     def judge(self) -> Iterable[Document]:
         if not self._windows:

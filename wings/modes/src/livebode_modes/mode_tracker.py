@@ -12,8 +12,8 @@ from livebode.arrays import Floats
 from livebode.core import Block, Emit, Event, ignore
 from livebode.language import Message
 from livebode_modes.correlations import hop_correlations
+from livebode_modes.output_only_settings import HOPS_MIN, OutputOnlySettings
 from livebode_modes.reduction import Reduction
-from livebode_modes.settings import HOPS_MIN, OutputOnlySettings
 from livebode_modes.stabilisation import Mode, stable_modes
 from livebode_modes.subspace import Subspace
 

@@ -11,8 +11,8 @@ from livebode.preparation import beginnings, chosen_part
 from livebode.runtime import Destination, ExaminedRecording, dated, of_log
 from livebode.sources import Log
 from livebode_modes.estimate import OutputOnly
+from livebode_modes.output_only_settings import OVERSAMPLING, OutputOnlySettings, reduced, window_of
 from livebode_modes.reduction import lost_samples
-from livebode_modes.settings import OVERSAMPLING, OutputOnlySettings, reduced, window_of
 
 with needing("SciPy", "analysis", "a run from the outputs alone"):
     import scipy  # its parts are loaded when they are first used

@@ -21,7 +21,7 @@ HIGHER_ORDERS, REPEATED_MIN = 5, 4
 DAMPING_MAX = 0.2
 """Poles with more damping are not listed: they describe the colour of excitation and noise."""
 SHARE_MIN = 0.005
-"""Of the outputs' power; weaker modes are not listed."""
+"""Share of the outputs' power; weaker modes are not listed."""
 UNCERTAINTY_MAX = 0.01
 """Sigma of a mode's frequency as a share of the frequency; poles that are less certain are not listed."""
 _SAME_FREQUENCY, _SAME_DAMPING = 0.01, 0.05  # relative, as usual in stabilisation diagrams (Peeters & De Roeck 2001)
@@ -78,7 +78,7 @@ def stable_modes(subspace: Subspace, band_hz: tuple[float, float]) -> tuple[int,
 
 
 def _separate(poles: Poles, stable: list[int]) -> list[int]:
-    """Of poles whose bounds do not separate them in frequency only the strongest: a model may split a mode in two."""
+    """The strongest of poles whose bounds do not separate them in frequency: a model may split a mode in two."""
     kept: list[int] = []
     for i in sorted(stable, key=lambda i: -poles.share[i]):
         apart = np.abs(poles.frequency_hz[kept] - poles.frequency_hz[i])

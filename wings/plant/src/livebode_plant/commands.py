@@ -73,4 +73,4 @@ COMMANDS: Mapping[str, Command] = {
     ),
 }
 
-FILES: Mapping[str, FileKind] = {"archive": FileKind("livebode_plant.archive.settings:archive_schema")}
+FILES: Mapping[str, FileKind] = {"archive": FileKind("livebode_plant.archive.archive_settings:archive_schema")}

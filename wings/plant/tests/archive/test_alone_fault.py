@@ -9,14 +9,14 @@ import psutil
 import pytest
 
 from livebode_plant.archive.alone import handle_alone
+from livebode_plant.archive.archive_settings import ArchiveSettings
 from livebode_plant.archive.job import Job
-from livebode_plant.archive.recordings import find_places, untracked
-from livebode_plant.archive.results import Failed, Tracked
-from livebode_plant.archive.settings import ArchiveSettings
+from livebode_plant.archive.recording_places import find_places, untracked
+from livebode_plant.archive.results import TrackedResult, TrackingFailure
 from tests.support.archives import contents_of, write_archive
 
 
-@pytest.mark.parametrize(("kills", "kind"), [(2, Tracked), (3, Failed)])
+@pytest.mark.parametrize(("kills", "kind"), [(2, TrackedResult), (3, TrackingFailure)])
 def test_a_process_that_is_killed_is_started_again_twice(tmp_path: Path, kills: int, kind: type) -> None:
     settings = ArchiveSettings.read(write_archive(tmp_path, 1))
     job = Job.of(settings.axes(), str(tmp_path / "lake"), 10**12)
@@ -27,7 +27,7 @@ def test_a_process_that_is_killed_is_started_again_twice(tmp_path: Path, kills: 
     (result,) = handle_alone(job, recording).results
     killer.join()
     assert type(result) is kind
-    if isinstance(result, Failed):
+    if isinstance(result, TrackingFailure):
         assert result.code == "archive.process-ended"
         assert "ended by SIGKILL" in result.sentence
 

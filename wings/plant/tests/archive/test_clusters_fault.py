@@ -13,10 +13,10 @@ import trustme
 from distributed import LocalCluster, Security
 
 from livebode import ArchiveError
-from livebode_plant.archive import clusters, distributing
-from livebode_plant.archive.grouping import RecordingGroups
-from livebode_plant.archive.recordings import ArchivedRecording, RecordingPlace
-from livebode_plant.archive.settings import ClusterSection
+from livebode_plant.archive import clusters, distribution
+from livebode_plant.archive.archive_settings import ClusterSection
+from livebode_plant.archive.groups import RecordingGroups
+from livebode_plant.archive.recording_places import ArchivedRecording, RecordingPlace
 from tests.support.certificates import certified
 
 
@@ -53,8 +53,8 @@ def test_who_has_a_certificate_is_served_and_who_has_another_is_not(
 @pytest.mark.parametrize(("lost", "code"), [("workers", "workers-lost"), ("scheduler", "cluster-lost")])
 def test_a_cluster_that_is_lost_ends_with_a_sentence(lost: str, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clusters, "_CONNECT_S", 1)
-    monkeypatch.setattr(distributing, "_NO_WORKER_S", 0.3 if lost == "workers" else 60)
-    monkeypatch.setattr(distributing, "_COUNT_AGAIN_S", 0.1)
+    monkeypatch.setattr(distribution, "_NO_WORKER_S", 0.3 if lost == "workers" else 60)
+    monkeypatch.setattr(distribution, "_COUNT_AGAIN_S", 0.1)
     items = [ArchivedRecording(RecordingPlace(Path(str(number)), 1, "")) for number in range(50)]
     with (
         LocalCluster(
@@ -63,7 +63,7 @@ def test_a_cluster_that_is_lost_ends_with_a_sentence(lost: str, code: str, monke
         ) as local,
         clusters.started(ClusterSection(address=local.scheduler_address)) as cluster,
     ):  # fmt: skip
-        done = distributing.Distribution[ArchivedRecording, int](
+        done = distribution.Distribution[ArchivedRecording, int](
             cluster, RecordingGroups(items), _zeros, lambda *_: 0, lambda _: False, lambda _: 0
         ).results()
         assert [result for _, result in next(done)] == [0]

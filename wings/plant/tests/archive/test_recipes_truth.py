@@ -12,8 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from livebode import ConfigError
+from livebode_plant.archive.archive_settings import ArchiveSettings
 from livebode_plant.archive.coordinator import ArchiveOutcome, Coordinator, Progress
-from livebode_plant.archive.settings import ArchiveSettings
 from livebode_plant.lake import Lake
 from livebode_plant.trending import Selection, history
 from tests.support import ringing

@@ -10,8 +10,8 @@ from hypothesis import settings as run_with
 from hypothesis import strategies as st
 
 from livebode import ConfigError
-from livebode_plant.archive.recordings import RecordingPlace, find_places, levels_of
-from livebode_plant.archive.settings import ArchiveSettings
+from livebode_plant.archive.archive_settings import ArchiveSettings
+from livebode_plant.archive.recording_places import RecordingPlace, find_places, levels_of
 from livebode_plant.archive.template import Template
 
 TLS = 'certificate = "a.pem"\nkey = "a.key"\nauthority = "ca.pem"\n'

@@ -8,8 +8,8 @@ import psutil
 import pytest
 import trustme
 
+from livebode_plant.archive.archive_settings import ArchiveSettings
 from livebode_plant.archive.coordinator import Coordinator, Progress
-from livebode_plant.archive.settings import ArchiveSettings
 from livebode_plant.lake import Lake
 from tests.support.archives import loop, stored, write_archive
 from tests.support.certificates import certified

@@ -12,8 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from livebode.sources.live import encode_line
+from livebode_plant.fleet.fleet_settings import FleetSettings
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import FleetSettings
 from tests.support.command import livebode
 from tests.support.fleet_runs import PARTITIONS, SAMPLES, batch, owned_until_current
 from tests.support.forked import Command

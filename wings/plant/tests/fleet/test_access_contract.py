@@ -17,11 +17,11 @@ from nats.js.errors import NoStreamResponseError, ServiceUnavailableError
 
 from livebode.core import ConfigError, FleetError
 from livebode_plant.fleet.credentials import write_credentials
+from livebode_plant.fleet.fleet_settings import FleetSettings, LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import message_id, write_message
 from livebode_plant.fleet.page_status import VIEW
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import FleetSettings, LogSection
 from livebode_plant.fleet.status import fleet_status
 from livebode_plant.fleet.subjects import ACTS, EDGE, LOG, LOG_STREAM, RESULTS, STATUS, STATUS_STREAM, axis_path
 from livebode_plant.page.fleet_alarms import FleetAct

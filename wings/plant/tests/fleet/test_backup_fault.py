@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from livebode.configuration import Axis
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.status import fleet_status
 from tests.support.fleet_runs import PARTITIONS, SAMPLES, checked, fleet_axes, log_section, owned_until_current, sent
 

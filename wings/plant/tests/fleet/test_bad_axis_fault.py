@@ -14,12 +14,12 @@ from livebode.core import FleetError
 from livebode.fitting import Fitter, problem, rows
 from livebode.runtime import Fits
 from livebode_plant.fleet.axis_stream import AxisStream, Output, outputs_together
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.replay import replayed
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.status import fleet_status
 from livebode_plant.fleet.subjects import RESULT_STREAM, RESULTS, axis_path
 from tests.support.fitted_fleet import fitted_axes, fitted_message, fitted_sent, healthy_baseline
@@ -70,7 +70,7 @@ def _streams() -> dict[int, AxisStream]:
 def _outputs(streams: dict[int, AxisStream]) -> list[Output]:
     for axis, stream in streams.items():
         for n in range(BATCHES):
-            stream.take(fitted_message(axis, n), n + 1, 1e9 + 0.1 * n)
+            stream.add(fitted_message(axis, n), n + 1, 1e9 + 0.1 * n)
     return outputs_together([*streams.values()])
 
 

@@ -17,8 +17,8 @@ import pytest
 from livebode.configuration import Axis
 from livebode_plant.fleet import worker_process
 from livebode_plant.fleet.coordinator import FleetCoordinator
+from livebode_plant.fleet.fleet_settings import FleetSettings, LogSection
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import FleetSettings, LogSection
 from tests.support.fleet_runs import PARTITIONS, checked, fleet_axes, log_section, sent
 from tests.support.forked import server
 from tests.support.peers.peer import PATIENCE_S

@@ -22,11 +22,11 @@ from livebode.sources.live import Batch, SpectraBatch
 from livebode_plant.fleet import edge as edge_module
 from livebode_plant.fleet.edge import Edge, SoleSender, send_edges
 from livebode_plant.fleet.edge_buffer import EdgeBuffer
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message, write_message
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.subjects import LOG, LOG_STREAM
 from tests.support.fleet_runs import CHANNELS, PARTITIONS, RATE_HZ, batch, fleet_axes, log_section
 
@@ -195,10 +195,10 @@ def test_an_edge_outlasts_the_log_and_stores_each_message_once(tmp_path: Path) -
             await log.create_streams()
             sending = asyncio.create_task(edge.send(log, taking))
             for first in range(0, 500, 50):
-                edge.take(batch(0, first))
+                edge.add(batch(0, first))
             await asyncio.to_thread(server.kill)
             for first in range(500, 1000, 50):
-                edge.take(batch(0, first))
+                edge.add(batch(0, first))
             await asyncio.to_thread(server.start)
             taking.set_result(None)
             await sending
@@ -221,7 +221,7 @@ def test_an_edge_that_starts_while_the_log_is_away_buffers(tmp_path: Path, caplo
         edge, taking, stop = Edge(key, buffer), Future[None](), threading.Event()
         sending = asyncio.create_task(send_edges(log_section(server.url), [(edge, taking)], stop))
         for first in firsts:
-            edge.take(batch(0, first))
+            edge.add(batch(0, first))
             await asyncio.sleep(0)
         if last:
             await asyncio.to_thread(server.start)
@@ -261,7 +261,7 @@ def test_a_full_disk_does_not_matter_while_the_log_is_there_and_holds_up_the_sou
 
     def take(first: int, last: int) -> None:
         for number in range(first, last, 50):
-            edge.take(batch(0, number))
+            edge.add(batch(0, number))
             taken.append(number)
 
     async def stored(count: int) -> None:
@@ -312,7 +312,7 @@ def test_a_second_sender_of_an_axis_waits_for_the_end_of_the_first_and_both_are_
                     asyncio.create_task(send_edges(settings, [(edges[number // 10], taking[number // 10])], stop))
                 )
             for epoch, edge in enumerate(edges[: len(sending)], 1):
-                edge.take(batch(0, 50 * number, epoch))
+                edge.add(batch(0, 50 * number, epoch))
             await asyncio.sleep(0.05)
         assert edges[1].sent == 0
         taking[0].set_result(None)

@@ -12,12 +12,12 @@ import pytest
 
 from livebode.configuration import Axis
 from livebode.core import FleetError
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.replay import ReplayedAxis, replayed, write_replayed
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.subjects import RESULT_STREAM, RESULTS, STATE_STREAM
 from tests.support.fitted_fleet import fitted_axes, fitted_sent, healthy_baseline
 from tests.support.fleet_runs import PARTITIONS, checked, log_section, owned_until_current

@@ -63,7 +63,7 @@ def test_batch_cut_and_takeover_change_no_bit(axes: dict[str, Axis], alone: list
         chosen = order[:some]
         for i in chosen:
             for number in range(taken[i], min(taken[i] + count, BATCHES)):
-                streams[i].take(MESSAGES[i][number], number + 1, 1e9 + 0.1 * (number + 1))
+                streams[i].add(MESSAGES[i][number], number + 1, 1e9 + 0.1 * (number + 1))
             taken[i] = min(taken[i] + count, BATCHES)
         for i, output in zip(chosen, outputs_together([streams[i] for i in chosen])):
             outputs[i].append(output)
@@ -108,7 +108,7 @@ def test_the_page_shows_value_bound_and_change_and_a_takeover_raises_no_alarm_ag
     streams = {key: AxisStream(axis, 1) for key, axis in axes.items()}
     for n in range(BATCHES):
         for stream, messages in zip(streams.values(), MESSAGES):
-            stream.take(messages[n], n + 1, 1e9 + 0.1 * n)
+            stream.add(messages[n], n + 1, 1e9 + 0.1 * n)
         outputs_together([*streams.values()])
     names, status = _page(streams)
     assert {(one.parameter, one.unit) for one in names.axes} == {("Js", "kg m²")}

@@ -13,14 +13,14 @@ import pytest
 from nats.errors import Error
 
 from livebode.core import FleetError
-from livebode_plant.fleet.connecting import security
+from livebode_plant.fleet.connection import security
 from livebode_plant.fleet.edge import Edge, send_edges
 from livebode_plant.fleet.edge_buffer import EdgeBuffer
 from livebode_plant.fleet.encrypted_client import EncryptedClient
+from livebode_plant.fleet.fleet_settings import FleetSettings, LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import NatsServer, free_port
 from livebode_plant.fleet.server_config import leaf_configuration
-from livebode_plant.fleet.settings import FleetSettings, LogSection
 from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM
 from tests.support.command import livebode
 from tests.support.fleet_runs import batch, checked, owned_until_current
@@ -60,12 +60,12 @@ def test_an_edge_behind_a_leaf_node_is_tracked_and_a_cut_of_the_link_loses_nothi
     async def outage(settings: LogSection) -> None:
         sending = asyncio.create_task(send_edges(settings, [(edge, taking)], threading.Event()))
         for first in range(0, 1000, 50):
-            edge.take(batch(0, first))
+            edge.add(batch(0, first))
         while edge.sent < 5:
             await asyncio.sleep(0.02)
         await asyncio.to_thread(fleet.server.kill)
         for first in range(1000, 2000, 50):
-            edge.take(batch(0, first))
+            edge.add(batch(0, first))
         await asyncio.to_thread(fleet.server.start)
         taking.set_result(None)
         await sending

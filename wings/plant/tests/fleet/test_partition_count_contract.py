@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from livebode.core import FleetError
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from tests.support.command import livebode
 from tests.support.fleet_runs import PARTITIONS, fleet_axes, log_section, sent
 

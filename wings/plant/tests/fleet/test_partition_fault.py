@@ -11,12 +11,12 @@ import pytest
 
 from livebode.configuration import Axis
 from livebode.core import FleetError
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import write_message
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.status import fleet_status
 from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS, STATE_STREAM, axis_path
 from tests.support.fleet_runs import (

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from livebode.configuration import MachineSection
 from livebode.core import ConfigError, FleetError
 from livebode_plant.fleet.demo import write_simulated_fleet
-from livebode_plant.fleet.settings import FleetSettings
+from livebode_plant.fleet.fleet_settings import FleetSettings
 from livebode_plant.fleet.subjects import axis_key, axis_path
 
 NAMES = st.text(st.characters(exclude_categories=["C", "Z"], exclude_characters="/"), max_size=20)

@@ -19,11 +19,11 @@ import pytest
 
 from livebode.core import LEVELS
 from livebode_plant.fleet import sink_tables
+from livebode_plant.fleet.fleet_settings import LogSection, SinkSection
 from livebode_plant.fleet.log import FleetLog, StoredMessage
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection, SinkSection
 from livebode_plant.fleet.sink import Sink
 from livebode_plant.fleet.sink_tables import SinkTables
 from livebode_plant.fleet.status import fleet_status

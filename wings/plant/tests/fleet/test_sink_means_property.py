@@ -16,7 +16,7 @@ from livebode.core import Responses
 from livebode.fitting import mean_response
 from livebode.records import response_table
 from livebode_plant.fleet.sink_rows import RunKey, RunPart, SinkRows
-from livebode_plant.fleet.sink_tables import Closed, MeanTier
+from livebode_plant.fleet.sink_tables import ClosedPeriods, MeanTier
 from livebode_plant.lake.wide_responses import from_wide, to_wide
 
 EVERY_S, PERIOD_S = 14.0, 60
@@ -55,15 +55,15 @@ def message(number: int, lags_s: tuple[float, ...] = (0.3, 0.8)) -> SinkRows:
     )
 
 
-def means(messages: Sequence[SinkRows], kills: Sequence[int] = ()) -> list[Closed]:
+def means(messages: Sequence[SinkRows], kills: Sequence[int] = ()) -> list[ClosedPeriods]:
     """What a sink commits that is killed after these messages, and reads again from where its lake says."""
-    found: list[Closed] = []
+    found: list[ClosedPeriods] = []
     at, kills = 0, sorted(kills)
     while True:
         tier = MeanTier("minute", PERIOD_S, found[-1].through if found else 0)
         first = found[-1].first if found else messages[0].number
         stop = next((kill for kill in kills if kill > at), len(messages))
-        taken = (tier.take(one, "log") for one in messages[first - messages[0].number : stop])
+        taken = (tier.process(one, "log") for one in messages[first - messages[0].number : stop])
         found += [closed for closed in taken if closed is not None]
         if stop == len(messages):
             return found

@@ -16,11 +16,11 @@ from livebode.configuration import Axis
 from livebode.core import PER_LINE, PER_RESPONSE, Channel, Responses, SpectraLayout
 from livebode.sources.live import SpectraBatch
 from livebode_plant.fleet.axis_stream import AxisStream, Output, outputs_together, stacked_together
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import message_id, write_message
 from livebode_plant.fleet.result_message import PendingResults
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.subjects import EDGE
 from tests.support.fleet_runs import (
     CHANNELS,
@@ -142,7 +142,7 @@ def test_no_bit_of_an_axis_depends_on_the_others_on_the_cut_or_on_a_takeover(
         chosen = order[:some]
         for i in chosen:
             for number in range(taken[i], min(taken[i] + count, len(messages[i]))):
-                streams[i].take(messages[i][number], number + 1, 1e9 + 0.05 * (number + 1))
+                streams[i].add(messages[i][number], number + 1, 1e9 + 0.05 * (number + 1))
             taken[i] = min(taken[i] + count, len(messages[i]))
         for i, output in zip(chosen, outputs_together([streams[i] for i in chosen])):
             outputs[i].append(output)
@@ -168,7 +168,7 @@ def _streams(numbers: list[int], kind: type[AxisStream] = AxisStream) -> list[Ax
 
 def _next(numbers: list[int], streams: list[AxisStream], n: int = 12, kinds: dict[int, str] | None = None) -> None:
     for number, stream in zip(numbers, streams):
-        stream.take(_message(number, n, (kinds or {}).get(number, "whole")), n + 1, 1e9 + 0.05 * n)
+        stream.add(_message(number, n, (kinds or {}).get(number, "whole")), n + 1, 1e9 + 0.05 * n)
 
 
 def test_axes_that_are_alike_are_one_stack_and_their_rows_are_stored_as_those_of_one_axis() -> None:

@@ -52,7 +52,7 @@ def _tracked(axis: Axis, messages: list[bytes], cuts: set[int], restored: set[in
     """Responses, events and state; outputs are taken at the cuts, and at some the stream continues from a state."""
     stream, parts, events = AxisStream(axis, 1), [], []
     for number, message in enumerate(messages, 1):
-        stream.take(message, number, 1e9 + 0.05 * number)
+        stream.add(message, number, 1e9 + 0.05 * number)
         if number in cuts or number == len(messages):
             output = stream.output()
             parts += [] if output.responses is None else [output.responses]

@@ -11,11 +11,11 @@ import pyarrow as pa
 import pytest
 
 from livebode.locations import Url, find, write_whole
+from livebode_plant.archive.archive_settings import ArchiveSettings
 from livebode_plant.archive.coordinator import Committer
 from livebode_plant.archive.job import Job
-from livebode_plant.archive.recordings import find_places, untracked
-from livebode_plant.archive.results import Hashed, Tracked, each_result
-from livebode_plant.archive.settings import ArchiveSettings
+from livebode_plant.archive.recording_places import find_places, untracked
+from livebode_plant.archive.results import HashedContent, TrackedResult, each_result
 from livebode_plant.archive.tasks import handle
 from livebode_plant.lake import DataFile, Lake
 from livebode_plant.lake.table_directory import delta_options
@@ -45,11 +45,11 @@ def test_two_coordinators_lose_nothing_and_double_nothing(tmp_path: Path) -> Non
 
     def coordinator(order: int) -> list[DataFile]:
         lake = Lake(LAKE)
-        for result in [*(Hashed(*one) for one in contents), *results[::order]]:
+        for result in [*(HashedContent(*one) for one in contents), *results[::order]]:
             committer = Committer(lake, job)
-            committer.take([result])
+            committer.add([result])
             committer.commit()
-        return [file for result in results if isinstance(result, Tracked) for file in result.files]
+        return [file for result in results if isinstance(result, TrackedResult) for file in result.files]
 
     with ThreadPoolExecutor() as pool:
         written, _ = pool.map(coordinator, (1, -1))

@@ -14,7 +14,7 @@ import pytest
 
 from livebode.core import ArchiveError, DamageWarning
 from livebode.locations import Url, opened, write_whole
-from livebode_plant.fleet.settings import SinkSection
+from livebode_plant.fleet.fleet_settings import SinkSection
 from livebode_plant.fleet.sink_tables import SinkTables
 from livebode_plant.lake import TABLES, Key, Lake, compact
 from tests.support.archives import coordinator, write_archive

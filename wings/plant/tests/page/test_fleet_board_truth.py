@@ -35,7 +35,7 @@ def sent(board: FleetBoard, status: np.ndarray, now_s: float, partition: int = 0
     """One partition with an axis for each row reports."""
     axes = tuple(AxisName(f"hall/m{i}/x", "stiffness", "N/m") for i in range(len(status)))
     names, table = encode_names(PartitionNames(partition, worker, axes, ("", "change", "gap")), now_s)
-    board.take([names, encode_status(partition, table, status, now_s)], now_s)
+    board.process([names, encode_status(partition, table, status, now_s)], now_s)
     board.refresh(now_s)
 
 
@@ -54,7 +54,7 @@ def look(board: FleetBoard, axis: int = 1) -> str:
 
 def ask(board: FleetBoard, act: str, raised: int = 1, now_s: float = NOW, **words: object) -> None:
     asked = AlarmRequest(1, f"{board.layout}:{raised}", **words)  # type: ignore[arg-type]
-    board.take_act(board.act(act, asked, now_s).to_bytes())  # type: ignore[arg-type]
+    board.process_act(board.act(act, asked, now_s).to_bytes())  # type: ignore[arg-type]
     board.refresh(now_s)
 
 
@@ -65,9 +65,9 @@ def test_a_simulated_fleet_looks_as_it_is() -> None:
     tables = {names.partition: encode_names(names, NOW) for names in fleet.names()}
     messages = [message for message, _ in tables.values()]
     random.Random(1).shuffle(messages)
-    board.take(messages, began_s)
+    board.process(messages, began_s)
     found = feed.messages({number: table for number, (_, table) in tables.items()}, began_s + 125)
-    board.take(found[::-1], began_s + 125)
+    board.process(found[::-1], began_s + 125)
     board.refresh(began_s + 125)
     status = fleet.status(125, began_s + 125)
     truth = dict(zip(fleet.paths, expected_looks(status)))
@@ -127,7 +127,7 @@ def test_an_act_that_the_page_did_not_show_is_refused() -> None:
 
 def test_acts_from_before_the_names_are_applied() -> None:
     board = FleetBoard()
-    board.take_act(FleetAct("acknowledge", "hall/m1/x", 1, 100, "Ann", "", 0.0, NOW).to_bytes())
+    board.process_act(FleetAct("acknowledge", "hall/m1/x", 1, 100, "Ann", "", 0.0, NOW).to_bytes())
     sent(board, one_alarm(), NOW)
     assert look(board) == "acknowledged"
 
@@ -141,11 +141,11 @@ def test_acts_of_strangers_are_counted_and_change_nothing(change: dict[str, obje
     board = FleetBoard()
     sent(board, one_alarm(), NOW)
     good = json.loads(FleetAct("shelve", "hall/m1/x", 1, 100, "Ann", "why", NOW + 60, NOW).to_bytes())
-    board.take_act(json.dumps(good | change).encode())
-    board.take_act(b"[" * 3000)
+    board.process_act(json.dumps(good | change).encode())
+    board.process_act(b"[" * 3000)
     board.refresh(NOW)
     assert (board.axes.dropped, look(board)) == (2, "alarm")
-    board.take_act(json.dumps(good).encode())
+    board.process_act(json.dumps(good).encode())
     board.refresh(NOW)
     assert look(board) == "shelved"
 
@@ -195,9 +195,9 @@ def test_a_stranger_harms_nobody_else() -> None:
     twice = status[:2].copy()
     twice["axis"] = 1
     messages = [good, bad, encode_status(1, bad_table, wrong, NOW), encode_status(0, table, status, NOW)]
-    board.take(messages, NOW)
-    board.take([encode_status(1, bad_table, twice, NOW), encode_status(1, bad_table, status, NOW), b"x" * 99], NOW)
-    board.take([encode_status(1, bad_table, twice, NOW)], NOW)
+    board.process(messages, NOW)
+    board.process([encode_status(1, bad_table, twice, NOW), encode_status(1, bad_table, status, NOW), b"x" * 99], NOW)
+    board.process([encode_status(1, bad_table, twice, NOW)], NOW)
     board.refresh(NOW)
     truth = {"bad/x": "lost", "bad/y": "lost", "hall/m0/x": "ok", "hall/m1/x": "alarm", "hall/m2/x": "ok"}
     assert {path: LOOKS[n] for path, n in zip(board.paths, board.looks)} == truth

@@ -17,9 +17,9 @@ import pytest
 from livebode.configuration import Axis
 from livebode.core import FleetError
 from livebode.dashboard import AlarmRequest
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.status_message import (
     ACTIVE,
     AXIS_STATUS,

@@ -64,7 +64,7 @@ class Page:
 
     def __init__(self, lake: str) -> None:
         view = FleetView(DemoFeed(FLEET), lake=lake)
-        view.board.take([encode_names(names, time.time())[0] for names in FLEET.names()], time.time())
+        view.board.process([encode_names(names, time.time())[0] for names in FLEET.names()], time.time())
         self.dashboard = Dashboard(Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER))
         self.dashboard.show(FleetSite(view))
 

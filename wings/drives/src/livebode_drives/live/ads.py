@@ -12,9 +12,9 @@ import numpy as np
 
 from livebode.core import ConfigError, LivebodeError, SourceError, not_installed
 from livebode.sources.live import Address, LiveSource, named_channels
-from livebode_drives.live.numbered import Numbered
 from livebode_drives.live.ring import FILETIME_1970, HEADER, Ring, new_rows, read_ring, ring_batch
-from livebode_drives.settings import DriveKeys
+from livebode_drives.live.stamp_numbers import StampNumbers
+from livebode_drives.source_settings import DriveKeys
 
 TIMEOUT_MS = 2000
 SYMBOL_BYTES_MAX = 16 << 20
@@ -152,7 +152,7 @@ class AdsSource(LiveSource):
             at = ctypes.addressof(header) + pyads.structs.SAdsNotificationHeader.data.offset
             came.append((header.nTimeStamp, ctypes.string_at(at, min(header.cbSampleSize, size))))
 
-        numbered = Numbered(self._channels, settings.rate_hz)
+        numbered = StampNumbers(self._channels, settings.rate_hz)
         attributes = pyads.NotificationAttrib(
             size, pyads.ADSTRANS_SERVERCYCLE, max_delay=1e3 * settings.poll_s, cycle_time=1e3 / settings.rate_hz
         )
@@ -172,7 +172,7 @@ class AdsSource(LiveSource):
             if handles is not None:
                 self._unsubscribe(plc, handles)
 
-    def _take_values(self, numbered: Numbered, values: list[tuple[int, bytes]]) -> None:
+    def _take_values(self, numbered: StampNumbers, values: list[tuple[int, bytes]]) -> None:
         samples = []
         for stamp, row in values:
             try:

@@ -32,7 +32,7 @@ class ArrivalRate:
         self._newest = -1
         self._least: tuple[float, float] = (0.0, 0.0)
 
-    def take(self, number: int, time_s: float) -> None:
+    def add(self, number: int, time_s: float) -> None:
         """Sample `number` arrived at `time_s`."""
         if number < self._newest:
             self.restart()

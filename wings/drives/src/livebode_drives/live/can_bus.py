@@ -12,9 +12,9 @@ from livebode.core import ConfigError, SourceError, not_installed
 from livebode.sources.live import TICK_S, Address, LiveSource, Position, Reach
 from livebode_drives.live.arrival_rate import ArrivalRate
 from livebode_drives.live.can_samples import CanSamples, Identity, signals_of
-from livebode_drives.live.counter import Counted, batches_of
+from livebode_drives.live.counter import NumberedSample, batches_of
 from livebode_drives.recordings.dbc import messages_of
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 
 TOGETHER_S = 0.01
 """Time between reads: what arrives together costs less."""
@@ -116,14 +116,14 @@ class CanSource(LiveSource):
         return frames
 
     def _take_frames(self, frames: list[Any]) -> None:
-        found: list[Counted] = []
+        found: list[NumberedSample] = []
         try:
             for frame in frames:
                 found += self._samples_with(frame)
         finally:  # also what came before the controller left the bus
             self._pass_on(found)
 
-    def _samples_with(self, frame: Any) -> list[Counted]:
+    def _samples_with(self, frame: Any) -> list[NumberedSample]:
         """The samples that are certain with this frame."""
         identity = (frame.arbitration_id, frame.is_extended_id)
         if frame.is_error_frame:
@@ -132,18 +132,18 @@ class CanSource(LiveSource):
             self._take_foreign(identity)
         else:
             try:
-                return self._samples.take(identity, bytes(frame.data), frame.timestamp)
+                return self._samples.process(identity, bytes(frame.data), frame.timestamp)
             except SourceError as error:
                 self._malformed(error)
         return []
 
-    def _pass_on(self, found: list[Counted]) -> None:
+    def _pass_on(self, found: list[NumberedSample]) -> None:
         for problem in self._samples.problems:
             self._malformed(problem)
         self._samples.problems.clear()
         if found:
             self._count += len(found)
-            self._rate.take(self._count, time.monotonic())
+            self._rate.add(self._count, time.monotonic())
             self._foreign.clear()
         for batch in batches_of(found, self._samples.channels, self._rate_given, time.monotonic()):
             self._deliver(batch)

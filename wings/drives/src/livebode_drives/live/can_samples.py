@@ -13,7 +13,7 @@ import numpy as np
 
 from livebode.core import Channel, ConfigError, SourceError, nearest_name
 from livebode.sources import split_unit
-from livebode_drives.live.counter import Counted, Counter
+from livebode_drives.live.counter import Counter, NumberedSample
 
 TOLERANCE = 0.4
 """A frame that is further from its due time than this, in periods, has no certain number."""
@@ -35,7 +35,7 @@ class FrameClock:
         self._period_s = 1 / rate_hz
         self._due_s: float | None = None
         self.number = 0
-        """Of the newest frame."""
+        """Number of the newest frame."""
 
     @property
     def paused_s(self) -> float:
@@ -47,7 +47,7 @@ class FrameClock:
         """Time at which the newest frame was due, by all before it."""
         return self._due_s
 
-    def take(self, time_s: float) -> bool:
+    def add(self, time_s: float) -> bool:
         """Whether a frame at this time has a certain number, which is then `number`."""
         if self._due_s is None:
             self._due_s = time_s
@@ -179,7 +179,7 @@ class CanSamples:
         self._offsets: dict[Identity, int] | None = None
         self._waiting: dict[int, dict[int, float]] = {}
 
-    def take(self, identity: Identity, data: bytes, time_s: float) -> list[Counted]:
+    def process(self, identity: Identity, data: bytes, time_s: float) -> list[NumberedSample]:
         """The samples that are certain with this frame, which was received at `time_s`.
 
         Raises
@@ -190,7 +190,7 @@ class CanSamples:
         values = self._decoded(identity, data)
         if self._counter is not None and self._counted is not None:
             row = np.array([values[signal.name] for signal in self.signals], dtype=np.float64)
-            found = self._counter.take(int(values[self._counted.name]), time_s, row)
+            found = self._counter.process(int(values[self._counted.name]), time_s, row)
             if self._counter.damaged:
                 self.problems.append(f"{self._counter.damaged} frames had a counter that no other frame confirmed")
                 self._counter.damaged = 0
@@ -215,13 +215,13 @@ class CanSamples:
                 "check that the DBC belongs to the device",
             ) from None
 
-    def _timed(self, identity: Identity, values: dict[str, float], time_s: float) -> list[Counted]:
+    def _timed(self, identity: Identity, values: dict[str, float], time_s: float) -> list[NumberedSample]:
         clock = self._clocks[identity]
         if clock.newest_s is not None and time_s - clock.newest_s > clock.paused_s:
             self.problems.append(f"no {self._messages[identity].name} for {time_s - clock.newest_s:.3g} s")
             self.restart()
             clock = self._clocks[identity]
-        if not clock.take(time_s):
+        if not clock.add(time_s):
             self._doubt(identity)
             return []
         self._uncertain = 0
@@ -255,7 +255,7 @@ class CanSamples:
             apart = round((clock.newest_s - first.newest_s) * self._rate_hz)
             self._offsets[identity] = apart - (clock.number - first.number)
 
-    def _complete(self, number: int, sample: dict[int, float]) -> list[Counted]:
+    def _complete(self, number: int, sample: dict[int, float]) -> list[NumberedSample]:
         if len(sample) < len(self.signals):
             while len(self._waiting) > INCOMPLETE_MAX:
                 del self._waiting[min(self._waiting)]
@@ -263,7 +263,7 @@ class CanSamples:
         # Frames of a bus are in order, so what is incomplete and older is lost.
         self._waiting = {later: values for later, values in self._waiting.items() if later > number}
         row = np.array([sample[place] for place in range(len(self.signals))], dtype=np.float64)
-        return [Counted(self._epoch, number, row)]
+        return [NumberedSample(self._epoch, number, row)]
 
 
 def counted_signal(signals: list[Signal], counter: str, messages: Mapping[Identity, Any]) -> Signal:

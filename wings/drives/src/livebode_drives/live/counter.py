@@ -15,7 +15,7 @@ FAR_S = 1.0
 """A counter that differs by more than this from the time since its last value was set to another value."""
 
 
-class Counted(NamedTuple):
+class NumberedSample(NamedTuple):
     """A sample with its number; `epoch` changes where the sender restarted."""
 
     epoch: int
@@ -49,7 +49,7 @@ class Counter:
         self.damaged = 0
         """Samples that were dropped because no other one confirmed their counter."""
 
-    def take(self, count: int, time_s: float, row: NDArray[np.float64]) -> list[Counted]:
+    def process(self, count: int, time_s: float, row: NDArray[np.float64]) -> list[NumberedSample]:
         """The samples that are certain with this one: its counter, its time on any clock, and its values."""
         doubtful, self._doubtful = self._doubtful, None
         found = []
@@ -74,7 +74,7 @@ class Counter:
     def _ahead(self, before: int, after: int) -> int:
         return after - before if self._modulus is None else (after - before) % self._modulus
 
-    def _accepted(self, count: int, time_s: float, row: NDArray[np.float64]) -> Counted:
+    def _accepted(self, count: int, time_s: float, row: NDArray[np.float64]) -> NumberedSample:
         number = count
         if self._last is not None:
             last, last_number, last_s = self._last
@@ -88,10 +88,12 @@ class Counter:
             self._epoch += restarted
             number = count if restarted else last_number + steps
         self._last = count, number, time_s
-        return Counted(self._epoch, number, row)
+        return NumberedSample(self._epoch, number, row)
 
 
-def batches_of(samples: list[Counted], channels: tuple[Channel, ...], rate_hz: float, arrived_s: float) -> list[Batch]:
+def batches_of(
+    samples: list[NumberedSample], channels: tuple[Channel, ...], rate_hz: float, arrived_s: float
+) -> list[Batch]:
     """Batches of these samples; a batch ends where the next number is not the following one."""
     cuts = [i for i, (a, b) in enumerate(pairwise(samples), 1) if (b.epoch, b.number) != (a.epoch, a.number + 1)]
     return [

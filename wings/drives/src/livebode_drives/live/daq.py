@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from livebode.core import Channel, SourceError, nearest_name, not_installed
 from livebode.sources import split_unit
 from livebode.sources.live import CHANNELS_MAX, VALUES_MAX, Address, Batch, LiveSource, Reach
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 
 BEHIND_MAX = 1 << 18
 """Samples that wait for those of another signal."""
@@ -113,7 +113,7 @@ class TogetherByNumber:
         self._numbers[signal] = self._numbers[signal][-BEHIND_MAX:]
         self._values[signal] = self._values[signal][-BEHIND_MAX:]
 
-    def take(self) -> list[tuple[int, NDArray[np.float64]]]:
+    def pop(self) -> list[tuple[int, NDArray[np.float64]]]:
         """Runs of samples that all signals have: the number of the first, and the values (signals, samples)."""
         common = reduce(np.intersect1d, self._numbers)
         if not common.size:
@@ -184,7 +184,7 @@ class DaqSource(LiveSource):
                     together.add(place, self._numbers(ticks, clock), np.asarray(values, dtype=np.float64))
                 elif clock_of(signals[place]) != clock:
                     raise ConnectionError("the device changed its sampling rate")
-            if runs := together.take():
+            if runs := together.pop():
                 heard = time.monotonic()
             elif time.monotonic() - heard > SILENCE_S:
                 raise ConnectionError(f"the device sent nothing for {SILENCE_S:g} s")

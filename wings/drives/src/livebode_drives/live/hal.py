@@ -27,7 +27,7 @@ from livebode_drives.live.hal_wiring import (
     program,
     signals_at,
 )
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 
 ALIVE_S = 1.0
 """Silence after which it is checked whether the real-time part still runs."""

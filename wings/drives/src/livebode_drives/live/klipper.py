@@ -28,7 +28,7 @@ from livebode.sources.live import (
     pieces,
 )
 from livebode_drives.live.on_grid import OnGrid
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 
 MOVES_MAX = 1 << 16
 """Moves that wait for the samples of their time."""
@@ -263,7 +263,7 @@ class KlipperSource(LiveSource):
         if not len(rows):
             return
         self._newest_s = float(rows[-1, 0])
-        self._waiting += self._grid.take(rows[:, 0], rows[:, 1:].T)
+        self._waiting += self._grid.process(rows[:, 0], rows[:, 1:].T)
         self._check_rate()
         self._pass_on()
 

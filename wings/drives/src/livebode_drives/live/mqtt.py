@@ -32,7 +32,7 @@ from livebode.sources.live import (
     password,
     read_header,
 )
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 
 RECEIVE_MAX = 4096
 """Messages that a broker may send without an acknowledgement: several times those of the interval of commits."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Channel, SourceError
 from livebode.sources.live import Batch
-from livebode_drives.live.counter import Counted, Counter, batches_of
+from livebode_drives.live.counter import Counter, NumberedSample, batches_of
 
 _BETWEEN = re.compile(rb"[,;\s]+")
 _SHOWN = 40
@@ -88,7 +88,7 @@ class NumberLines:
 
     def batches(self, lines: list[bytes], time_s: float) -> list[Batch]:
         """Batches of the samples in these lines, which arrived at `time_s`."""
-        samples: list[Counted] = []
+        samples: list[NumberedSample] = []
         for line in lines:
             try:
                 samples += self._sample(line, time_s)
@@ -101,12 +101,12 @@ class NumberLines:
             self._epoch = samples[-1].epoch
         return batches_of(samples, self._channels, self._rate_hz, time_s)
 
-    def _sample(self, line: bytes, time_s: float) -> list[Counted]:
+    def _sample(self, line: bytes, time_s: float) -> list[NumberedSample]:
         self._next += 1
         row = numbers_in(line, len(self._channels))
         if self._column is None:
-            return [Counted(self._epoch, self._next - 1, row)]
+            return [NumberedSample(self._epoch, self._next - 1, row)]
         count = row[self._column]
         if not (math.isfinite(count) and count == math.floor(count) and 0 <= count < 1 << 53):
             raise line_not_numbers(line, f"has the counter {count:g}, which is not a whole number")
-        return self._counter.take(int(count), time_s, row)
+        return self._counter.process(int(count), time_s, row)

@@ -44,7 +44,7 @@ class OnGrid:
         """Begin again after a gap."""
         self._time, self._data = self._time[:0], self._data[:, :0]
 
-    def take(self, time_s: Floats, data: Floats) -> list[tuple[int, Floats]]:
+    def process(self, time_s: Floats, data: Floats) -> list[tuple[int, Floats]]:
         """Runs of consecutive numbers, each with the first one and the values (channels, numbers).
 
         Parameters

@@ -23,8 +23,8 @@ from livebode.sources.live import (
     named_channels,
     password,
 )
-from livebode_drives.live.numbered import Numbered
-from livebode_drives.settings import DriveKeys
+from livebode_drives.live.stamp_numbers import StampNumbers
+from livebode_drives.source_settings import DriveKeys
 
 REQUEST_S = 5.0
 PUBLISH_MS = 50
@@ -37,7 +37,7 @@ _REFUSALS = (
 )  # fmt: skip
 
 
-class Gathered:
+class StampCollector:
     """Combines the values of one time stamp: one array for each channel, and the number of its first sample.
 
     At most 64 time stamps wait for missing parts; older ones are dropped and become gaps.
@@ -48,10 +48,10 @@ class Gathered:
         self._channels = named_channels(list(nodes))
         self._rate_hz, self._sample_node = rate_hz, sample_node
         self._required = {*self._keys, *([sample_node] if sample_node else [])}
-        self._numbered = Numbered(self._channels, rate_hz)
+        self._numbered = StampNumbers(self._channels, rate_hz)
         self._moments: OrderedDict[datetime, dict[str, Any]] = OrderedDict()
 
-    def take(self, key: str, value: Any, stamp: datetime | None) -> Batch | None:
+    def add(self, key: str, value: Any, stamp: datetime | None) -> Batch | None:
         """Add a new value of node `key`; returns the batch that it completes. SourceError if the values are invalid."""
         if stamp is None:
             raise SourceError(
@@ -199,7 +199,7 @@ class OpcUaSource(LiveSource):
         if self._files is not None:
             await self._secure(client, *self._files)
         assert settings.rate_hz is not None
-        gathered = Gathered(settings.nodes, settings.rate_hz, settings.sample_node)
+        gathered = StampCollector(settings.nodes, settings.rate_hz, settings.sample_node)
         required = [*settings.nodes.values(), *([settings.sample_node] if settings.sample_node else [])]
         async with client:
             by_node = {client.get_node(text): text for text in required}
@@ -250,13 +250,13 @@ class OpcUaSource(LiveSource):
 class Handler:
     """Receives data changes from asyncua."""
 
-    def __init__(self, source: OpcUaSource, gathered: Gathered, by_node: dict[Any, str]) -> None:
+    def __init__(self, source: OpcUaSource, gathered: StampCollector, by_node: dict[Any, str]) -> None:
         self._source, self._gathered, self._by_node = source, gathered, by_node
 
     def datachange_notification(self, node: Any, value: Any, data: Any) -> None:
         """A node has a new value."""
         try:
-            batch = self._gathered.take(self._by_node[node], value, data.monitored_item.Value.SourceTimestamp)
+            batch = self._gathered.add(self._by_node[node], value, data.monitored_item.Value.SourceTimestamp)
             if batch is not None:
                 self._source._deliver(batch)
         except LivebodeError as error:

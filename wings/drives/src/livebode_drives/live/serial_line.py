@@ -26,7 +26,7 @@ from livebode.sources.live import (
 )
 from livebode_drives.live.arrival_rate import ArrivalRate
 from livebode_drives.live.number_lines import NumberLines
-from livebode_drives.settings import DriveKeys
+from livebode_drives.source_settings import DriveKeys
 
 UNKNOWN_BYTES = 1 << 12
 """Bytes without a frame or JSON that are searched, and reported together."""
@@ -209,7 +209,7 @@ class SerialSource(LiveSource):
         if batch.epoch != self._epoch:
             self._epoch = batch.epoch
             self._arrival.restart()
-        self._arrival.take(batch.stop, now)
+        self._arrival.add(batch.stop, now)
 
 
 def number_lines(settings: DriveKeys, epoch: int) -> NumberLines:

@@ -141,7 +141,7 @@ ALL_BITS = (1 << 64) - 1
 
 
 @dataclass(frozen=True)
-class Scaled:
+class ChannelScale:
     """Where the raw values of a channel are, and its physical values: factor·raw + offset."""
 
     handle: int
@@ -175,7 +175,7 @@ class ScopeProjectRecording(Recording):
                 found.append(item.column())
         self.columns, self.skipped = tuple(as_columns(self._by_clock(distinct(found)))), tuple(skipped)
 
-    def _unreadable(self, item: Shown) -> str:
+    def _unreadable(self, item: ChannelDisplay) -> str:
         """Why the data of an acquisition is not read; empty if it is."""
         data = item.acquisition
         type_, handle = text(data, "DataType"), int(text(data, "FileHandle") or 0)
@@ -218,7 +218,7 @@ class ScopeProjectRecording(Recording):
         return samples_of(self.path, self._parts[handle], self._kinds[handle])
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
-        keys = [column.key if isinstance(column.key, Scaled) else Scaled(column.key) for column in columns]
+        keys = [column.key if isinstance(column.key, ChannelScale) else ChannelScale(column.key) for column in columns]
         handles = list(dict.fromkeys(key.handle for key in keys))
         for parts in zip(*(even(self._samples(handle), rows) for handle in handles), strict=True):
             read = dict(zip(handles, parts))
@@ -245,7 +245,7 @@ def even(pieces: Iterator[Samples], rows: int) -> Iterator[Samples]:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ChannelDisplay:
     """A channel: its name, the acquisition with its data, and how a chart scales it."""
 
     name: str
@@ -262,7 +262,7 @@ class Shown:
         scale, offset = number(own, "ScaleFactor", 1.0), number(own, "Offset", 0.0)
         again = number(own, "ResultingUnit/UnitScaleResult", 1.0)
         shift = number(own, "ResultingUnit/UnitOffsetResult", 0.0)
-        key = Scaled(int(text(self.acquisition, "FileHandle")), scale * again, offset * again + shift)
+        key = ChannelScale(int(text(self.acquisition, "FileHandle")), scale * again, offset * again + shift)
         unit = QUANTITY.sub("", f" {text(own, 'ResultingUnit/Unit/ReturnText')}").strip()
         return Column(self.name, unit, aliases=(symbol,) if symbol not in ("", self.name) else (), key=key)
 
@@ -276,7 +276,7 @@ def number(element: Element | None, path: str, default: float) -> float:
     return float(found) if found else default
 
 
-def shown_acquisitions(root: Element) -> Iterator[Shown]:
+def shown_acquisitions(root: Element) -> Iterator[ChannelDisplay]:
     """What the charts show; the x of an XY chart as NAME.X."""
     by_guid = {text(one, "Guid"): one for one in root.iter() if one.find("FileHandle") is not None}
     for channel in root.iter("Channel"):
@@ -284,14 +284,14 @@ def shown_acquisitions(root: Element) -> Iterator[Shown]:
             data = by_guid.get(text(own, "AcquisitionGUID"))
             if data is not None:
                 usage = text(own, "Usage")
-                yield Shown(text(channel, "Name") + (f".{usage}" if usage not in ("", "Y") else ""), data, own)
+                yield ChannelDisplay(text(channel, "Name") + (f".{usage}" if usage not in ("", "Y") else ""), data, own)
 
 
-def hidden_acquisitions(root: Element, shown: Sequence[Shown]) -> Iterator[Shown]:
+def hidden_acquisitions(root: Element, shown: Sequence[ChannelDisplay]) -> Iterator[ChannelDisplay]:
     known = {id(one.acquisition) for one in shown}
     for one in root.iter():
         if one.find("FileHandle") is not None and id(one) not in known:
-            yield Shown(text(one, "Name"), one)
+            yield ChannelDisplay(text(one, "Name"), one)
 
 
 def distinct(columns: Sequence[Column]) -> list[Column]:

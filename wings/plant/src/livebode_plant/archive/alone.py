@@ -20,25 +20,27 @@ from pathlib import Path
 
 from livebode.core import ArchiveError, write_whole
 from livebode_plant.archive.job import Job
-from livebode_plant.archive.recordings import ArchivedRecording
-from livebode_plant.archive.results import Failed, Handled, Hashed, Result, failed
+from livebode_plant.archive.recording_places import ArchivedRecording
+from livebode_plant.archive.results import HashedContent, RecordingResults, Result, TrackingFailure, failed
 from livebode_plant.archive.tasks import handle_one
 
 _LOOK_S = 0.1
 _KILLED_MAX = 3
 
 
-def handle_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Handled:
+def handle_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> RecordingResults:
     """Hash a recording, which ends no process, and find each of its results in a process of its own."""
     started = time.perf_counter()
     hashed = handle_one(job, replace(recording, recipes=()), scratch)
     results: list[Result] = list(hashed.results)
-    found = next((one.content for one in results if isinstance(one, Hashed)), recording.content)
-    if not any(isinstance(one, Failed) for one in results) and not (not recording.content and job.knows(found)):
+    found = next((one.content for one in results if isinstance(one, HashedContent)), recording.content)
+    if not any(isinstance(one, TrackingFailure) for one in results) and not (
+        not recording.content and job.knows(found)
+    ):
         for recipe in recording.recipes:
             one = replace(recording, content=found, recipes=(recipe,))
             results += _tracked_alone(job, one, scratch)
-    return Handled(tuple(results), time.perf_counter() - started)
+    return RecordingResults(tuple(results), time.perf_counter() - started)
 
 
 def _tracked_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Sequence[Result]:

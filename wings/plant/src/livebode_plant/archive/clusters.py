@@ -15,7 +15,7 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.core import ArchiveError, not_installed
-from livebode_plant.archive.settings import ClusterSection
+from livebode_plant.archive.archive_settings import ClusterSection
 
 try:
     import dask
@@ -59,7 +59,7 @@ _ENVIRONMENT = {
 
 
 def _environment() -> dict[str, str]:
-    """Of each worker. Fits on different processors differ in the last digits, except if all use the same routines."""
+    """Environment of each worker: fits on different processors differ in the last digits if routines differ."""
     same = os.environ.get("OPENBLAS_CORETYPE")
     return _ENVIRONMENT | ({"OPENBLAS_CORETYPE": same} if same else {})
 

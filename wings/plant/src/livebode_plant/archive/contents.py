@@ -48,7 +48,7 @@ class MachineRuns:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """As plain data, the days in ISO 8601."""
+        """Plain data, the days in ISO 8601."""
         days = {name: when and when.date().isoformat() for name, when in (("first", self.first), ("last", self.last))}
         numbers = {name: getattr(self, name) for name in ("runs", "judged", "alarming", "quarantined")}
         return {"machine": self.machine, **numbers, **days}

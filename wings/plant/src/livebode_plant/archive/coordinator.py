@@ -15,10 +15,11 @@ from packaging.version import Version
 
 from livebode.version import __version__
 from livebode_plant.archive.alone import handle_alone
+from livebode_plant.archive.archive_settings import ArchiveSettings
 from livebode_plant.archive.contents import quarantine
-from livebode_plant.archive.grouping import RecordingGroups
+from livebode_plant.archive.groups import RecordingGroups
 from livebode_plant.archive.job import Job, short
-from livebode_plant.archive.recordings import (
+from livebode_plant.archive.recording_places import (
     ArchivedRecording,
     RecordingPlace,
     file_rows,
@@ -29,8 +30,15 @@ from livebode_plant.archive.recordings import (
     place_of,
     untracked,
 )
-from livebode_plant.archive.results import Failed, Handled, Hashed, Result, Tracked, each_result, lost
-from livebode_plant.archive.settings import ArchiveSettings
+from livebode_plant.archive.results import (
+    HashedContent,
+    RecordingResults,
+    Result,
+    TrackedResult,
+    TrackingFailure,
+    each_result,
+    lost,
+)
 from livebode_plant.archive.tasks import handle
 from livebode_plant.lake import QUANTITIES, QUARANTINE, RUNS, DataFile, Lake
 
@@ -59,17 +67,17 @@ class Committer:
     _waiting: list[Result] = field(default_factory=list)
     _committed_s: float = field(default_factory=time.monotonic)
 
-    def take(self, results: Iterable[Result]) -> None:
-        """Take results, and commit if it is time."""
+    def add(self, results: Iterable[Result]) -> None:
+        """Add results, and commit if it is time."""
         self._waiting += results
         if time.monotonic() - self._committed_s > _EVERY_S or len(self._waiting) >= _RESULTS_MAX:
             self.commit()
 
     def commit(self) -> None:
         """Commit what waits; ArchiveError or LocationError if the lake cannot be written."""
-        hashed = [one for one in self._waiting if isinstance(one, Hashed)]
-        tracked = [one for one in self._waiting if isinstance(one, Tracked)]
-        bad = [one for one in self._waiting if isinstance(one, Failed) and not one.by_storage]
+        hashed = [one for one in self._waiting if isinstance(one, HashedContent)]
+        tracked = [one for one in self._waiting if isinstance(one, TrackedResult)]
+        bad = [one for one in self._waiting if isinstance(one, TrackingFailure) and not one.by_storage]
         if hashed:  # first: what has a result and no known place would be tracked again
             rows = file_rows([(one.place, one.content) for one in hashed], self.job.common_machine)
             self.lake.add_rows("files", rows)
@@ -90,7 +98,7 @@ class Committer:
         self._waiting.clear()
         self._committed_s = time.monotonic()
 
-    def _quarantined(self, one: Failed) -> dict[str, str | None]:
+    def _quarantined(self, one: TrackingFailure) -> dict[str, str | None]:
         return {
             "content": one.content,
             "recipe": one.recipe,
@@ -146,8 +154,8 @@ class ArchiveOutcome:
     recordings: int = 0
     known: int = 0
     tracked: int = 0
-    quarantined: list[Failed] = field(default_factory=list)
-    unreadable: list[Failed] = field(default_factory=list)
+    quarantined: list[TrackingFailure] = field(default_factory=list)
+    unreadable: list[TrackingFailure] = field(default_factory=list)
     stopped: bool = False
     remaining: int = 0
 
@@ -231,7 +239,7 @@ class Coordinator:
         lengths = Counter(place.size_bytes for place in (*new, *(one.place for one in waiting())))
         alike = [place for place in new if not place.size_bytes or lengths[place.size_bytes] > 1]
         for result in self._handle("reading", [ArchivedRecording(place) for place in alike], stack):
-            if isinstance(result, Hashed):
+            if isinstance(result, HashedContent):
                 known[result.place.known_as] = result.content
         single = [ArchivedRecording(place, recipes) for place in new if lengths[place.size_bytes] == 1]
         candidates = {content for one in single for content in by_size.get(one.size_bytes, ())}
@@ -254,31 +262,35 @@ class Coordinator:
                 self._count(found)
                 if tracking:
                     self._outcome.remaining -= len(handled)
-                    self._outcome.known += sum(all(isinstance(x, Hashed) for x in one.results) for one in handled)
+                    self._outcome.known += sum(
+                        all(isinstance(x, HashedContent) for x in one.results) for one in handled
+                    )
                 results += [] if tracking else found
-                committer.take(found)
+                committer.add(found)
         finally:
             committer.commit()
         return results
 
     def _count(self, results: Iterable[Result]) -> None:
         for result in results:
-            if isinstance(result, Tracked):
+            if isinstance(result, TrackedResult):
                 self._outcome.tracked += 1
-            elif isinstance(result, Failed):
+            elif isinstance(result, TrackingFailure):
                 bad = self._outcome.unreadable if result.by_storage else self._outcome.quarantined
                 bad.append(result)
 
     def _distributed(
         self, stage: str, recordings: Sequence[ArchivedRecording], stack: ExitStack, alone: bool
-    ) -> Iterator[list[Handled]]:
+    ) -> Iterator[list[RecordingResults]]:
         """What was found, in the order in which it comes."""
         cluster = self._started(stack)
-        from livebode_plant.archive.distributing import Distribution
+        from livebode_plant.archive.distribution import Distribution
 
         groups = RecordingGroups([] if alone else recordings)
         together, one = partial(handle, self._job), partial(handle_alone, self._job)
-        work: Distribution[ArchivedRecording, Handled] = Distribution(cluster, groups, together, one, _again, lost)
+        work: Distribution[ArchivedRecording, RecordingResults] = Distribution(
+            cluster, groups, together, one, _again, lost
+        )
         work.last.extend(recordings if alone else ())
         done, done_bytes, total_bytes = 0, 0, sum(one.size_bytes for one in recordings)
         self._report(Progress(stage, 0, len(recordings), 0, total_bytes, cluster.dashboard))
@@ -302,5 +314,5 @@ class Coordinator:
         return self._cluster
 
 
-def _again(handled: Handled) -> bool:
+def _again(handled: RecordingResults) -> bool:
     return handled.again

@@ -8,7 +8,7 @@ from typing import Any
 
 from livebode.core import ArchiveError, LivebodeError
 from livebode.locations import with_originals
-from livebode_plant.archive.recordings import ArchivedRecording, RecordingPlace
+from livebode_plant.archive.recording_places import ArchivedRecording, RecordingPlace
 from livebode_plant.lake import DataFile
 
 _STORAGE = ("location", "output")
@@ -16,7 +16,7 @@ _LAKE = ("archive.lake-damaged", "archive.lake-unusable", "archive.changed-meanw
 
 
 @dataclass(frozen=True)
-class Hashed:
+class HashedContent:
     """The content at a place."""
 
     place: RecordingPlace
@@ -24,7 +24,7 @@ class Hashed:
 
 
 @dataclass(frozen=True)
-class Tracked:
+class TrackedResult:
     """A result whose files are in the lake's directory, and its rows of `runs` and `quantities`, not committed yet."""
 
     files: tuple[DataFile, ...]
@@ -33,7 +33,7 @@ class Tracked:
 
 
 @dataclass(frozen=True)
-class Failed:
+class TrackingFailure:
     """A recording that cannot be read or tracked: the code of the error, and its sentence.
 
     Content and recipe are empty if the recording could not be read, which is no result.
@@ -56,11 +56,11 @@ class Failed:
         return not self.recipe or self.code.partition(".")[0] in _STORAGE or self.code in _LAKE
 
 
-Result = Hashed | Tracked | Failed
+Result = HashedContent | TrackedResult | TrackingFailure
 
 
 @dataclass(frozen=True)
-class Handled:
+class RecordingResults:
     """All results of one recording, and the time that they took."""
 
     results: tuple[Result, ...]
@@ -69,10 +69,10 @@ class Handled:
     @property
     def again(self) -> bool:
         """Whether to try again alone: what the content is the reason of has the same result each time."""
-        return any(isinstance(one, Failed) and not one.by_content for one in self.results)
+        return any(isinstance(one, TrackingFailure) and not one.by_content for one in self.results)
 
 
-def failed(place: RecordingPlace, error: Exception, content: str = "", recipe: str = "") -> Failed:
+def failed(place: RecordingPlace, error: Exception, content: str = "", recipe: str = "") -> TrackingFailure:
     """The failure that an exception means."""
     if isinstance(error, MemoryError):
         error = ArchiveError(
@@ -84,15 +84,15 @@ def failed(place: RecordingPlace, error: Exception, content: str = "", recipe: s
         error = ArchiveError(
             "internal", f"internal error ({type(error).__name__}: {error})", "please report it with the recording"
         )
-    return Failed(place, error.code, str(with_originals(error)), content, recipe)
+    return TrackingFailure(place, error.code, str(with_originals(error)), content, recipe)
 
 
-def each_result(handled: Iterable[Handled]) -> list[Result]:
+def each_result(handled: Iterable[RecordingResults]) -> list[Result]:
     """The results of several recordings."""
     return [result for one in handled for result in one.results]
 
 
-def lost(recording: ArchivedRecording) -> Handled:
+def lost(recording: ArchivedRecording) -> RecordingResults:
     """The results of a recording whose worker ended each time."""
     error = ArchiveError(
         "process-ended",
@@ -100,4 +100,4 @@ def lost(recording: ArchivedRecording) -> Handled:
         "please report it with the recording",
     )
     recipes = recording.recipes if recording.content else ("",)
-    return Handled(tuple(failed(recording.place, error, recording.content, recipe) for recipe in recipes), 0.0)
+    return RecordingResults(tuple(failed(recording.place, error, recording.content, recipe) for recipe in recipes), 0.0)

@@ -24,8 +24,8 @@ from livebode.runtime import Destination, Document, FitResults, RecordInOnePiece
 from livebode.tables import from_numpy, text
 from livebode.version import __version__
 from livebode_plant.archive.job import Job
-from livebode_plant.archive.recordings import ArchivedRecording, RecordingPlace, levels_of
-from livebode_plant.archive.results import Handled, Hashed, Result, Tracked, failed
+from livebode_plant.archive.recording_places import ArchivedRecording, RecordingPlace, levels_of
+from livebode_plant.archive.results import HashedContent, RecordingResults, Result, TrackedResult, failed
 from livebode_plant.lake import DataFile, Key, Lake
 from livebode_plant.lake.data_file import ResultFileWriter
 from livebode_plant.lake.wide_matrices import covariance_to_wide, entries_to_wide
@@ -127,7 +127,7 @@ def _text(words: list[str]) -> pa.Array[Any]:
     return text(words, np.arange(len(words)))
 
 
-def track(job: Job, place: RecordingPlace, path: Path, key: Key, scratch: Path | None = None) -> Tracked:
+def track(job: Job, place: RecordingPlace, path: Path, key: Key, scratch: Path | None = None) -> TrackedResult:
     """Track a recording by a recipe, and put the files of its result in the lake's directory.
 
     Raises
@@ -144,7 +144,7 @@ def track(job: Job, place: RecordingPlace, path: Path, key: Key, scratch: Path |
         for file in record.files:
             lake.store(Path(folder) / file.table / file.name, file.table)
     common = key._asdict() | levels
-    return Tracked(record.files, common | _about(record, place), tuple(_quantities(axis, record, common)))
+    return TrackedResult(record.files, common | _about(record, place), tuple(_quantities(axis, record, common)))
 
 
 def _no_pictures(*_: object) -> None:
@@ -219,15 +219,15 @@ def _moment(text: str | None) -> datetime | None:
     return None if text is None else datetime.fromisoformat(text)
 
 
-def handle(job: Job, recordings: Sequence[ArchivedRecording], scratch: Path | None = None) -> list[Handled]:
+def handle(job: Job, recordings: Sequence[ArchivedRecording], scratch: Path | None = None) -> list[RecordingResults]:
     """Hash and track each recording; files are written, and nothing is committed."""
     return [handle_one(job, recording, scratch) for recording in recordings]
 
 
-def handle_one(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> Handled:
+def handle_one(job: Job, recording: ArchivedRecording, scratch: Path | None = None) -> RecordingResults:
     """Hash and track one recording."""
     started = time.perf_counter()
-    return Handled(tuple(_results(job, recording, scratch)), time.perf_counter() - started)
+    return RecordingResults(tuple(_results(job, recording, scratch)), time.perf_counter() - started)
 
 
 def _results(job: Job, recording: ArchivedRecording, scratch: Path | None) -> Iterator[Result]:
@@ -237,7 +237,7 @@ def _results(job: Job, recording: ArchivedRecording, scratch: Path | None) -> It
         with local_copy(place.url) as path:
             content = content_sha256(path)
             if not recording.content:
-                yield Hashed(place, content)
+                yield HashedContent(place, content)
                 if job.knows(content):
                     return
             elif content != recording.content:

@@ -34,7 +34,7 @@ from livebode_plant.fleet.message import read_message
 from livebode_plant.fleet.usual_spectra import PendingSpectrum, UsualSpectra, spectra_together
 
 RESPONSE_BYTES = 130
-"""Of a response at a line, in a message of results."""
+"""Size of a response at a line, in a message of results."""
 _OUTPUT_BYTES_MAX = 4 << 20
 """Most bytes of the responses to one message: a message of results must have room for them."""
 _EVENT_BYTES = 1000
@@ -81,7 +81,7 @@ class UnfittedOutput(NamedTuple):
     events: list[Event]
 
 
-class _Taken(NamedTuple):
+class _TakenMessages(NamedTuple):
     """Messages that are tracked together: number in the log of the last one, its last sample and time, their Blocks,
     and the most bytes of their responses; more than allowed only for a single message."""
 
@@ -133,7 +133,7 @@ class AxisStream(StatefulBase):
         settings = axis.source
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
         self._pipeline: SingleResponse | None = None
-        self._taken: list[_Taken] = []
+        self._taken: list[_TakenMessages] = []
         self.usual: UsualSpectra | None = None
         self.spectra: list[PendingSpectrum] = []
         """The messages taken since the last output, while they are usual ones."""
@@ -147,11 +147,11 @@ class AxisStream(StatefulBase):
 
     def process(self, message: bytes, position: int, log_s: float) -> Output:
         """The responses and events of the next message; `position` is its number in the log, `log_s` its time there."""
-        self.take(message, position, log_s)
+        self.add(message, position, log_s)
         return self.output()
 
-    def take(self, message: bytes, position: int, log_s: float) -> int:
-        """Take the next message, to be tracked together with those after it: the cost is by call, not by sample.
+    def add(self, message: bytes, position: int, log_s: float) -> int:
+        """Add the next message, to be tracked together with those after it: the cost is by call, not by sample.
 
         Returns the most bytes that it adds to a message of results. The responses are those of `process`, bit for bit.
         """
@@ -186,10 +186,10 @@ class AxisStream(StatefulBase):
         if self._taken and self._taken[-1].size_bytes + size_bytes <= _OUTPUT_BYTES_MAX:
             before = self._taken.pop()
             blocks, size_bytes = before.blocks + blocks, before.size_bytes + size_bytes
-        self._taken.append(_Taken(position, end, blocks, size_bytes))
+        self._taken.append(_TakenMessages(position, end, blocks, size_bytes))
 
     def _read_spectra(self) -> None:
-        """Take usual messages as any others: they are not tracked with those of other axes."""
+        """Process usual messages like any others: they are not tracked with those of other axes."""
         spectra, self.spectra = self.spectra, []
         for one in spectra:
             assert self.usual is not None
@@ -215,7 +215,7 @@ class AxisStream(StatefulBase):
         return outputs_together([self])[0]
 
     def tracked(self) -> UnfittedOutput:
-        """The same before the fits; `finished` follows."""
+        """Results before the fits; `finished` follows."""
         self._track()
         first, responses, self._responses = self.responses, self._responses, []
         self.responses += sum(map(len, responses))
@@ -251,7 +251,7 @@ class AxisStream(StatefulBase):
             found, self._tracked_events = found + self._tracked_events, []
         self._remember(found, parameters)
         return Output(
-            tracked.number, tracked.responses, tracked.number + tracked.to_fit, parameters, self._limits.take(found)
+            tracked.number, tracked.responses, tracked.number + tracked.to_fit, parameters, self._limits.process(found)
         )
 
     def _monitored(self, responses: Responses | None, parameters: tuple[Parameters, ...]) -> list[Event]:
@@ -403,7 +403,7 @@ def outputs_together(streams: Sequence[AxisStream]) -> list[Output]:
 
 
 def stacked_together(streams: Sequence[AxisStream]) -> tuple[list[StackedRows], dict[int, Output]]:
-    """The same: responses of axes that are alike in one piece, and the outputs of all others by their places.
+    """Results of all streams: those of axes that are alike in one piece, and outputs of all others by their places.
 
     An axis of the first kind is also among the others if it has events, or further responses.
     """

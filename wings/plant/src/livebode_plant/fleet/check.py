@@ -94,7 +94,7 @@ class CheckResult:
         return {"exact": self.exact, "claims": self.claims, "messages": self.messages, "axes": axes}
 
 
-class _Stored:
+class _StoredDigests:
     """Digests of the stored results, and for each partition the message up to which they are complete."""
 
     def __init__(self) -> None:
@@ -128,7 +128,7 @@ async def check_results(log: FleetLog, axes: Mapping[str, Axis]) -> CheckResult:
     FleetError
         If the log no longer has its beginning.
     """
-    stored = _Stored()
+    stored = _StoredDigests()
     extent = await log.extent(RESULT_STREAM)
     async for message in stored_messages(log, RESULT_STREAM, f"{RESULTS}.*", extent.last, extent.first):
         stored.add(message.subject.split(".")[1], ResultMessage.from_bytes(message.data))
@@ -149,7 +149,7 @@ async def check_results(log: FleetLog, axes: Mapping[str, Axis]) -> CheckResult:
 class _Again:
     """The uninterrupted computation: a stream for each run of each axis."""
 
-    def __init__(self, axes: Mapping[str, Axis], stored: _Stored) -> None:
+    def __init__(self, axes: Mapping[str, Axis], stored: _StoredDigests) -> None:
         self._axes, self._stored = axes, stored
         self._runs: dict[str, list[int]] = {}
         for key, run in stored.recipes:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from livebode.core import FleetError
-from livebode_plant.fleet.settings import FleetSettings
+from livebode_plant.fleet.fleet_settings import FleetSettings
 from livebode_plant.fleet.worker_process import END_S, WorkerProcess, import_early
 
 if TYPE_CHECKING:

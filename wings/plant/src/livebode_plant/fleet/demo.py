@@ -26,9 +26,9 @@ from livebode_plant.fleet.check import CheckResult, check_results
 from livebode_plant.fleet.coordinator import FleetCoordinator
 from livebode_plant.fleet.edge import Edge, send_edges
 from livebode_plant.fleet.edge_buffer import FILE_BYTES, EdgeBuffer
+from livebode_plant.fleet.fleet_settings import FleetSettings
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import LogServer
-from livebode_plant.fleet.settings import FleetSettings
 from livebode_plant.fleet.status import fleet_status, silences
 
 RATE_HZ, WINDOW = 4000.0, 400
@@ -137,7 +137,7 @@ class SimulatedMachines:
 
     def _take_batches(self, number: int) -> None:
         for axis, edge in enumerate(self._edges):
-            edge.take(self.batch(axis, number))
+            edge.add(self.batch(axis, number))
 
     def _send(self) -> None:
         edges = [(edge, self._taking) for edge in self._edges]

@@ -16,9 +16,9 @@ import numpy as np
 from livebode.core import FleetError
 from livebode.sources.live import AnyBatch, Batch, LiveBlock, LiveSource, LiveSpectra, SpectraBatch
 from livebode_plant.fleet.edge_buffer import EdgeBuffer
+from livebode_plant.fleet.fleet_settings import EdgeSection, LogSection
 from livebode_plant.fleet.log import FleetLog, OtherLastError
 from livebode_plant.fleet.message import message_id, write_message
-from livebode_plant.fleet.settings import EdgeSection, LogSection
 from livebode_plant.fleet.subjects import EDGE, axis_path
 
 QUIET_S = 2.0
@@ -112,7 +112,7 @@ class Edge:
     """Sends the messages of a buffer to the log, in order, each until the log has stored it.
 
     What the disk does not take, because it is full for example, is kept in memory up to `HELD_BYTES_MAX`, and is sent
-    from there or written later. Beyond that `take` waits, so that a sender that can wait does, and the source counts
+    from there or written later. Beyond that `add` waits, so that a sender that can wait does, and the source counts
     what others send.
 
     Parameters
@@ -133,7 +133,7 @@ class Edge:
         self.sent = 0
         """Messages that the log has stored."""
 
-    def take(self, batch: AnyBatch) -> None:
+    def add(self, batch: AnyBatch) -> None:
         """Append a batch to the buffer; may be called from any thread."""
         message = write_message(batch)
         with self._room:
@@ -149,7 +149,7 @@ class Edge:
             _logger.warning("the buffer is full: the oldest %d messages were deleted", lost)
 
     def end(self) -> None:
-        """Let `take` wait no longer."""
+        """Let `add` wait no longer."""
         with self._room:
             self._ended = True
             self._write_held(troubled=True)
@@ -292,7 +292,7 @@ def send_sources(
 
 def _take_all(source: LiveSource, edge: Edge) -> None:
     for batch in sender_batches(source):
-        edge.take(batch)
+        edge.add(batch)
 
 
 async def send_edges(settings: LogSection, edges: list[tuple[Edge, Future[None]]], stop: threading.Event) -> None:

@@ -12,7 +12,7 @@ logging.getLogger("asyncio").addFilter(lambda record: "eof_received() has no eff
 
 
 class EncryptedClient(Client):
-    """As its base, but a server that does not offer TLS is refused.
+    """A client like its base, but a server that does not offer TLS is refused.
 
     The base encrypts if the server's greeting, which is plain text, demands it: whoever is between the two could
     remove that from the greeting, at any reconnection, and read the data.

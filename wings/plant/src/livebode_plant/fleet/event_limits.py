@@ -25,7 +25,7 @@ class EventLimits(StatefulBase):
     Examples
     --------
     >>> limits = EventLimits()
-    >>> found = limits.take(Event("gap", n, n / 10, "a gap") for n in range(300))
+    >>> found = limits.process(Event("gap", n, n / 10, "a gap") for n in range(300))
     >>> len(found), found[20].details
     (22, {'more': 80})
     """
@@ -34,9 +34,9 @@ class EventLimits(StatefulBase):
 
     def __init__(self) -> None:
         self._kinds: dict[str, tuple[float, float, int]] = {}
-        """Of each kind: events that may be stored at once, time of the newest event, and how many were dropped."""
+        """Each kind's events that may be stored at once, time of the newest event, and how many were dropped."""
 
-    def take(self, events: Iterable[Event]) -> list[Event]:
+    def process(self, events: Iterable[Event]) -> list[Event]:
         """Those of these events that are stored."""
         return [one for event in events for one in ([event] if event.kind in _FULL else self._limited(event))]
 

@@ -14,10 +14,10 @@ from typing import Any, TypeVar
 
 from livebode.core import FleetError
 from livebode_plant.fleet import subjects
-from livebode_plant.fleet.connecting import connected
+from livebode_plant.fleet.connection import connected
 from livebode_plant.fleet.consumer import Consumer
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.partition_count import description_of, partitions_changed, partitions_of
-from livebode_plant.fleet.settings import LogSection
 
 _logger = logging.getLogger(f"livebode.{__name__}")
 _EXPECTED, _IDENTITY, _WRITE = "Nats-Expected-Last-Subject-Sequence", "Nats-Msg-Id", "Livebode-Write"

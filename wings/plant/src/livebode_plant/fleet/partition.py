@@ -263,7 +263,7 @@ class PartitionOwner:
             key = key_of(message.subject)
             stream = self._stream(key, message.number)
             if stream is not None and message.number > stream.position:
-                size += stream.take(message.data, message.number, message.stored_s)
+                size += stream.add(message.data, message.number, message.stored_s)
                 sizes[key] = sizes.get(key, 0) + len(message.data)
         return sizes, len(messages)
 

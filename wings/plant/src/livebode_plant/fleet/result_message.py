@@ -24,7 +24,7 @@ from livebode_plant.fleet.wide_rows import (
 )
 
 _EVENT_BYTES = 500
-"""Of an event without its sentence."""
+"""Size of an event without its sentence."""
 _PARAMETER_BYTES = 100
 _HEAD = struct.Struct("<4sH")
 _MAGIC, _VERSION = b"LBRM", 2

@@ -9,14 +9,14 @@ from urllib.parse import quote
 
 from livebode.core import FleetError, on_loopback
 from livebode.sources.live import FRAME_BYTES_MAX
+from livebode_plant.fleet.fleet_settings import FleetSettings, ServerSection, UsersSection
 from livebode_plant.fleet.page_status import NAMES, VIEW
-from livebode_plant.fleet.settings import FleetSettings, ServerSection, UsersSection
 from livebode_plant.fleet.subjects import ACTS_STREAM, API, EDGE, STATUS_STREAM, VIEW_API, axis_path
 
 _FLEET, _VIEW = "FLEET", "VIEW"
 _CONNECTIONS_MORE, _SUBSCRIPTIONS = 4, 4
 _MESSAGE_BYTES_MAX = 2 * FRAME_BYTES_MAX
-"""Of an edge: a frame with the names of the channels, and one of samples."""
+"""Largest message of an edge: a frame with the names of the channels, and one of samples."""
 _VIEWED = ("STREAM.INFO.*", f"STREAM.MSG.GET.{STATUS_STREAM}", f"STREAM.MSG.GET.{ACTS_STREAM}")
 """Requests of a viewer. A consumer is not one of them: it could deliver to any subject of the log's account."""
 _ONLY_ASKS = json.dumps([f"{VIEW_API}.{request}" for request in _VIEWED])

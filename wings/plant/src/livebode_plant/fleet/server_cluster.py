@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 
 from livebode.core import FleetError, on_loopback
-from livebode_plant.fleet.settings import FleetSettings, ServerSection
+from livebode_plant.fleet.fleet_settings import FleetSettings, ServerSection
 
 
 @dataclass(frozen=True)

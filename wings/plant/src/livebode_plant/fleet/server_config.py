@@ -7,13 +7,13 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from livebode.core import FleetError, on_loopback
+from livebode_plant.fleet.fleet_settings import FleetSettings, LeafSection, ServerSection
 from livebode_plant.fleet.server_access import OPEN, ServerAccess
 from livebode_plant.fleet.server_cluster import ClusterMember
-from livebode_plant.fleet.settings import FleetSettings, LeafSection, ServerSection
 from livebode_plant.fleet.subjects import EDGE, LEVELS, LOG
 
 PAYLOAD_BYTES_MAX = 8 << 20
-"""Of one message: the state of an axis with [motion] has 0.65 MB."""
+"""Size of one message: the state of an axis with [motion] has 0.65 MB."""
 _MEMORY_BYTES = 64 << 20
 
 

@@ -7,9 +7,9 @@ import json
 from hashlib import sha256
 
 from livebode_plant.fleet.alarm_samples import AlarmSamples
+from livebode_plant.fleet.fleet_settings import SinkSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.reader import Reader
-from livebode_plant.fleet.settings import SinkSection
 from livebode_plant.fleet.sink_tables import SinkTables, SinkTotals
 from livebode_plant.fleet.subjects import RESULT_STREAM, RESULTS, SINK, STATUS
 

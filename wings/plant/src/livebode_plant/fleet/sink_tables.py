@@ -16,8 +16,8 @@ from livebode.analysis import FittedQuantities
 from livebode.core import LEVELS, ArchiveError, Responses, SignalError, counted
 from livebode.fitting import RunningMean
 from livebode.tables import Table
+from livebode_plant.fleet.fleet_settings import SinkSection
 from livebode_plant.fleet.log import StoredMessage
-from livebode_plant.fleet.settings import SinkSection
 from livebode_plant.fleet.sink_rows import (
     DELETED,
     US,
@@ -81,7 +81,7 @@ class _Responses:
             return _invalid(self.newest)
 
 
-class Closed(NamedTuple):
+class ClosedPeriods(NamedTuple):
     """The means of the periods up to number `through`.
 
     `first` is the number of the first message that has to be read again for the means of later periods.
@@ -116,8 +116,8 @@ class MeanTier:
         self._responses: dict[PeriodKey, _Responses] = {}
         self._parameters: dict[PeriodKey, FittedQuantities] = {}
 
-    def take(self, message: SinkRows, log: str) -> Closed | None:
-        """Take the next message; returns the means of the periods that have ended before it, if any have."""
+    def process(self, message: SinkRows, log: str) -> ClosedPeriods | None:
+        """Add the next message; returns the means of the periods that have ended before it, if any have."""
         # A clock that was set back must not open a period again.
         self._now_s = max(self._now_s, message.stored_s)
         self._begins.setdefault(int(self._now_s // self._period_s), message.number)
@@ -141,7 +141,7 @@ class MeanTier:
                 here = np.flatnonzero(periods == period)  # one after the other: a log's clock only advances
                 yield PeriodKey(part.key, period), part.rows.slice(here[0], here[-1] + 1 - here[0])
 
-    def _close(self, through: int, log: str) -> Closed:
+    def _close(self, through: int, log: str) -> ClosedPeriods:
         own = [key for key in self._responses if key.period <= through]
         fitted = [key for key in self._parameters if key.period <= through]
         tables = {
@@ -150,7 +150,7 @@ class MeanTier:
         }
         self.closed = through
         self._begins = {period: number for period, number in self._begins.items() if period > through}
-        return Closed(through, min(self._begins.values()), tables)
+        return ClosedPeriods(through, min(self._begins.values()), tables)
 
     def _response_table(self, groups: list[tuple[PeriodKey, _Responses]], log: str) -> pa.Table:
         tables = [RESPONSE_MEANS.empty_table()]
@@ -208,7 +208,7 @@ class SinkTotals:
         return asdict(self)
 
 
-class _Waiting:
+class _WaitingRows:
     """Rows that are not committed yet, with the position of each part in the stream."""
 
     def __init__(self, table: StreamTable) -> None:
@@ -246,7 +246,7 @@ class SinkTables:
     def __init__(self, settings: SinkSection) -> None:
         self._settings = settings
         self.lake = Lake(settings.url)
-        self._waiting = {name: _Waiting(StreamTable(self.lake, name)) for name in FLEET_SCHEMAS}
+        self._waiting = {name: _WaitingRows(StreamTable(self.lake, name)) for name in FLEET_SCHEMAS}
         self.totals = SinkTotals()
 
     def resume(self, created_s: float) -> int:
@@ -297,7 +297,7 @@ class SinkTables:
         self._next = message.number + 1
         rows = sink_rows(message, self.name)
         for tier in self._tiers:
-            if (closed := tier.take(rows, self.name)) is not None:
+            if (closed := tier.process(rows, self.name)) is not None:
                 for name, table in closed.tables.items():
                     self._waiting[name].add(closed.through, table)
                 self._firsts[tier.name] = closed.through, closed.first

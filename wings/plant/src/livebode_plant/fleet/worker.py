@@ -10,9 +10,9 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 from livebode.configuration import Axis
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.partition import PartitionOwner
-from livebode_plant.fleet.settings import LogSection
 
 _AGAIN_S = 1.0
 """After which an owner that failed begins again."""

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from livebode.configuration import Axis
-    from livebode_plant.fleet.settings import LogSection
+    from livebode_plant.fleet.fleet_settings import LogSection
 
 SILENT_S = 4.0
 """Time without a sign of life after which a worker is frozen."""
 _START_S = 30.0
-"""The same for its first one: on a busy computer the imports take that long."""
+"""Time until its first one: on a busy computer the imports take that long."""
 _SIGN_S = 0.5
 END_S = 5.0
 """Time that a worker has to store its results and states when it is to end."""

@@ -3,7 +3,7 @@
 from livebode.core import needing
 
 with needing("PyArrow", "archive", "a lake"), needing("deltalake", "archive", "a lake"):
-    from livebode_plant.lake.compaction import Compacted, compact
+    from livebode_plant.lake.compaction import CompactionResult, compact
     from livebode_plant.lake.data_file import DataFile, Key
     from livebode_plant.lake.lake import Lake
     from livebode_plant.lake.lake_run import LakeRun, runs_of
@@ -46,7 +46,7 @@ __all__ = [
     "RESPONSE_MEANS",
     "RUNS",
     "TABLES",
-    "Compacted",
+    "CompactionResult",
     "DataFile",
     "Key",
     "Lake",

@@ -19,7 +19,7 @@ RETENTION_HOURS = 7 * 24
 
 
 @dataclass(frozen=True)
-class Compacted:
+class CompactionResult:
     """What compaction did to a table: its files before and after, and how many old ones were removed.
 
     `open_results` results have files and no row in `runs`: an archive is running, or was ended. The files of the table
@@ -33,7 +33,7 @@ class Compacted:
     open_results: int = 0
 
 
-def compact(lake: Lake) -> list[Compacted]:
+def compact(lake: Lake) -> list[CompactionResult]:
     """Join small files of each table, and remove files older than a week that are not in it.
 
     A file in a table that was replaced, and a file that a process wrote before it was killed, remain for a week: a
@@ -57,7 +57,7 @@ def compact(lake: Lake) -> list[Compacted]:
     return [one for one in found if one is not None]
 
 
-def _compacted(lake: Lake, name: str) -> Compacted | None:
+def _compacted(lake: Lake, name: str) -> CompactionResult | None:
     def joined(parts: Iterator[pa.Table]) -> list[DataFile]:
         with TemporaryDirectory(prefix="livebode-") as folder, DataFileWriter(Path(folder), name, JOINED) as writer:
             for part in parts:
@@ -75,7 +75,7 @@ def _compacted(lake: Lake, name: str) -> Compacted | None:
             for group in small_files(files):
                 lake.join(name, group, joined)
         removed = lake.remove_unused(name, RETENTION_HOURS)
-        return Compacted(name, len(files), len(lake.snapshot(name).files), removed, waiting)
+        return CompactionResult(name, len(files), len(lake.snapshot(name).files), removed, waiting)
 
 
 def _open_results(lake: Lake, name: str, files: list[DataFile]) -> int:

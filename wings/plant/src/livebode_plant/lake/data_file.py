@@ -69,7 +69,7 @@ class DataFile:
 
     @property
     def sha256(self) -> str:
-        """Of its bytes, in hexadecimal digits."""
+        """SHA-256 of its bytes, in hexadecimal digits."""
         return self._parts[1]
 
     @property

@@ -126,7 +126,7 @@ class LakeRun:
         return table.filter((pc.field("output") == output) & (pc.field("input") == input))
 
     def batches(self) -> Iterator[Responses]:
-        """The same in parts of bounded size."""
+        """Responses of the run in parts of bounded size."""
         table = self._rows()
         for start in range(0, table.num_rows, _ROWS):
             yield from_wide(table.slice(start, _ROWS), self.summary["found"])

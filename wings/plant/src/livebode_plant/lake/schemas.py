@@ -33,9 +33,9 @@ def in_delta(kind: pa.DataType) -> pa.DataType:
 
 
 _KEY: Final = [("content", pa.string()), ("recipe", pa.string())]
-"""Of a result of an archive: SHA-256 of the bytes of the recording, and id of the settings."""
+"""Key of a result of an archive: SHA-256 of the bytes of the recording, and id of the settings."""
 _RUN: Final = [("day", pa.date32()), *MACHINE, ("log", pa.string()), ("run", pa.int64()), ("recipe", pa.string())]
-"""Of a result of a fleet: an axis, and a run of it in a log."""
+"""Key of a result of a fleet: an axis, and a run of it in a log."""
 _WIDE: Final = [(field.name, in_delta(field.type)) for field in wide_schema(1)]
 _WEIGHT: Final = ("weight_re", "weight_im")
 _GRID: Final = (
@@ -108,13 +108,13 @@ RESPONSES = pa.schema([*_KEY, *((field.name, in_delta(field.type)) for field in 
 Of a matrix of responses one row for each entry; output, input, condition and reason are null in all other rows."""
 
 COVARIANCE = pa.schema([*_KEY, *((field.name, in_delta(field.type)) for field in covariance_schema(1))])
-"""As covariance.parquet of a matrix run, in wide form."""
+"""Columns of covariance.parquet of a matrix run, in wide form."""
 
 PARAMETERS = pa.schema([*_KEY, *((field.name, field.type) for field in pa.schema(PARAMETER_SCHEMA))])
-"""As parameters.parquet of a run."""
+"""Columns of parameters.parquet of a run."""
 
 EVENTS = pa.schema([*_KEY, *_EVENT])
-"""As events.jsonl of a run; the details are JSON."""
+"""Columns of events.jsonl of a run; the details are JSON."""
 
 QUARANTINE = pa.schema(
     [

@@ -77,7 +77,7 @@ class Snapshot:
         return type(self)(self.table, self.columns, files, {**self.positions, **(positions or {})})
 
     def commit_properties(self, positions: Mapping[str, int] | None = None) -> CommitProperties:
-        """Of the commit that leads to this, with these new positions."""
+        """Properties of the commit that leads to this, with these new positions."""
         entry = json.dumps({"digest": self._digest, "streams": sorted(self.positions)})
         new = [Transaction(stream, at) for stream, at in (positions or {}).items()]
         return CommitProperties({_ENTRY: entry}, max_commit_retries=0, app_transactions=new)

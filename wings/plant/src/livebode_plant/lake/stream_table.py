@@ -85,7 +85,7 @@ class StreamTable:
             )
 
     def newest_first(self, columns: list[str], where: pc.Expression, since: date) -> Iterator[pa.Table]:
-        """The same file by file from the newest day on, so that a reader with little time may stop.
+        """Rows file by file from the newest day on, so that a reader with little time may stop.
 
         Raises
         ------

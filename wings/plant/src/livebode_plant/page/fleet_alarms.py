@@ -49,7 +49,7 @@ class FleetAct:
     at_s: float = 0.0
 
     def to_bytes(self) -> bytes:
-        """As JSON."""
+        """This act as JSON."""
         return json.dumps(asdict(self), ensure_ascii=False).encode()
 
     @classmethod

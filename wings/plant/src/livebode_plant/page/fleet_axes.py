@@ -104,8 +104,8 @@ class FleetAxes:
         """Row of an axis; None if it is not known."""
         return self._rows.get(path)
 
-    def take(self, messages: Sequence[bytes], now_s: float) -> None:
-        """Take the newest status of each partition from messages; those that are not valid are counted."""
+    def process(self, messages: Sequence[bytes], now_s: float) -> None:
+        """Process the newest status of each partition from messages; those that are not valid are counted."""
         newest: dict[int, PartitionStatus] = {}
         for message in messages:
             if self._repeated(message):

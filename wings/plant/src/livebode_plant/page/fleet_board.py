@@ -54,17 +54,17 @@ class FleetBoard:
         """Path of each axis, in order."""
         return [self.axes.names[row].path for row in self.axes.order]
 
-    def take(self, messages: Sequence[bytes], now_s: float) -> None:
-        """Take messages of partitions that arrived until `now_s`, seconds since 1970."""
-        self.axes.take(messages, now_s)
+    def process(self, messages: Sequence[bytes], now_s: float) -> None:
+        """Process messages of partitions that arrived until `now_s`, seconds since 1970."""
+        self.axes.process(messages, now_s)
         for row in range(self._rows_done, len(self.axes)):
             for acknowledges in (True, False):
                 if (act := self._acts.pop((self.axes.names[row].path, acknowledges), None)) is not None:
                     self.alarms.apply(act, row)
         self._rows_done = len(self.axes)
 
-    def take_act(self, data: bytes) -> None:
-        """Take an act that arrived; what is not valid is counted as dropped."""
+    def process_act(self, data: bytes) -> None:
+        """Process an act that arrived; what is not valid is counted as dropped."""
         act = FleetAct.of(data)
         if act is None:
             self.axes.dropped += 1

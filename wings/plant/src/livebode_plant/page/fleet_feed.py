@@ -8,9 +8,9 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from livebode.core import FleetError
-from livebode_plant.fleet.connecting import connected
+from livebode_plant.fleet.connection import connected
+from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.page_status import NAMES, VIEW
-from livebode_plant.fleet.settings import LogSection
 from livebode_plant.fleet.subjects import ACTS, ACTS_STREAM, VIEW_API, axis_token
 from livebode_plant.page.fleet_alarms import FleetAct
 
@@ -123,7 +123,7 @@ class NatsFeed:
         await asyncio.Event().wait()
 
     async def _ask_for_acts(self, hear_act: Hear) -> None:
-        """The same with the key of a viewer, which has no consumer: ask for the next one, again and again.
+        """Receive acts with the key of a viewer, which has no consumer: ask for the next one, again and again.
 
         nats-server 2.9.10 can end at the request for the next message of a stream that is being created, so it is asked
         first whether there is one.

@@ -70,8 +70,8 @@ class FleetView:
     def _tick(self) -> None:
         now_s, board = time.time(), self.board
         messages = [self._messages.popleft() for _ in range(len(self._messages))]
-        board.take(messages, now_s)
+        board.process(messages, now_s)
         while self._acts:
-            board.take_act(self._acts.popleft())
+            board.process_act(self._acts.popleft())
         board.refresh(now_s)
         self.pulse.beat()

@@ -134,7 +134,7 @@ class Selection:
         return not self.below or axis == self.below or axis.startswith(self.below + "/")
 
     def without(self, contents: Sequence[str]) -> Selection:
-        """The same without these recordings."""
+        """This selection without these recordings."""
         return replace(self, excluded=(*self.excluded, *contents))
 
 

@@ -71,7 +71,7 @@ class CorrelatedScatter:
         )  # fmt: skip
 
     def seen_as(self, matrix: Floats) -> CorrelatedScatter:
-        """Of other coefficients, which these are multiplied with to get them."""
+        """Scatter of other coefficients, which are the products of a matrix with these."""
         other = matrix @ self.covariance @ matrix.T
         return CorrelatedScatter(self.probability, other, self.scatter, self.correlation, self.freedom)
 
@@ -98,7 +98,7 @@ class CorrelatedScatter:
         return np.exp((mean + 1 / self.freedom - 1 / freedom) / 2), freedom
 
     def _variances(self, contrasts: Floats) -> Floats:
-        """Of each combination with each correlation, (correlations, combinations)."""
+        """Variance of each combination with each correlation, (correlations, combinations)."""
         return np.asarray(np.einsum("ci,gij,cj->gc", contrasts, self.covariance, contrasts, optimize=True))
 
 
@@ -151,7 +151,7 @@ class RobustFit:
 
     @property
     def correlation(self) -> float:
-        """Of the scatter of neighbours."""
+        """Correlation of the scatter of neighbours."""
         return self.errors.correlation
 
     def error(self, contrasts: Floats) -> Floats:

@@ -39,7 +39,7 @@ def compare_command(
     differences marked are expected to be none.
     """
     from livebode.records import to_json
-    from livebode_plant.archive.settings import lake_url
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.lake import Lake
     from livebode_plant.trending import differences
 

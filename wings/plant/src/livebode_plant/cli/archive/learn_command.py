@@ -16,8 +16,8 @@ from livebode_plant.cli.archive.options import LakeOf
 from livebode_plant.cli.archive.selection import SelectionOptions, with_selection
 
 if TYPE_CHECKING:
+    from livebode_plant.archive.archive_settings import ArchiveSettings
     from livebode_plant.archive.healthy_runs import HealthyRuns
-    from livebode_plant.archive.settings import ArchiveSettings
     from livebode_plant.lake import Lake
 
 _REFUSED = 2
@@ -60,8 +60,8 @@ def learn_command(
     """
     from livebode.cli import check_replaceable
     from livebode.records import to_json
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.archive.healthy_runs import contents_of, healthy_runs
-    from livebode_plant.archive.settings import lake_url
     from livebode_plant.lake import Lake
 
     settings = _settings(archive)
@@ -96,7 +96,7 @@ def learn_command(
 
 
 def _settings(archive: str) -> ArchiveSettings | None:
-    from livebode_plant.archive.settings import ArchiveSettings
+    from livebode_plant.archive.archive_settings import ArchiveSettings
 
     return ArchiveSettings.read(Path(archive)) if archive.lower().endswith(".toml") else None
 
@@ -114,7 +114,7 @@ def _recipe(settings: ArchiveSettings | None) -> str | None:
 
 def _files(found: Sequence[HealthyRuns], text: str | None, *, each: bool) -> list[Path]:
     """The file of each axis."""
-    from livebode_plant.archive.settings import check_baselines
+    from livebode_plant.archive.archive_settings import check_baselines
     from livebode_plant.archive.template import Template
 
     if text is None:

@@ -34,8 +34,8 @@ def list_command(
     A query has no access to files, and does not see results that are not complete.
     """
     from livebode.records import to_json
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.archive.contents import machines, quarantine
-    from livebode_plant.archive.settings import lake_url
     from livebode_plant.lake import Lake
 
     lake = Lake(lake_url(archive))

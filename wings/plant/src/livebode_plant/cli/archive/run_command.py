@@ -55,7 +55,7 @@ def run_command(
 
 def _compact(archive: str, *, as_json: bool) -> None:
     from livebode.records import to_json
-    from livebode_plant.archive.settings import lake_url
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.lake import Lake, compact
 
     found = compact(Lake(lake_url(archive)))

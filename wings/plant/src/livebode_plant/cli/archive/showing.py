@@ -15,7 +15,7 @@ from livebode.cli import console
 
 if TYPE_CHECKING:
     from livebode_plant.archive.coordinator import ArchiveOutcome, Coordinator, Progress
-    from livebode_plant.archive.results import Failed
+    from livebode_plant.archive.results import TrackingFailure
 
 _SHOWN = 10
 
@@ -63,8 +63,8 @@ class ArchiveProgress:
 
 def track(archive: Path, work: Callable[[Coordinator], ArchiveOutcome], *, as_json: bool) -> None:
     """Do this with the coordinator of an archive, and print its progress and the result."""
+    from livebode_plant.archive.archive_settings import ArchiveSettings
     from livebode_plant.archive.coordinator import Coordinator
-    from livebode_plant.archive.settings import ArchiveSettings
 
     started, settings = time.monotonic(), ArchiveSettings.read(archive)
     with ArchiveProgress(quiet=as_json) as progress:
@@ -96,9 +96,9 @@ def _show(outcome: ArchiveOutcome, lake: str, archive: str, seconds: float, *, a
         print(f"livebode: stopped; {left}the same command continues", file=sys.stderr)
 
 
-def _url(one: Failed) -> str:
+def _url(one: TrackingFailure) -> str:
     return str(one.place.url)
 
 
-def _plain(one: Failed) -> dict[str, str]:
+def _plain(one: TrackingFailure) -> dict[str, str]:
     return {"url": _url(one), "code": one.code, "sentence": one.sentence}

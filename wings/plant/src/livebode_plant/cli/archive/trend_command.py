@@ -55,7 +55,7 @@ def trend_command(
     extra `pdf`.
     """
     from livebode.records import to_json
-    from livebode_plant.archive.settings import lake_url
+    from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.cli.archive.hall_pages import write_hall_pages
     from livebode_plant.lake import Lake
     from livebode_plant.trending import assess, history

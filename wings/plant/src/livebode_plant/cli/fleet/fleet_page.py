@@ -43,7 +43,7 @@ def _log(fleet: Path) -> tuple[StatusFeed, str]:
     """The feed of a log, and its lake."""
     import asyncio
 
-    from livebode_plant.fleet.settings import FleetSettings
+    from livebode_plant.fleet.fleet_settings import FleetSettings
     from livebode_plant.page.fleet_feed import NatsFeed
 
     settings = FleetSettings.read(fleet)

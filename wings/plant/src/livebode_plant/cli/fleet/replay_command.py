@@ -14,7 +14,7 @@ from livebode_plant.cli.fleet.options import Fleet
 if TYPE_CHECKING:
     from livebode_plant.fleet.check import CheckResult
     from livebode_plant.fleet.replay import ReplayedAxis
-    from livebode_plant.fleet.settings import FleetSettings
+    from livebode_plant.fleet.fleet_settings import FleetSettings
 
 
 def replay_command(
@@ -35,7 +35,7 @@ def replay_command(
     AXIS the responses are written as a table; with [fit] its parameters, derived quantities and margins are in a second
     one, FILE-parameters.parquet.
     """
-    from livebode_plant.fleet.settings import FleetSettings
+    from livebode_plant.fleet.fleet_settings import FleetSettings
 
     settings = FleetSettings.read(fleet)
     if axis is None:

@@ -55,8 +55,8 @@ def _run(fleet: Path, *, as_json: bool) -> None:
 
     from livebode.cli import warnings_shown
     from livebode_plant.fleet.coordinator import FleetCoordinator
+    from livebode_plant.fleet.fleet_settings import FleetSettings
     from livebode_plant.fleet.log import FleetLog
-    from livebode_plant.fleet.settings import FleetSettings
 
     settings = FleetSettings.read(fleet)
     axes = settings.read_axes()

@@ -29,7 +29,7 @@ def send_command(
     from livebode.records import to_json
     from livebode.sources.live import make_source
     from livebode_plant.fleet.edge import edge_buffers, send_sources
-    from livebode_plant.fleet.settings import FleetSettings, machine_key
+    from livebode_plant.fleet.fleet_settings import FleetSettings, machine_key
 
     settings = FleetSettings.read(fleet)
     axes = ConfigurationFile(axis, {}).read()

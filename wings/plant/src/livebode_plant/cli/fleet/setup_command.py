@@ -11,7 +11,7 @@ from livebode.cli import Json
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
-    from livebode_plant.fleet.settings import FleetSettings
+    from livebode_plant.fleet.fleet_settings import FleetSettings
 
 _USERS = ("edge:PATH", "fleet", "view")
 
@@ -60,7 +60,7 @@ def setup_command(
         _write_key(user or "", out, as_json=as_json)
         return
     from livebode_plant.fleet.server_config import leaf_configuration
-    from livebode_plant.fleet.settings import FleetSettings
+    from livebode_plant.fleet.fleet_settings import FleetSettings
 
     settings = FleetSettings.read(fleet)
     at = {"host": host, "port": port}

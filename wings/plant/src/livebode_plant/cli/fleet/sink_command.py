@@ -24,8 +24,8 @@ def sink_command(
     import asyncio
 
     from livebode.records import to_json
+    from livebode_plant.fleet.fleet_settings import FleetSettings
     from livebode_plant.fleet.log import FleetLog
-    from livebode_plant.fleet.settings import FleetSettings
     from livebode_plant.fleet.sink import Sink
     from livebode_plant.fleet.sink_tables import SinkTotals
 

@@ -61,8 +61,8 @@ def _print_status(fleet: Path, *, as_json: bool) -> None:
     import asyncio
 
     from livebode.records import to_json
+    from livebode_plant.fleet.fleet_settings import FleetSettings
     from livebode_plant.fleet.log import FleetLog
-    from livebode_plant.fleet.settings import FleetSettings
     from livebode_plant.fleet.status import fleet_status
 
     settings = FleetSettings.read(fleet)

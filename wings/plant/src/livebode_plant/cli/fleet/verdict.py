@@ -19,7 +19,7 @@ def verdict(result: CheckResult) -> str:
 
 
 def _others(count: int, what: str, missing: int, unexpected: int) -> str:
-    """The same of what many fleets have none of."""
+    """Words about what many fleets have none of."""
     if not (count or unexpected):
         return ""
     return f"; {count:,} {what}: {missing} missing, {unexpected} doubled or different"

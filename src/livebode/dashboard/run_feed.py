@@ -20,7 +20,7 @@ _MEANS = 2000
 _RECENT_S = 600.0
 
 
-class Viewed:
+class RunFeed:
     """Passes the responses, parameters and events of a run directory, or of an entry of a matrix run, to a State."""
 
     def __init__(self, directory: Path, entry: str | None = None) -> None:
@@ -41,11 +41,11 @@ class Viewed:
         self.begin(state)
         if not self.fill_from_means(state):
             for part in self._run.batches():
-                self.take(state, part)
+                self.pass_new(state, part)
         self.rest(state)
 
     def begin(self, state: State) -> None:
-        """Start the run of the state; its responses follow by `take`, and then everything else by `rest`."""
+        """Start the run of the state; its responses follow by `pass_new`, and then everything else by `rest`."""
         state.begin(self.directory, self._run.summary)
 
     def fill_from_means(self, state: State) -> bool:
@@ -63,7 +63,7 @@ class Viewed:
         count = sum(segment.rows for segment in segments) // each
         count += int(np.count_nonzero(newest.time_s > newest_s))
         self._sample, self._last_s = int(newest.sample[-1]), float(newest.time_s[-1])
-        state.take_past(first, means, newest, count)
+        state.add_past(first, means, newest, count)
         return True
 
     def more(self) -> tuple[list[Item], list[tuple[str, str, str, TrendRows]], dict[str, Any], bool]:
@@ -79,7 +79,7 @@ class Viewed:
         """Pass parameters and events."""
         for model, name, unit, rows in self._parameters(None):
             state.trends.add(model, [name], [unit], rows)
-        state.take(list(self._new_events()))
+        state.add(list(self._new_events()))
         state.finished = self._run.finished
         state.read()
 
@@ -94,10 +94,10 @@ class Viewed:
         self._damages = self._run.damages
         return new
 
-    def take(self, state: State, part: Responses) -> None:
+    def pass_new(self, state: State, part: Responses) -> None:
         """Pass responses that are new."""
         if (new := self._new(part)) is not None:
-            state.take([new])
+            state.add([new])
 
     def _new(self, part: Responses) -> Responses | None:
         behind = np.flatnonzero(part.sample > self._sample)

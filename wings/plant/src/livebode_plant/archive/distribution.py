@@ -15,9 +15,9 @@ from distributed.client import ClosedClientError, FutureCancelledError
 
 from livebode.core import ArchiveError
 from livebode_plant.archive.clusters import Cluster
-from livebode_plant.archive.grouping import RecordingGroups, Sized
+from livebode_plant.archive.groups import RecordingGroups, SizedItem
 
-S = TypeVar("S", bound=Sized)
+S = TypeVar("S", bound=SizedItem)
 R = TypeVar("R")
 
 _IN_FLIGHT = 2

@@ -265,7 +265,7 @@ class FleetSettings(SettingsSection):
         return found
 
     def beside(self, folder: Path) -> FleetSettings:
-        """The same with relative paths from `folder`."""
+        """These settings with relative paths from `folder`."""
         tls = ("certificate", "key", "authority")
         return self.model_copy(
             update={

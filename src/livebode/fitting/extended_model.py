@@ -34,7 +34,7 @@ WORDS = {
 
 
 @dataclass(frozen=True)
-class Extended(PhysicalModel):
+class ExtendedModel(PhysicalModel):
     """A model G and some of: a lag behind it, G/(1 + s·lag); a further mode, G + mode_gain·s/(s² + 2ζωs + ω²); the
     compliance of modes above the band, the same with ω at three times the highest line.
 
@@ -53,7 +53,7 @@ class Extended(PhysicalModel):
     Examples
     --------
     >>> from livebode.fitting import TwoMass
-    >>> Extended(TwoMass(), ("lag",), 120.0).names[-2:]
+    >>> ExtendedModel(TwoMass(), ("lag",), 120.0).names[-2:]
     ('delay', 'lag')
     """
 

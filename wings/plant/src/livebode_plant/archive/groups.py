@@ -10,14 +10,14 @@ _GROUP_S = (0.2, 10.0)
 _PER_WORKER = 4
 
 
-class Sized(Protocol):
+class SizedItem(Protocol):
     """What is processed: its length and nothing else is known before."""
 
     @property
     def size_bytes(self) -> int: ...
 
 
-S = TypeVar("S", bound=Sized)
+S = TypeVar("S", bound=SizedItem)
 
 
 class RecordingGroups(Generic[S]):
@@ -62,5 +62,5 @@ class RecordingGroups(Generic[S]):
         return size_bytes * self._done_s / self._done_bytes if self._done_bytes else 0.0
 
 
-def _size(item: Sized) -> int:
+def _size(item: SizedItem) -> int:
     return max(item.size_bytes, 1)

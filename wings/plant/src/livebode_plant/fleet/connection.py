@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.core import FleetError, not_installed
 from livebode_plant.fleet.credentials import checked_credentials
-from livebode_plant.fleet.settings import LogSection
+from livebode_plant.fleet.fleet_settings import LogSection
 
 if TYPE_CHECKING:
     from nats.aio.client import Client

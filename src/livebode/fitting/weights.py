@@ -54,7 +54,7 @@ def misfit(measured: Measured, response: Complex, dof: Floats, noise_dof: Floats
 
 
 def misfit_by(rest: Floats, noise: Floats, variance: Floats, noise_dof: Floats, use: NDArray[np.bool_]) -> Floats:
-    """The same from |residual|², the share of noise in v, and v, (rows, lines)."""
+    """Misfit from |residual|², the share of noise in v, and v, (rows, lines)."""
     with np.errstate(all="ignore"):
         n = np.minimum(noise_dof[:, np.newaxis] / (noise / variance) ** 2, _MANY)
         n = np.where(np.isfinite(n), n, _MANY)

@@ -17,7 +17,7 @@ NEAR = 0.5
 """A stamp within half a period of the time at which the next sample is due belongs to that sample."""
 
 
-class Numbered:
+class StampNumbers:
     """Turns stamped samples into Batches: the number is the stamp times the rate, rounded.
 
     A stamp that differs from the due time by less than half of its batch continues the stream, so that jitter causes

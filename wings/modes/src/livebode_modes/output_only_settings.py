@@ -119,7 +119,7 @@ class OutputOnlySettings:
         return max(self.band_hz[0] / 2, self.band_hz[1] / 100)
 
     def found(self) -> dict[str, Any]:
-        """As plain data for a record."""
+        """Plain data for a record."""
         return {
             "rate_hz": self.rate_hz,
             "outputs": list(self.outputs),

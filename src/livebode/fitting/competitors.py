@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import OK
-from livebode.fitting.extended import BEYOND, LAG, MODE, RESIDUAL, START_DAMPING, Extended
+from livebode.fitting.extended_model import BEYOND, LAG, MODE, RESIDUAL, START_DAMPING, ExtendedModel
 from livebode.fitting.physical import DELAY, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FittedRows, fit_rows
-from livebode.fitting.weighing import misfit, weights
+from livebode.fitting.weights import misfit, weights
 
 _TAKEN = 3  # at most
 _FRICTION_PRICE = 2.5  # required decrease of −2·ln(likelihood): 1.6 sigma, because every machine has some
@@ -45,7 +45,7 @@ class Competitor:
 
 
 @dataclass(frozen=True)
-class Allowed:
+class AllowedChanges:
     """Permitted changes by competitors: no parameter fixed by the user, and a delay only if it is not free already."""
 
     fixed: Set[str]
@@ -53,7 +53,7 @@ class Allowed:
     top_hz: float
 
 
-def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: Allowed) -> list[Competitor]:
+def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: AllowedChanges) -> list[Competitor]:
     """The model that explains one row best, then all others that were fitted.
 
     Starting with the specified model, the best of all models that differ by one step is selected as long as the cost
@@ -118,7 +118,7 @@ def positive(matrix: Floats) -> Floats:
     return np.asarray((vectors * values.clip(0)) @ vectors.T * np.outer(scale, scale))
 
 
-def _rivals(of: Competitor, measured: Measured, noise_dof: Floats, allowed: Allowed) -> Iterator[Competitor]:
+def _rivals(of: Competitor, measured: Measured, noise_dof: Floats, allowed: AllowedChanges) -> Iterator[Competitor]:
     for name, problem, starts in _steps(of, measured, allowed):
         if 2 * np.count_nonzero(measured.use) <= problem.size:
             continue
@@ -129,7 +129,7 @@ def _rivals(of: Competitor, measured: Measured, noise_dof: Floats, allowed: Allo
 
 
 def _less(of: Competitor, measured: Measured, noise_dof: Floats) -> Iterator[Competitor]:
-    """The same without one of its earlier additions, such as a delay that approximated a mode."""
+    """The competitor without one of its earlier additions, such as a delay that approximated a mode."""
     for i, name in enumerate(of.taken[:-1]):
         if name in of.problem.model.names and name not in of.problem.held and name not in (LAG, MODE, RESIDUAL):
             problem = of.problem.variant(held={name: 0.0})
@@ -138,7 +138,7 @@ def _less(of: Competitor, measured: Measured, noise_dof: Floats) -> Iterator[Com
                 yield competitor(problem, measured, noise_dof, fitted, of.taken[:i] + of.taken[i + 1 :])
 
 
-def _steps(of: Competitor, measured: Measured, allowed: Allowed) -> Iterator[tuple[str, Problem, Floats]]:
+def _steps(of: Competitor, measured: Measured, allowed: AllowedChanges) -> Iterator[tuple[str, Problem, Floats]]:
     """Name, problem and starts (starts, parameters) of each."""
     problem, at = of.problem, of.fitted.ended[0]
     for name in (DELAY, *problem.model.frictions):
@@ -147,9 +147,9 @@ def _steps(of: Competitor, measured: Measured, allowed: Allowed) -> Iterator[tup
             begun = at if name == DELAY else _only(at, wider.model.shown(at, problem.grid), wider, name)
             yield name, wider, begun[np.newaxis]
     model = problem.model
-    base, extras = (model.base, model.extras) if isinstance(model, Extended) else (model, ())
+    base, extras = (model.base, model.extras) if isinstance(model, ExtendedModel) else (model, ())
     if LAG not in extras:
-        lagging = Extended(base, (*extras, LAG), allowed.top_hz)
+        lagging = ExtendedModel(base, (*extras, LAG), allowed.top_hz)
         begun = _padded(lagging, problem.model, at)
         yield LAG, problem.variant(lagging), begun[np.newaxis]
         if allowed.delay and DELAY in model.names and DELAY not in problem.held:
@@ -160,9 +160,9 @@ def _steps(of: Competitor, measured: Measured, allowed: Allowed) -> Iterator[tup
             yield LAG, instead, begun[np.newaxis]
     if hasattr(base, "output") and not {RESIDUAL, MODE} & set(extras):
         if BEYOND * allowed.top_hz < _NEAR_NYQUIST * problem.grid.rate_hz / 2:
-            stiff = problem.variant(Extended(base, (*extras, RESIDUAL), allowed.top_hz))
+            stiff = problem.variant(ExtendedModel(base, (*extras, RESIDUAL), allowed.top_hz))
             yield RESIDUAL, stiff, _padded(stiff.model, model, at)[np.newaxis]
-        moving = problem.variant(Extended(base, (*extras, MODE), allowed.top_hz))
+        moving = problem.variant(ExtendedModel(base, (*extras, MODE), allowed.top_hz))
         starts = _mode_starts(moving, problem, measured, of.fitted)
         yield MODE, moving, starts
         # Far above the band its damping has no visible effect.
@@ -237,10 +237,10 @@ def _best_start(problem: Problem, measured: Measured, fitted: FittedRows, starts
     return found.values[[int(np.argmin(cost))]]
 
 
-def _possible(problem: Problem, fitted: FittedRows, allowed: Allowed) -> bool:
+def _possible(problem: Problem, fitted: FittedRows, allowed: AllowedChanges) -> bool:
     """Whether its mode is separate from the model's own, and a free delay, if any, is one that logging can cause."""
     model = problem.model
-    if isinstance(model, Extended) and MODE in model.extras:
+    if isinstance(model, ExtendedModel) and MODE in model.extras:
         own = len(model.base.names)
         base = Problem(model.base, problem.grid)
         if _near_own(base, fitted.values[:, :own], fitted.values[:, model.names.index("mode")]).any():
