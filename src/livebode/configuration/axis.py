@@ -137,7 +137,10 @@ class Axis(ConfigurationSection):
         if axis.source.replay is not None:
             check_keys(axis.source, "replay")
         try:
-            (check_matrix if axis.signals.is_matrix else check_no_matrix)(axis)
+            if axis.signals.is_matrix:
+                check_matrix(axis)
+            else:
+                check_no_matrix(axis.experiments, axis.loop, axis.monitoring)
         except ConfigError as error:
             raise error.at(origin) from None
         if axis.output_only is not None:

@@ -11,7 +11,9 @@ from livebode.core import ConfigError, Lines, Model
 
 if TYPE_CHECKING:
     from livebode.configuration.axis import Axis
+    from livebode.configuration.experiments_section import ExperimentsSection
     from livebode.configuration.loop_section import ControllerSection, LoopSection
+    from livebode.configuration.monitoring_section import MonitoringSection
     from livebode.mimo import MatrixLoop, MatrixSettings
 
 _USED = {
@@ -26,12 +28,12 @@ _OTHER_RUNS = ("fit", "motion", "output_only")
 _ESTIMATORS = ("direct", "joint", "indirect")
 
 
-def check_no_matrix(axis: Axis) -> None:
+def check_no_matrix(experiments: ExperimentsSection | None, loop: LoopSection, monitoring: MonitoringSection) -> None:
     """ConfigError if an axis with a single response sets what only a matrix has."""
-    unused = ["experiments"] if axis.experiments is not None else []
-    if axis.loop.controllers:
+    unused = ["experiments"] if experiments is not None else []
+    if loop.controllers:
         unused.append("loop.controllers")
-    if axis.monitoring.gantry is not None:
+    if monitoring.gantry is not None:
         unused.append("monitoring.gantry")
     if unused:
         raise ConfigError(
