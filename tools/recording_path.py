@@ -18,8 +18,6 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from livebode.interface import write_examples
-
 ROOT = Path(__file__).parents[1]
 _DEPTH = 3
 """Levels of attributes, lists and dictionaries in which the name is looked for."""
@@ -40,6 +38,8 @@ class RunTrace:
 
 def traced_run() -> RunTrace:
     """Trace of a run of an example, in a process and a directory of its own."""
+    from livebode.interface import write_examples  # not above: the process of the trace loads only what the run needs
+
     with tempfile.TemporaryDirectory() as folder:
         write_examples(["standstill"], Path(folder))
         options = ["--excitation", "w", "--input", "u", "--output", "velocity", "--average", "--out", f"{folder}/run"]

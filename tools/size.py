@@ -71,6 +71,20 @@ def past_faces() -> list[tuple[str, str]]:
     return [(module, other) for module, other in imports() if other not in (package(other), "livebode.sources.live")]
 
 
+def single_importers() -> list[str]:
+    """Modules that only one other module imports, of their own package, and no face or table names."""
+    named = {line.split()[1] for root in roots().values() for stub in root.rglob("*.pyi") for line in _imports_in(stub)}
+    text = "\n".join(path.read_text(encoding="utf-8") for root in roots().values() for path in root.rglob("*.py"))
+    importers = {module: graph().find_modules_that_directly_import(module) for module in sorted(graph().modules)}
+    alone = {module: next(iter(others)) for module, others in importers.items() if len(others) == 1}
+    own = [module for module, other in alone.items() if package(module) == package(other)]
+    return [module for module in own if module not in named and f"{module}:" not in text]
+
+
+def _imports_in(stub: Path) -> list[str]:
+    return [line for line in stub.read_text(encoding="utf-8").splitlines() if line.startswith("from ")]
+
+
 def import_depth() -> int:
     """Modules of the longest chain of imports; those of a circle count once."""
     above = {module: graph().find_upstream_modules(module) for module in graph().modules}
@@ -133,6 +147,7 @@ def figures(measured: dict[str, Size], trace: RunTrace) -> dict[str, str]:
         f"{sum(size.files for size in hull):,} / {len(hull) - 1}",
         "hull and wings: lines": f"{sum(size.lines for size in measured.values()):,}",
         "import depth": f"{import_depth()}",
+        "modules with a single importer, of their own package": f"{len(single_importers())}",
         "imports past a face": f"{len(past_faces())} of {len(imports())} ({len(past_faces()) / len(imports()):.0%})",
         "commands / options": f"{commands} / {options}",
         "README: lines": f"{(ROOT / 'README.md').read_text(encoding='utf-8').count(chr(10))}",

@@ -73,7 +73,7 @@ def run_targets(
     place = Path("runs") / target.stem if out is None else location(out)
     segments = live or any(axis.record is not None for axis in axes.values())
     with recorded_at(place, segments=segments) as (directory, send):
-        entries = {name or target.stem: axis.entries for name, axis in axes.items()}
+        entries = {name or target.stem: axis.entries for name, axis in axes.items()} if serve else {}
         if serve and alone is not None and rule(alone.kind, "page") is None:
             raise UsageError(
                 "conflict",

@@ -26,21 +26,21 @@ def open_recording(axis: Axis) -> Log:
 
 def open_even_or_uneven(axis: Axis) -> Log:
     """The same; a Log that is not `even` if the clock of the output jitters, or other channels have other clocks."""
-    source, signals = axis.source, axis.signals
-    (path,) = source.logs
+    signals, reading = axis.signals, _reading(axis)
+    (path,) = axis.source.logs
     named = [signals.excitation, signals.input, signals.output, signals.schedule, *axis.monitoring.covariates]
     if axis.tracking.estimator == "direct":
         named = [signals.input, *named]
     names = list(dict.fromkeys(name for name in named if name))
     with local_copy(path):
         try:
-            log = open_recording(axis)
+            log = open_log(path, channels=signals.listed("output"), **reading)
             log.check_clocks(names)
             return log
         except RecordingError as error:
-            if error.code not in UNEVEN or source.time == "none":
+            if error.code not in UNEVEN or reading["time"] == "none":
                 raise
-        return sources.open_uneven(path, names, **_reading(axis))
+        return sources.open_uneven(path, names, **reading)
 
 
 def with_shared_names(axis: Axis, log: Log) -> Axis:

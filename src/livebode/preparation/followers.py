@@ -76,7 +76,8 @@ def make_settings(axis: Axis, log: Log) -> Settings:
         from livebode.preparation.nonperiodic import nonperiodic_settings  # loads the method of local polynomials
 
         return nonperiodic_settings(axis, log)
-    return settings_of(axis, log.rate_hz, make_lines(axis, log))
+    lines = make_lines(axis, log)
+    return settings_of(axis, log.rate_hz, lines)
 
 
 def check_spectra(axis: Axis, layout: SpectraLayout, rate_hz: float) -> Lines:

@@ -43,6 +43,7 @@ from livebode.records.piece import StoredTable
 from livebode.records.response_table import EARLIER, RESPONSE_SCHEMA, responses_in
 from livebode.records.segments import event_lines, reading
 from livebode.records.segments.damage import KIND
+from livebode.records.segments.json_lines import EVENTS
 from livebode.records.segments.manifest import NAME as MANIFEST
 from livebode.records.segments.manifest import Manifest, Segment
 from livebode.records.summary_file import COPY, RUN, copy_damage, read_summary
@@ -434,7 +435,7 @@ class RunRecord:
         unfinished = not self.finished and reading.in_segments(self.path)
         commit = reading.newest_commit(self.path) if unfinished else None
         if commit is None:
-            return self._event_lines(self.summary.get("size_bytes", {}).get(event_lines.NAME, 0)), []
+            return self._event_lines(self.summary.get("size_bytes", {}).get(EVENTS, 0)), []
         waiting = [event for value in commit.waiting if (event := event_lines.to_event(value)) is not None]
         return self._event_lines(commit.events_bytes), waiting
 
@@ -442,12 +443,12 @@ class RunRecord:
         try:
             yield from event_lines.events(self.path, self.report, finished=self.finished, least_bytes=least_bytes)
         except OSError as error:
-            raise _unreadable(self.path / event_lines.NAME, error) from None
+            raise _unreadable(self.path / EVENTS, error) from None
 
     def each_event_and_damage(self) -> Iterator[Event]:
         """The same, followed by other damage found so far."""
         yield from self.each_event()
-        yield from (damage for damage in self.damages if damage.details.get("file") != event_lines.NAME)
+        yield from (damage for damage in self.damages if damage.details.get("file") != EVENTS)
 
 
 def _unreadable(path: Path, error: Exception) -> RecordError:

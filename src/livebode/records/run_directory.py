@@ -12,8 +12,7 @@ from typing import Any
 from livebode.core import Event, RecordError, whole_directory, writing
 from livebode.records._result_rows import RESPONSE_TABLES, result_rows
 from livebode.records.removal import check_removable, remove
-from livebode.records.segments.event_lines import NAME as EVENTS
-from livebode.records.segments.json_lines import to_line
+from livebode.records.segments.json_lines import EVENTS, to_line
 from livebode.records.segments.lock import Lock
 from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table_file import ColumnTable, TableFile

@@ -34,11 +34,12 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
         If `control` ends a recording before its end; the directory is as for an error.
     """
     control, started = control or RunControl(), time.perf_counter()
+    kind = axis.kind
     if axis.source.live:
         from livebode.runtime.live import run_live
 
         return run_live(axis, to, control)
-    of: ExaminedRecording = rule(axis.kind, "recording")(axis, to)
+    of: ExaminedRecording = rule(kind, "recording")(axis, to)
     about = {"configuration": of.axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": of.found}
     about |= provenance(of.axis, of.digests)
     feed = Feed(of.source, control, noticed=of.noticed, recorded=of.recorded, started=started)

@@ -107,7 +107,7 @@ FORMATS = (
     Format("Parquet", (".parquet", ".pq"), _begins(b"PAR1"), _own("parquet:open_parquet")),
     Format("Arrow", (".arrow", ".feather", ".ipc"), _begins(ARROW_MAGIC), _own("arrow:open_arrow")),
     Format("MATLAB", (".mat",), _begins(b"MATLAB 5.0 MAT-file"), _own("matlab:MatlabRecording")),
-    Format("MATLAB 7.3", (".mat",), lambda head: head[512:].startswith(HDF5_MAGIC), _own("matlab73:Matlab73Recording")),
+    Format("MATLAB 7.3", (".mat",), lambda head: head[512:].startswith(HDF5_MAGIC), _own("hdf5:Matlab73Recording")),
     Format("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), _begins(HDF5_MAGIC), _own("hdf5:Hdf5Recording")),
     Format("NPZ", (".npz",), _begins(b"PK\x03\x04"), _own("npz:NpzRecording")),
     Format("TDMS", (".tdms",), _begins(b"TDSm"), _own("tdms:TdmsRecording")),

@@ -12,9 +12,8 @@ from livebode.core import Event
 from livebode.language import Message
 from livebode.records.inside import open_read
 from livebode.records.segments.damage import KIND
-from livebode.records.segments.json_lines import in_line
+from livebode.records.segments.json_lines import EVENTS, in_line
 
-NAME = "events.jsonl"
 _LINE_BYTES_MAX = 1 << 20
 
 
@@ -30,7 +29,7 @@ def events(run: Path, report: Callable[[Event], None], *, finished: bool, least_
         If the file cannot be read.
     """
     sample, time_s, number, length = 0, 0.0, 0, 0
-    with open_read(run, NAME) as file:
+    with open_read(run, EVENTS) as file:
         while line := file.readline(_LINE_BYTES_MAX):
             number, start, length = number + 1, length, length + len(line)
             whole = line.endswith(b"\n")
@@ -48,7 +47,7 @@ def events(run: Path, report: Callable[[Event], None], *, finished: bool, least_
                     message = Message(
                         "line {line} of {file} is damaged: {what} are not read",
                         line=number,
-                        file=NAME,
+                        file=EVENTS,
                         what=_bytes(value),
                     )
                     event = Event(KIND, sample, time_s, message)
@@ -65,7 +64,7 @@ def end_missing(lost_bytes: int, sample: int, time_s: float) -> Event:
     """The damage of a file that is shorter than it was."""
     message = Message(
         "{file} is damaged: its last {missing_bytes} bytes, the newest events, are missing",
-        file=NAME,
+        file=EVENTS,
         missing_bytes=lost_bytes,
     )
     return Event(KIND, sample, time_s, message)
@@ -73,7 +72,7 @@ def end_missing(lost_bytes: int, sample: int, time_s: float) -> Event:
 
 def ends_line(run: Path) -> bool:
     """Whether the last byte is the end of a line."""
-    with open_read(run, NAME) as file:
+    with open_read(run, EVENTS) as file:
         file.seek(-1, os.SEEK_END)
         return file.read() == b"\n"
 

@@ -10,6 +10,8 @@ from typing import Any
 
 from livebode.records.json_format import to_json
 
+EVENTS = "events.jsonl"
+"""The events of a run, one on each line."""
 _KEY = ', "crc32": "'
 _END = re.compile(rb', "crc32": "[0-9a-f]{8}"\}')
 

@@ -27,7 +27,7 @@ from livebode.sources.units import split_unit
 def _recording(given: Any) -> Location:
     if not isinstance(given, str | Path | Url):
         raise PydanticCustomError("location", "input is not a valid path or URL")
-    return location(given)
+    return location(given) if isinstance(given, str) else given
 
 
 def _plain_recording(value: Any, info: SerializationInfo) -> Any:

@@ -13,8 +13,8 @@ from livebode_plant.cli.fleet.options import Fleet
 
 if TYPE_CHECKING:
     from livebode_plant.fleet.check import CheckResult
-    from livebode_plant.fleet.replay import ReplayedAxis
     from livebode_plant.fleet.fleet_settings import FleetSettings
+    from livebode_plant.fleet.replay import ReplayedAxis
 
 
 def replay_command(

@@ -59,8 +59,8 @@ def setup_command(
     if fleet is None:
         _write_key(user or "", out, as_json=as_json)
         return
-    from livebode_plant.fleet.server_config import leaf_configuration
     from livebode_plant.fleet.fleet_settings import FleetSettings
+    from livebode_plant.fleet.server_config import leaf_configuration
 
     settings = FleetSettings.read(fleet)
     at = {"host": host, "port": port}
