@@ -1,4 +1,4 @@
-"""The kinds of estimates, and the rules of each: what processes, records, draws, shows, reports and exports it.
+"""The kinds of estimates, and the rules of each: what checks, processes, draws, shows, reports, fits and exports it.
 
 A rule is named as "module:name" and loaded when it is used. A kind that lacks a rule does not offer that.
 """

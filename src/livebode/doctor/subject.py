@@ -115,8 +115,8 @@ def _problem_of(axis: Axis) -> LivebodeError | None:
     try:
         if axis.monitoring.baseline is not None:
             rule(axis.kind, "baseline").load(axis.monitoring.baseline)
-        if axis.monitoring.gantry is not None:
-            rule(axis.kind, "machine")(axis.monitoring.gantry)
+            if axis.monitoring.gantry is not None:
+                rule(axis.kind, "machine")(axis.monitoring.gantry)
         if axis.source.url is not None and axis.source.rate_hz is not None:
             live_follower(axis, axis.source.rate_hz)
     except LivebodeError as error:
