@@ -6,8 +6,14 @@ from livebode.analysis._changes import QuantityChange as QuantityChange
 from livebode.analysis._changes import changes as changes
 from livebode.analysis._changes import percent as percent
 from livebode.analysis._loop_report import LoopReport as LoopReport
-from livebode.analysis._loop_report import loop_of_run as loop_of_run
 from livebode.analysis._loop_report import loop_report as loop_report
+from livebode.analysis._margins import CONTRADICTED as CONTRADICTED
+from livebode.analysis._margins import MARGIN_NAMES as MARGIN_NAMES
+from livebode.analysis._margins import MARGIN_WORDS as MARGIN_WORDS
+from livebode.analysis._margins import Margins as Margins
+from livebode.analysis._margins import against_lines as against_lines
+from livebode.analysis._margins import peak_sensitivity_at_lines as peak_sensitivity_at_lines
+from livebode.analysis._margins import worst as worst
 from livebode.analysis.acceptance import Accepted as Accepted
 from livebode.analysis.acceptance import LimitEvidence as LimitEvidence
 from livebode.analysis.acceptance import accepted as accepted
@@ -27,8 +33,11 @@ from livebode.analysis.learning import learnable_axis as learnable_axis
 from livebode.analysis.learning import reads_recordings as reads_recordings
 from livebode.analysis.loop_verdict import CheckedLoop as CheckedLoop
 from livebode.analysis.loop_verdict import checked_loop as checked_loop
+from livebode.analysis.margin_reading import margins as margins
 from livebode.analysis.matrices import fit_matrix_run as fit_matrix_run
 from livebode.analysis.matrices import read_gantry as read_gantry
+from livebode.analysis.open_loop import OpenLoop as OpenLoop
+from livebode.analysis.open_loop import stable as stable
 from livebode.analysis.overview import LIVE_VALUES_MAX as LIVE_VALUES_MAX
 from livebode.analysis.overview import Overview as Overview
 from livebode.analysis.parameter_track import MARGINS as MARGINS
@@ -47,4 +56,6 @@ from livebode.analysis.run_trend import fitted_rows as fitted_rows
 from livebode.analysis.run_trend import trend_points as trend_points
 from livebode.analysis.table import Analysis as Analysis
 from livebode.analysis.table import ModelTest as ModelTest
+from livebode.analysis.table import loop_section as loop_section
 from livebode.analysis.table import model_test as model_test
+from livebode.analysis.table import proposed_filter as proposed_filter

@@ -7,13 +7,15 @@ from math import hypot, isfinite
 
 import numpy as np
 
+from livebode.analysis._margins import Margins, against_lines
 from livebode.analysis.difference import ALPHA, Compared
 from livebode.analysis.fits import fit_averaged
+from livebode.analysis.margin_reading import margins
+from livebode.analysis.open_loop import OpenLoop
 from livebode.configuration import FitSection, LoopSection, recorded_configuration
 from livebode.core import LivebodeError, normal_quantile
 from livebode.fitting import Fit
 from livebode.language import Message
-from livebode.margins import Margins, OpenLoop, against_lines, margins
 
 
 @dataclass(frozen=True)

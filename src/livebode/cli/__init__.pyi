@@ -16,6 +16,7 @@ from livebode.cli.options import Time as Time
 from livebode.cli.options import To as To
 from livebode.cli.picture_support import can_draw as can_draw
 from livebode.cli.picture_support import tell_how_to_draw as tell_how_to_draw
+from livebode.cli.pictures import margins_in_short as margins_in_short
 from livebode.cli.pictures import one_drawing_at_a_time as one_drawing_at_a_time
 from livebode.cli.query_result import Csv as Csv
 from livebode.cli.query_result import RowsMax as RowsMax

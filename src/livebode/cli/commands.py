@@ -76,10 +76,6 @@ COMMANDS: Mapping[str, Command] = {
         "Write the responses, the fitted parameters or the model over the position in a format of other programs.",
         "livebode.cli.export_command:export_command",
     ),
-    "margins": Command(
-        "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.",
-        "livebode.cli.margins_command:margins_command",
-    ),
     "learn": Command(
         "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",
         "livebode.cli.learn_command:learn_command",

@@ -32,6 +32,7 @@ from livebode.core._unit_reading import split_plant_unit as split_plant_unit
 from livebode.core._wording import counted as counted
 from livebode.core._wording import plural as plural
 from livebode.core._wording import rounded_down as rounded_down
+from livebode.core._wording import with_bound as with_bound
 from livebode.core.clock import ClockKind as ClockKind
 from livebode.core.clock import RunClock as RunClock
 from livebode.core.clock import clock_kind_of as clock_kind_of

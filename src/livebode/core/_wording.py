@@ -1,4 +1,8 @@
-"""Counts and remedies in sentences."""
+"""Counts, numbers and remedies in sentences."""
+
+from math import floor, isfinite, log10
+
+from livebode.language import number, tr
 
 
 def counted(count: int, what: str = "response") -> str:
@@ -25,3 +29,20 @@ def rounded_down(value: float) -> float:
     """
     near = float(f"{value:.4g}")
     return near if near <= value else float(f"{value * (1 - 5e-4):.4g}")
+
+
+def with_bound(value: float, bound: float) -> tuple[str, str]:
+    """Value and bound, rounded to two significant digits of the bound.
+
+    >>> with_bound(501234.5, 1234.5), with_bound(0.0028, 1.2e-5), with_bound(3.0, float("nan"))
+    (('501200', '1200'), ('0.002800', '0.000012'), ('3', 'not known'))
+    """
+    if not isfinite(value):
+        return "—", "—"
+    if not isfinite(bound) or bound <= 0:
+        return number(value, ".5g"), tr("fixed") if bound == 0 else tr("not known")
+    digits = 1 - floor(log10(bound))
+    if abs(value) >= 1e7 or digits > 9:
+        return number(value, ".5g"), number(bound, ".2g")
+    places = f".{max(digits, 0)}f"
+    return number(round(value, digits), places), number(round(bound, digits), places)

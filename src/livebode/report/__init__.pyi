@@ -12,9 +12,6 @@ from livebode.report.canvas import written as written
 from livebode.report.excitation import excitation_figure as excitation_figure
 from livebode.report.excitation import save_excitation_picture as save_excitation_picture
 from livebode.report.html import to_html as to_html
-from livebode.report.loop import loop_figure as loop_figure
-from livebode.report.loop import round_numbers as round_numbers
-from livebode.report.loop import save_loop_picture as save_loop_picture
 from livebode.report.matrix import matrix_figure as matrix_figure
 from livebode.report.matrix import save_matrix_pictures as save_matrix_pictures
 from livebode.report.matrix import singular_values_figure as singular_values_figure

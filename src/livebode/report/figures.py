@@ -21,7 +21,6 @@ _FIGURES: Mapping[str, tuple[str, str, bool]] = {
     "bode": ("livebode.report.bode:bode_figure", Message("Average response"), False),
     "tracking": ("livebode.report.tracking:tracking_figure", Message("Magnitude over time"), True),
     "parameters": ("livebode.report.parameters:parameters_figure", "", False),
-    "loop": ("livebode.report.loop:loop_figure", Message("Open loop"), True),
     "matrix": ("livebode.report.matrix:matrix_figure", Message("Matrix of responses"), True),
     "singular values": ("livebode.report.matrix:singular_values_figure", Message("Singular values"), False),
     "comparison": ("livebode.report.comparison:comparison_figure", "", False),

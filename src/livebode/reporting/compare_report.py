@@ -15,7 +15,7 @@ import numpy as np
 
 from livebode.analysis import ALPHA, Averaged, Changes, Compared, Difference, QuantityChange, changes, compare, percent
 from livebode.configuration import ReportSection, recorded_configuration, recorded_report
-from livebode.core import TONES, Document, Finding, Paragraph, Part, Picture, PrintedTable, Section
+from livebode.core import TONES, Document, Finding, Paragraph, Part, Picture, PrintedTable, Section, with_bound
 from livebode.estimates import kind_of, rule
 from livebode.language import Message, number, recorded, tr, trn, worded
 from livebode.records import RunRecord, event_counts, read_summary
@@ -23,7 +23,7 @@ from livebode.reporting import first_page
 from livebode.reporting.comparison_verdict import detectable, verdict
 from livebode.reporting.limits import limits
 from livebode.reporting.report_data import entry_title, read, written
-from livebode.reporting.wording import BOUND_95, decibels, pairs, polar, polar_phrase, signed, with_bound
+from livebode.reporting.wording import BOUND_95, decibels, pairs, polar, polar_phrase, signed
 
 TONES_OF_A_COMPARISON = {**TONES, "ok": Message("no difference shown")}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40

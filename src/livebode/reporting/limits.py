@@ -7,9 +7,8 @@ from math import ceil, isfinite, isinf
 
 from livebode.analysis import Accepted
 from livebode.configuration import MAGNITUDES, LimitSection
-from livebode.core import TONES, Finding, Paragraph, PrintedTable, Section
+from livebode.core import TONES, Finding, Paragraph, PrintedTable, Section, with_bound
 from livebode.language import Message, number, tr, trn, worded
-from livebode.reporting.wording import with_bound
 
 _WORDS = {
     "resonance_hz": Message("resonance"), "resonance_damping": Message("resonance damping"),

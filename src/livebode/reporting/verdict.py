@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import isfinite
 
-from livebode.analysis import MARGINS, failed
+from livebode.analysis import MARGINS, failed, worst
 from livebode.core import Finding, Tone
 from livebode.language import listed, number, tr, trn, worded
-from livebode.margins import worst
 from livebode.records import RunRecord
 from livebode.reporting.alarms import alarms
 from livebode.reporting.report_data import ReportData, RunData

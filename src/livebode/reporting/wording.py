@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import floor, isfinite, log10
+from math import isfinite, log10
 from typing import Any
 
 import numpy as np
@@ -44,23 +44,6 @@ def duration(of_s: float) -> str:
     minutes, rest = divmod(round(of_s), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes} min {rest} s" if hours else f"{minutes} min {rest} s"
-
-
-def with_bound(value: float, bound: float) -> tuple[str, str]:
-    """Value and bound, rounded to two significant digits of the bound.
-
-    >>> with_bound(501234.5, 1234.5), with_bound(0.0028, 1.2e-5), with_bound(3.0, float("nan"))
-    (('501200', '1200'), ('0.002800', '0.000012'), ('3', 'not known'))
-    """
-    if not isfinite(value):
-        return "—", "—"
-    if not isfinite(bound) or bound <= 0:
-        return number(value, ".5g"), tr("fixed") if bound == 0 else tr("not known")
-    digits = 1 - floor(log10(bound))
-    if abs(value) >= 1e7 or digits > 9:
-        return number(value, ".5g"), number(bound, ".2g")
-    places = f".{max(digits, 0)}f"
-    return number(round(value, digits), places), number(round(bound, digits), places)
 
 
 def decibels(size: float) -> float:

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis import plain_fit
+from livebode.analysis import OpenLoop, against_lines, margins, plain_fit
 from livebode.configuration import FitSection, chosen_model, fitter_of
 from livebode.core import Event, Loop, Parameters, PlantKinds, Responses, Stage, decode, encode
 from livebode.fitting import Fit, Fitter, best_of, fit_of
-from livebode.margins import OpenLoop, against_lines, margins
 
 _STAGE = Stage("fits", 1)
 _NUMBERS = ("value", "covariance", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis import loop_report
+from livebode.analysis import loop_report, proposed_filter
 from livebode.core import ENCODING, Lines, PlantKinds, Responses, moment
 from livebode.estimation import Follower
 from livebode.fitting import Drift, Fit, RecordingsMean
@@ -99,5 +99,6 @@ def fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[
     summary = {"fit": fits.summary(newest)}
     if newest is not None and fits.loop is not None:
         words = f"newest fit, at {moment(newest.parameters.time_s[0], 2)}"
-        summary["loop"] = loop_report(newest, words, responses, fits.loop).plain()
+        report = loop_report(newest, words, responses, fits.loop)
+        summary["loop"] = report.plain(proposed_filter(report))
     return summary

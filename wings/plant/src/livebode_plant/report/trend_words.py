@@ -6,9 +6,9 @@ from math import isfinite
 
 import numpy as np
 
+from livebode.core import with_bound
 from livebode.language import listed, number, tr, trn, worded
 from livebode.report import labelled
-from livebode.reporting import with_bound
 from livebode_plant.report.year import Year, day
 from livebode_plant.trending import LOGARITHMIC, ChangePoint, History, Ranked, Trend
 

@@ -63,7 +63,7 @@ def compare_command(
 def _print_table(found: Sequence[LevelDifference]) -> None:
     from rich.table import Table
 
-    from livebode.reporting import with_bound
+    from livebode.core import with_bound
 
     table = Table(box=None, pad_edge=False)
     for column in _COLUMNS:
