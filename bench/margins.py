@@ -10,8 +10,9 @@ from dataclasses import replace
 import control
 import numpy as np
 
+from livebode.analysis import margins
 from livebode.fitting import TwoMass
-from livebode.margins import margins, tuning
+from livebode_control.tuning.filter_proposal import tuning
 from tools.loops import BELT, Case, parameters
 
 CASE = Case(BELT, gain=3 * 0.2308, delay_ticks=8)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode import PID, Lines, Loop, Responses, TuneError
-from livebode.margins import stable
+from livebode.analysis import stable
 from livebode.simulation import Friction, Mechanics, Sampled, Spans, linear
 from livebode_control.tuning import ControllerProposal, LoopSpecification, PredictedMargins, tune
 from livebode_control.tuning.predicted import predicted

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode import PID, Lines, TuneError
-from livebode.margins import Biquad
 from livebode.simulation import Sampled
 from livebode_control.tuning import tune
+from livebode_control.tuning.filters import Biquad
 from livebode_control.tuning.predicted_steps import predicted_steps
 from studies.result import Table, Verdict
 from studies.tune import LIMITS, LINES, RATE_HZ, machines, measured, show

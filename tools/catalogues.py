@@ -22,12 +22,12 @@ from babel.messages.catalog import Catalog, Message
 from babel.messages.extract import extract
 from babel.messages.pofile import read_po, write_po
 
+from livebode.analysis import MARGIN_NAMES as MARGINS
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.estimation.verdicts import KINDS as DOUBTS
 from livebode.fitting import model_named
 from livebode.fitting.extended_model import LAG, MODE, RESIDUAL, ExtendedModel
 from livebode.fitting.models import MODELS
-from livebode.margins._margins import NAMES as MARGINS
 from livebode.monitoring import ALARMS, RETURNS, UNMONITORED
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.runtime.event_groups import CAUSES

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import control
 import numpy as np
 
+from livebode.analysis import OpenLoop
 from livebode.core import PID, Cascade, Loop, Parameters
 from livebode.fitting import TwoMass
-from livebode.margins import OpenLoop
 
 RADIUS_M = 0.019
 MODEL = TwoMass(radius_m=RADIUS_M)

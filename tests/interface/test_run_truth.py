@@ -12,8 +12,8 @@ import pytest
 
 import livebode
 from livebode import ConfigError, Loop, OutputError, RecordError, Run, UsageError
+from livebode.analysis import MARGIN_NAMES as NAMES
 from livebode.fitting import mean_response
-from livebode.margins._margins import NAMES
 from livebode.records import to_json
 from tests.support.command import livebode as command
 from tests.support.errors import refused

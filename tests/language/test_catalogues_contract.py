@@ -9,6 +9,8 @@ from functools import cache
 
 import pytest
 
+from livebode.analysis import MARGIN_NAMES as MARGINS
+from livebode.analysis import MARGIN_WORDS
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.fitting import model_named
 from livebode.fitting.extended_model import WORDS as EFFECTS
@@ -16,8 +18,6 @@ from livebode.fitting.extended_model import ExtendedModel
 from livebode.fitting.models import MODELS
 from livebode.fitting.rows import SENTENCES as FITS
 from livebode.language import available
-from livebode.margins import WORDS as MARGIN_WORDS
-from livebode.margins._margins import NAMES as MARGINS
 from livebode.monitoring import ALARMS, RETURNS
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import WHAT

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from livebode.analysis import Margins, margins
 from livebode.core import Lines, Responses
-from livebode.margins import Margins, margins
 from tools.loops import Case, parameters
 
 LINES = Lines.parse("20:140:5", rate_hz=4000, window=800)

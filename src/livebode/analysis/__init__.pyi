@@ -4,8 +4,14 @@ from livebode.analysis._averaged import Overview as Overview
 from livebode.analysis._averaged import averaged as averaged
 from livebode.analysis._averaged import mean_of as mean_of
 from livebode.analysis._loop_report import LoopReport as LoopReport
-from livebode.analysis._loop_report import loop_of_run as loop_of_run
 from livebode.analysis._loop_report import loop_report as loop_report
+from livebode.analysis._margins import CONTRADICTED as CONTRADICTED
+from livebode.analysis._margins import MARGIN_NAMES as MARGIN_NAMES
+from livebode.analysis._margins import MARGIN_WORDS as MARGIN_WORDS
+from livebode.analysis._margins import Margins as Margins
+from livebode.analysis._margins import against_lines as against_lines
+from livebode.analysis._margins import peak_sensitivity_at_lines as peak_sensitivity_at_lines
+from livebode.analysis._margins import worst as worst
 from livebode.analysis.fits import fit_averaged as fit_averaged
 from livebode.analysis.fits import fit_remarks as fit_remarks
 from livebode.analysis.fits import fit_run as fit_run
@@ -17,6 +23,9 @@ from livebode.analysis.learning import learnable_axis as learnable_axis
 from livebode.analysis.learning import reads_recordings as reads_recordings
 from livebode.analysis.loop_verdict import CheckedLoop as CheckedLoop
 from livebode.analysis.loop_verdict import checked_loop as checked_loop
+from livebode.analysis.margin_reading import margins as margins
+from livebode.analysis.open_loop import OpenLoop as OpenLoop
+from livebode.analysis.open_loop import stable as stable
 from livebode.analysis.place_fits import by_place as by_place
 from livebode.analysis.place_fits import lpv_model as lpv_model
 from livebode.analysis.place_fits import modes_by_place as modes_by_place
@@ -30,4 +39,6 @@ from livebode.analysis.run_trend import fitted_rows as fitted_rows
 from livebode.analysis.run_trend import trend_points as trend_points
 from livebode.analysis.table import Analysis as Analysis
 from livebode.analysis.table import ModelTest as ModelTest
+from livebode.analysis.table import loop_section as loop_section
 from livebode.analysis.table import model_test as model_test
+from livebode.analysis.table import proposed_filter as proposed_filter

@@ -1,32 +1,18 @@
-"""The loop of a run: its margins, also over the schedule, and a proposal that increases them."""
+"""The loop of a run: its margins, also over the schedule."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
-from livebode.analysis.fits import fit_run
-from livebode.analysis.loop_verdict import NOT_CHECKED, CheckedLoop, checked_loop
+from livebode.analysis._margins import CONTRADICTED, Margins, against_lines, peak_sensitivity_at_lines, worst
+from livebode.analysis.loop_verdict import NOT_CHECKED, CheckedLoop
+from livebode.analysis.margin_reading import margins
+from livebode.analysis.open_loop import OpenLoop
 from livebode.analysis.place_fits import by_place
-from livebode.configuration import Axis, FitSection, LoopSection, recorded_configuration
 from livebode.core import FitError, Loop, Parameters, Responses
 from livebode.fitting import Fit, Fitter, mean_response
 from livebode.language import Message
-from livebode.margins import (
-    CONTRADICTED,
-    Margins,
-    OpenLoop,
-    Tuning,
-    against_lines,
-    margins,
-    peak_sensitivity_at_lines,
-    tuning,
-    worst,
-)
-from livebode.records import RunRecord
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +29,8 @@ class LoopReport:
         One row, of `fit`.
     at_lines
         Largest |S| at a line with its bound, and that line in Hz: known without a model.
-    places
-        Margins over the schedule, if the run has one; else the same as `margins`.
-    tuning
-        Proposed change, judged over the places.
+    places, fits
+        Margins over the schedule, if the run has one, and the fits that they are of; else the same as `margins`.
     responses
         Measured response, one row.
     checked
@@ -59,7 +43,7 @@ class LoopReport:
     margins: Margins
     at_lines: tuple[float, float, float]
     places: Margins
-    tuning: Tuning
+    fits: Parameters
     responses: Responses
     checked: CheckedLoop = NOT_CHECKED
 
@@ -83,8 +67,8 @@ class LoopReport:
             else Message("{why}; check the loop's description and the fit", why=Message(status))
         )
 
-    def plain(self) -> dict[str, Any]:
-        """For JSON."""
+    def plain(self, tuning: dict[str, Any] | None) -> dict[str, Any]:
+        """For JSON, with the proposed filter, if one was looked for."""
         bound = self.margins.bound()[0]
         found = {
             name: {
@@ -106,42 +90,12 @@ class LoopReport:
             "peak_sensitivity_at_lines": {"at_least": size, "bound": around, "frequency_hz": at_hz},
             "places": len(self.places),
             "worst_over_places": worst(self.places),
-            "tuning": self.tuning.plain(),
+            **({} if tuning is None else {"tuning": tuning}),
             "loop_check": asdict(self.checked),
         }
 
 
-def loop_of_run(
-    directory: Path,
-    section: FitSection | None = None,
-    axis: Axis | None = None,
-    peak_sensitivity: float = 2.0,
-    entry: str | None = None,
-) -> LoopReport:
-    """The report of a finished run; loop and model are from `axis` and `section`, else from its configuration.
-
-    Of a matrix run that of one `entry`, with the controller between its output and its input; all other loops are open.
-
-    Raises
-    ------
-    UsageError
-        If the loop's feedback is missing.
-    FitError
-        If no model could be fitted.
-    """
-    run = RunRecord.open(directory, entry=entry)
-    own_words = recorded_configuration(run.summary)
-    loop = axis.loop if axis is not None else LoopSection.model_validate(own_words.get("loop", {}))
-    if section is None:
-        own = axis.fit if axis is not None else None
-        section = own or FitSection.model_validate(own_words.get("fit", {}))
-    found, words = fit_run(directory, section, entry)
-    responses = Responses.join(list(run.steady_batches()))  # the fitted responses
-    report = loop_report(found, words, responses, loop.build(responses.lines.rate_hz), peak_sensitivity)
-    return replace(report, checked=checked_loop(directory, loop, run.selected))
-
-
-def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sensitivity: float = 2.0) -> LoopReport:
+def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop) -> LoopReport:
     """The report of a fit and of its responses."""
     if fit.status != "ok":
         raise FitError(
@@ -168,21 +122,6 @@ def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sen
         margins=every[-1:],
         at_lines=tuple(float(x[0]) for x in peak_sensitivity_at_lines(fitted_to, loop)),  # type: ignore[arg-type]
         places=every,
-        tuning=_tuned(fits, every, around, fit.band_hz, peak_sensitivity),
+        fits=fits,
         responses=mean,
     )
-
-
-def _tuned(
-    fits: Parameters, read: Margins, loop: OpenLoop, band_hz: tuple[float, float], peak_sensitivity: float
-) -> Tuning:
-    """A filter from the fits; none if the lines contradict one of them."""
-    if wrong := int(np.count_nonzero(read.status == CONTRADICTED)):
-        sentence = Message(
-            "the lines contradict {wrong} of {count} fits: a filter cannot be judged with such a model",
-            wrong=wrong,
-            count=len(read),
-        )
-        return Tuning("refused", sentence, read)
-    rate_hz = getattr(getattr(loop.loop.feedback, "velocity", loop.loop.feedback), "rate_hz", None)
-    return tuning(fits, loop, band_hz, controller_rate_hz=rate_hz, peak_sensitivity=peak_sensitivity)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
-from livebode.core import Finding, Section, UsageError
+from livebode.analysis._loop_report import LoopReport
+from livebode.core import Finding, Part, Section, UsageError
+from livebode.language import tr
 from livebode.plugins import loaded, named
 
 
@@ -20,6 +22,11 @@ class Analysis(NamedTuple):
     section
         Section of the report, from the file that the analysis left in the run directory. Called with the directory and,
         of a matrix run, the entry; returns a `Section`, or the reason why there is none. Empty: not in the report.
+    filter
+        Proposed filter for the loop of a run, for its run.json. Called with the `LoopReport`; returns data for JSON.
+    loop
+        Section of the report on the margins of the described loop. Called with the `LoopReport` and the parts that show
+        the margins over time.
     test
         Test of the run's model on independent data, for `livebode report --on`. Called with the run directory and the
         recording; returns a `ModelTest`.
@@ -29,8 +36,28 @@ class Analysis(NamedTuple):
 
     function: str
     section: str = ""
+    filter: str = ""
+    loop: str = ""
     test: str = ""
     trial: str = ""
+
+
+def proposed_filter(loop: LoopReport) -> dict[str, Any] | None:
+    """The filter for a loop, of the first analysis that proposes filters; None if there is none."""
+    for analysis in named("analyses").values():
+        if analysis.filter:
+            found: dict[str, Any] = loaded(analysis.filter)(loop)
+            return found
+    return None
+
+
+def loop_section(loop: LoopReport, over_time: Sequence[Part]) -> Section | str:
+    """The section of the report on the margins of a loop, of the first analysis that has one, or why there is none."""
+    for analysis in named("analyses").values():
+        if analysis.loop:
+            found: Section = loaded(analysis.loop)(loop, over_time)
+            return found
+    return tr("No margins: the wing control is not installed.")
 
 
 class ModelTest(Protocol):

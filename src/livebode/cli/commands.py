@@ -81,11 +81,6 @@ COMMANDS: Mapping[str, Command] = {
         "livebode.cli.export_command:export_command",
         panel=RESULTS,
     ),
-    "margins": Command(
-        "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.",
-        "livebode.cli.margins_command:margins_command",
-        panel=CONTROL,
-    ),
     "learn": Command(
         "Learn a baseline from runs of the healthy machine, for `livebode run --baseline`.",
         "livebode.cli.learn_command:learn_command",

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis import Overview
+from livebode.analysis import Overview, peak_sensitivity_at_lines
 from livebode.configuration import recorded_configuration
 from livebode.core import Event, LivebodeError, Quantity, Responses, RunClock
 from livebode.dashboard.alarm import AlarmShelf
@@ -29,7 +29,6 @@ from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses
 from livebode.dashboard.trends import Trends
 from livebode.language import for_page
-from livebode.margins import peak_sensitivity_at_lines
 from livebode.records import RunRecord, to_json
 from livebode.runtime import RunControl
 

@@ -8,7 +8,7 @@ from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
-from livebode.analysis import Averaged, averaged, fit_averaged, loop_report
+from livebode.analysis import Averaged, Margins, averaged, fit_averaged, loop_report
 from livebode.configuration import Axis, FitSection, MachineSection, recorded_configuration, recorded_loop
 from livebode.core import (
     Event,
@@ -26,7 +26,6 @@ from livebode.core import (
 )
 from livebode.fitting import Fit
 from livebode.locations import Url, local_copy, location, shared_copy
-from livebode.margins import Margins
 from livebode.pictures import plot_responses
 from livebode.plugins import loaded, named
 from livebode.records import PARAMETERS, RunRecord

@@ -150,7 +150,7 @@ class MarginGrid(NamedTuple):
 
 
 class MarginRows(NamedTuple):
-    """Margins in the order of `livebode.margins.NAMES`, shape (rows, 6), and stable rows (rows,); NaN in the others."""
+    """Margins in the order of `analysis.MARGIN_NAMES`, shape (rows, 6), and stable rows (rows,); else NaN."""
 
     value: Floats
     sigma: Floats

@@ -19,9 +19,6 @@ from livebode.pictures.curves import circular as circular
 from livebode.pictures.curves import near as near
 from livebode.pictures.curves import quantiles as quantiles
 from livebode.pictures.curves import unwrapped as unwrapped
-from livebode.pictures.loop import loop_figure as loop_figure
-from livebode.pictures.loop import round_numbers as round_numbers
-from livebode.pictures.loop import save_loop_picture as save_loop_picture
 from livebode.pictures.map import frequency_edges as frequency_edges
 from livebode.pictures.matrix import matrix_figure as matrix_figure
 from livebode.pictures.matrix import save_matrix_pictures as save_matrix_pictures

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis import loop_report, plain_fit
+from livebode.analysis import OpenLoop, against_lines, loop_report, margins, plain_fit, proposed_filter
 from livebode.configuration import FitSection, chosen_model, fitter_of
 from livebode.core import Event, Loop, Parameters, PlantKinds, Responses, Stage, decode, encode, moment
 from livebode.fitting import Fit, Fitter, best_of, fit_of
-from livebode.margins import OpenLoop, against_lines, margins
 
 _STAGE = Stage("fits", 1)
 _NUMBERS = ("value", "covariance", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
@@ -123,7 +122,8 @@ class Fits:
         found = {"fit": self.summary(newest)}
         if newest is not None and self.loop is not None:
             words = f"newest fit, at {moment(newest.parameters.time_s[0], 2)}"
-            found["loop"] = loop_report(newest, words, responses, self.loop).plain()
+            report = loop_report(newest, words, responses, self.loop)
+            found["loop"] = report.plain(proposed_filter(report))
         return found
 
     def summary(self, newest: Fit | None) -> dict[str, Any]:

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.analysis import Margins, OpenLoop, margins
 from livebode.core import Block, Responses
 from livebode.fitting import EvaluationGrid, Fit, fit
-from livebode.margins import Margins, OpenLoop, margins
-from livebode.pictures import save_loop_picture
+from livebode_control.margins.loop_picture import save_loop_picture
 from livebode_control.validation.validation import validate
 from livebode_control.validation.validation_picture import save_validation_picture
 from tests.support.belt_loops import LINES, responses_of

@@ -11,12 +11,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.analysis import loop_of_run
+from livebode.analysis import margins
 from livebode.fitting import mean_response
-from livebode.margins import margins
 from livebode.records import RunRecord
 from livebode.records.summary_file import to_document
 from livebode.simulation.two_mass_loop import RATE_HZ
+from livebode_control.margins.loop_margins import margins_of_run
 from tests.support.belt_loops import read
 from tests.support.command import livebode
 from tests.support.loop_runs import AXIS, LINES, record
@@ -121,7 +121,7 @@ def test_a_true_model_passes_on_fresh_data_and_a_wrong_one_does_not(run: Path) -
 def test_margins_leave_out_the_transient_that_the_run_names(run: Path, tmp_path: Path) -> None:
     left_out = shutil.copytree(run, tmp_path / "run") / "run.json"
     left_out.write_bytes(to_document(RunRecord.open(run).summary | {"left_out_samples": 5 * LINES.window}))
-    found, every = loop_of_run(left_out.parent).responses, mean_response(RunRecord.open(run).responses())
+    found, every = margins_of_run(left_out.parent).report.responses, mean_response(RunRecord.open(run).responses())
     assert np.array_equal(found.value, mean_response(RunRecord.open(left_out.parent).steady_batches()).value)
     assert not np.any(found.value == every.value)
 

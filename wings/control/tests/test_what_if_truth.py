@@ -1,4 +1,4 @@
-"""The sliders of "What if" agree with livebode.margins, livebode_control.tuning and python-control."""
+"""The sliders of "What if" agree with livebode.analysis, livebode_control.tuning and python-control."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ import pytest
 from numpy.typing import ArrayLike
 from playwright.sync_api import Browser, Route
 
-from livebode.analysis import by_place
+from livebode.analysis import by_place, stable
 from livebode.configuration import LoopSection
 from livebode.core import PID, Algebra, Cascade, Model, Responses
 from livebode.dashboard import Dashboard, Serving
-from livebode.margins import Biquad, low_pass, notch, stable
 from livebode.records import RunRecord
 from livebode_control.tuning import LoopSpecification
+from livebode_control.tuning.filters import Biquad, low_pass, notch
 from livebode_control.tuning.plant_band import PlantBand
 from livebode_control.tuning.predicted import predicted
 from livebode_control.tuning.predicted_steps import predicted_steps

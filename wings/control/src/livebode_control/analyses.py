@@ -7,6 +7,11 @@ from collections.abc import Mapping
 from livebode.analysis import Analysis
 
 ANALYSES: Mapping[str, Analysis] = {
+    "margins": Analysis(
+        "livebode_control.run_analyses:loop_margins",
+        filter="livebode_control.margins.loop_margins:plain_filter",
+        loop="livebode_control.margins.section:loop_section",
+    ),
     "loop-check": Analysis("livebode_control.run_analyses:loop_check"),
     "proposal": Analysis(
         "livebode_control.run_analyses:proposal",

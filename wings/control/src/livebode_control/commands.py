@@ -7,6 +7,10 @@ from collections.abc import Mapping
 from livebode.cli import COMPARE, CONTROL, Command
 
 COMMANDS: Mapping[str, Command] = {
+    "margins": Command(
+        "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.",
+        "livebode_control.margins.margins_command:margins_command",
+    ),
     "check-loop": Command(
         "Compare the described controllers with the recorded signals: as described, or the change that explains them.",
         "livebode_control.loop_check.check_loop_command:check_loop_command",

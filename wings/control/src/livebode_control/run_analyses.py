@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from livebode.configuration import OrdersSection
 from livebode_control.loop_check.loop_check import LoopCheck
 from livebode_control.loop_check.run_loop_check import check_loop_of_run
+from livebode_control.margins.loop_margins import LoopMargins, margins_of_run
 from livebode_control.proposal.tune_report import tune_run
 from livebode_control.strokes.friction import FrictionReport, friction_of
 from livebode_control.strokes.motion_samples import read_strokes
@@ -17,6 +18,11 @@ from livebode_control.validation.section import ValidationReport, validation_rep
 
 if TYPE_CHECKING:
     from livebode import Run
+
+
+def loop_margins(run: Run, **options: Any) -> LoopMargins:
+    """Margins of the run's loop with the filter that increases them; `options` are those of `margins_of_run`."""
+    return margins_of_run(Path(run.path), **options)
 
 
 def loop_check(run: Run, **channels: str) -> LoopCheck:

@@ -7,12 +7,11 @@ from math import hypot, isfinite
 
 import numpy as np
 
-from livebode.analysis import fit_averaged
+from livebode.analysis import Margins, OpenLoop, against_lines, fit_averaged, margins
 from livebode.configuration import FitSection, LoopSection, recorded_configuration
 from livebode.core import LivebodeError, normal_quantile
 from livebode.fitting import Fit
 from livebode.language import Message
-from livebode.margins import Margins, OpenLoop, against_lines, margins
 from livebode_reports.difference import ALPHA, Compared
 
 

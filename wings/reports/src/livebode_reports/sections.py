@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from math import isfinite, isinf, isnan
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from livebode.analysis import MARGINS, LoopReport
+from livebode.analysis import MARGINS, loop_section
 from livebode.core import Listing, Paragraph, Part, Picture, PrintedTable, Section, moment, with_bound
 from livebode.fitting import Fit
 from livebode.language import Message, listed, number, tr, worded
-from livebode.margins import WORDS
 from livebode_reports.events import alarms
 from livebode_reports.parameter_track import Track
 from livebode_reports.report_data import ReportData, RunData, by_schedule
@@ -140,51 +139,10 @@ def margins(of: ReportData) -> Section | str:
         return of.loop_words
     if of.loop.message:
         return tr("No margins: {why}.", why=worded(of.loop.message))
-    found = of.loop.margins
-    bound = found.bound()[0]
-    rows = []
-    for i, (name, unit) in enumerate(zip(found.names, found.units)):
-        value, at = found.value[0, i], found.frequency_hz[0, i]
-        if isnan(at):
-            size = tr("any amount") if isinf(value) else tr("none")
-            rows.append((worded(WORDS[name]), size, "", worded(unit), "", tr("no crossing")))
-            continue
-        between = found.place[0, i] == "interpolated"
-        mark = tr("between the lines") if between else tr("EXTRAPOLATED: no line checks it")
-        rows.append((worded(WORDS[name]), *with_bound(value, bound[i]), worded(unit), number(at, ".4g"), mark))
-    headings = (tr("margin"), tr("value"), "±", tr("unit"), tr("at Hz"), tr("range"))
-    table = PrintedTable(headings, tuple(rows), (1, 2, 4), _about_margins(of.loop, of.fit))
-    caption = tr(
-        "Open loop L of the fit with its 95 % band, and the measured lines. Right: near −1, with the circle of Ms."
-    )
-    parts: list[Part] = [table, Picture("loop", {"found": of.loop}, caption)]
+    over_time: list[Part] = []
     if MARGINS in of.tracks and _moving(of.tracks[MARGINS]):
-        parts.append(_over_time(of, of.tracks[MARGINS], tr("Margins")))
-    return Section(tr("Margins of the loop"), tuple(parts))
-
-
-def _about_margins(loop: LoopReport, fit: Fit | None) -> str:
-    size, around, at_hz = loop.at_lines
-    about = "" if fit is None else tr("Of the fit: {bounds}. ", bounds=worded(fit.about_bounds))
-    return about + tr(
-        "From the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} (at {at:g} Hz). Tuning "
-        "{verdict}: {sentence}",
-        size=size, around=around, at=at_hz, verdict=worded(loop.tuning.verdict),
-        sentence=worded(loop.tuning.sentence),
-    ) + " " + _about_description(loop)  # fmt: skip
-
-
-def _about_description(loop: LoopReport) -> str:
-    """Whether the margins are of a loop whose description was checked."""
-    if loop.checked.verdict == "not checked":
-        return tr("The description of the controllers was not compared with the signals (livebode check-loop).")
-    if loop.checked.verdict == "as described":
-        return tr("The description of the controllers was compared with the signals: the loop is as described.")
-    return tr(
-        "The description of the controllers was compared with the signals and does not fit, so the margins are wrong: "
-        "{what}.",
-        what=loop.checked.sentence,
-    )
+        over_time.append(_over_time(of, of.tracks[MARGINS], tr("Margins")))
+    return loop_section(of.loop, over_time)
 
 
 def events(of: RunData) -> Section:

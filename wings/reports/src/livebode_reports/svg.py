@@ -95,7 +95,6 @@ _FIGURES: Mapping[str, tuple[str, str, bool]] = {
     "bode": ("livebode.pictures:bode_figure", Message("Average response"), False),
     "tracking": ("livebode.pictures:tracking_figure", Message("Magnitude over time"), True),
     "parameters": ("livebode_reports.parameters:parameters_figure", "", False),
-    "loop": ("livebode.pictures:loop_figure", Message("Open loop"), True),
     "matrix": ("livebode.pictures:matrix_figure", Message("Matrix of responses"), True),
     "singular values": ("livebode.pictures:singular_values_figure", Message("Singular values"), False),
     "comparison": ("livebode_reports.comparison:comparison_figure", "", False),

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import isfinite
 
-from livebode.analysis import MARGINS
+from livebode.analysis import MARGINS, worst
 from livebode.core import Finding, Tone
 from livebode.language import listed, number, tr, trn, worded
-from livebode.margins import worst
 from livebode.records import RunRecord
 from livebode_reports.events import alarms
 from livebode_reports.parameter_track import failed

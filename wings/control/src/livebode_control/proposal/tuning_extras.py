@@ -10,7 +10,8 @@ import numpy as np
 
 from livebode.core import Model
 from livebode.language import number, tr
-from livebode.pictures import Style, plain, round_numbers
+from livebode.pictures import Style, plain
+from livebode_control.margins.loop_picture import round_numbers
 from livebode_control.strokes.friction_picture import labelled, speed_unit
 from livebode_control.tuning import ControllerProposal
 from livebode_control.tuning.feedforward import Feedforward

@@ -11,7 +11,8 @@ import numpy as np
 from livebode.arrays import Complex, Floats
 from livebode.core import Model
 from livebode.language import number, tr
-from livebode.pictures import Style, drawing, heading, new_figure, plain, round_numbers, save, style
+from livebode.pictures import Style, drawing, heading, new_figure, plain, save, style
+from livebode_control.margins.loop_picture import round_numbers
 from livebode_control.proposal.tuning_extras import extra_panels
 from livebode_control.tuning import ControllerProposal
 from livebode_control.tuning.feedforward import Feedforward

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import Algebra, Model, UsageError
-from livebode.margins import Biquad, low_pass, notch
 from livebode_control.tuning.feedback_parts import FeedbackParts
+from livebode_control.tuning.filters import Biquad, low_pass, notch
 
 _NOTCHES_MAX = 4
 _SIZE = (1e-12, 1e12)  # of a gain or a time

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from livebode.analysis import stable
 from livebode.arrays import Floats
 from livebode.core import Model, TuneError
-from livebode.margins import stable
 from livebode_control.tuning.plant_band import PlantBand
 from livebode_control.tuning.predicted_steps import PredictedStep, predicted_steps
 from livebode_control.tuning.problem import TuningProblem

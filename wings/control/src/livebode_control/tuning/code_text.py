@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from math import isfinite, pi
 
 from livebode.core import PID, Cascade, UsageError
-from livebode.margins import Biquad
+from livebode_control.tuning.filters import Biquad
 from livebode_control.tuning.structure import TunedFeedback
 
 
 def c_header(biquads: Sequence[Biquad]) -> str:
     """A C99 header with the coefficients and a function that computes one filter.
 
-    >>> from livebode.margins import notch
+    >>> from livebode_control.tuning.filters import notch
     >>> print(c_header([notch(60.0, 20.0, 0.5, 4000.0)]).splitlines()[0])
     /* Filters in series with the velocity controller, 4000 Hz. y = b0 x + b1 x1 + b2 x2 - a1 y1 - a2 y2. */
     """
@@ -36,7 +36,7 @@ def c_header(biquads: Sequence[Biquad]) -> str:
 def structured_text(biquads: Sequence[Biquad]) -> str:
     """A function block in Structured Text (TwinCAT, IEC 61131-3), called once in each cycle of the velocity controller.
 
-    >>> from livebode.margins import notch
+    >>> from livebode_control.tuning.filters import notch
     >>> print(structured_text([notch(60.0, 20.0, 0.5, 4000.0)]).splitlines()[0])
     FUNCTION_BLOCK FB_LivebodeFilters
     """

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.analysis import stable
 from livebode.arrays import Complex, Floats
-from livebode.margins import stable
 from livebode_control.tuning.clearance import ForbiddenRegion
 from livebode_control.tuning.plant_band import PlantBand
 from livebode_control.tuning.predicted import gain_margin_db, phase_margin_deg

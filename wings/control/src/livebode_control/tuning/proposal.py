@@ -231,7 +231,7 @@ def margins_of(plant: PlantBand, feedback: Model, share: float) -> PredictedMarg
 
 def _stable_margins(plant: PlantBand, loop: Loop, share: float) -> PredictedMargins | None:
     """Margins of the described loop; None where the measured plant makes it unstable."""
-    from livebode.margins import stable
+    from livebode.analysis import stable
 
     feedback = loop.feedback
     assert feedback is not None

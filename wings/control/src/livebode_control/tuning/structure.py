@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import PID, Cascade, Model, PositionPD, TuneError, integral
-from livebode.margins import Biquad, low_pass, notch
+from livebode_control.tuning.filters import Biquad, low_pass, notch
 
 _NOTCH_MOVES = log(1.25)  # of its centre, in each direction
 _DAMPING = (0.05, 1.5)
@@ -198,7 +198,7 @@ class FeedbackStructure:
         return value["gain"] * law
 
     def _notch(self, value: dict[str, float], number: int, slopes: Complex) -> Complex:
-        """That of `livebode.margins.notch`, as a function of tan(πf/rate)."""
+        """That of `livebode_control.tuning.filters.notch`, as a function of tan(πf/rate)."""
         at, depth, damping = (value[f"notch{number}_{name}"] for name in ("frequency", "depth", "damping"))
         v, dv = self._warped(at)
         above, below = 1 - v**2 + 2j * depth * damping * v, 1 - v**2 + 2j * damping * v

@@ -8,12 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from livebode.analysis import MARGIN_NAMES, Margins, OpenLoop, margins, worst
 from livebode.core import FitError, Parameters, UsageError
 from livebode.language import Message
-from livebode.margins._margins import NAMES, Margins
-from livebode.margins.filters import Biquad, low_pass, notch_over
-from livebode.margins.open_loop import OpenLoop
-from livebode.margins.reading import margins
+from livebode_control.tuning.filters import Biquad, low_pass, notch_over
 
 Verdict = Literal["none needed", "suggested", "refused"]
 
@@ -136,7 +134,7 @@ def tuning(
         )
     rows = _spread(fits)
     before = margins(rows, loop, band_hz)
-    ms, bound = before.of("peak_sensitivity"), before.bound()[:, NAMES.index("peak_sensitivity")]
+    ms, bound = before.of("peak_sensitivity"), before.bound()[:, MARGIN_NAMES.index("peak_sensitivity")]
     if not before.ok.all():
         return Tuning(
             "refused",
@@ -199,20 +197,8 @@ def largest_ms(found: Margins) -> float:
     """Over the rows, with its 95 % bound; infinite where a row is unstable."""
     if not found.ok.all():
         return float("inf")
-    at = NAMES.index("peak_sensitivity")
+    at = MARGIN_NAMES.index("peak_sensitivity")
     return float(np.max(found.value[:, at] + found.bound()[:, at]))
-
-
-def worst(found: Margins) -> dict[str, float]:
-    """The least of each margin over the valid rows (of Ms the largest)."""
-    rows = found.value[found.ok]
-    if not len(rows):
-        return {}
-    least = {name: float(np.min(rows[:, i])) for i, name in enumerate(NAMES)}
-    turn = rows[:, NAMES.index("phase_margin")]
-    least["phase_margin"] = float(turn[np.argmin(np.abs(turn))])
-    least["peak_sensitivity"] = float(np.max(rows[:, NAMES.index("peak_sensitivity")]))
-    return least
 
 
 def _spread(fits: Parameters) -> Parameters:

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.options import Entry, Json
-from livebode.cli.remote import results_directory
+from livebode.cli import Entry, Json, results_directory
 from livebode.core import RecordError, writing
 from livebode.locations import location
 
 if TYPE_CHECKING:
-    from livebode.analysis import LoopReport
-    from livebode.margins import Margins, Proposal, Tuning
+    from livebode.analysis import Margins
+    from livebode_control.margins.loop_margins import LoopMargins
+    from livebode_control.tuning.filter_proposal import Proposal, Tuning
 
 
 def margins_command(
@@ -35,19 +35,19 @@ def margins_command(
 
     Writes margins.png to the run directory.
     """
-    from livebode.analysis import loop_of_run
-    from livebode.cli.picture_support import can_draw, tell_how_to_draw
+    from livebode.cli import can_draw, tell_how_to_draw
     from livebode.configuration import Axis, FitSection
-    from livebode.pictures import save_loop_picture
     from livebode.records import to_json
+    from livebode_control.margins.loop_margins import margins_of_run
+    from livebode_control.margins.loop_picture import save_loop_picture
 
     given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
     section = FitSection.model_validate(given) if given else None
-    found = loop_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity, entry)
+    found = margins_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity, entry)
     into = results_directory(directory)
     if can_draw():
         with writing(into, RecordError):
-            save_loop_picture(found, into, title=directory.name)
+            save_loop_picture(found.report, into, title=directory.name)
     if as_json:
         print(to_json(found.plain()))
         return
@@ -56,8 +56,9 @@ def margins_command(
     tell_how_to_draw()
 
 
-def show_loop(found: LoopReport) -> None:
+def show_loop(of: LoopMargins) -> None:
     """Print the margins with bounds and marks, and the proposals."""
+    found = of.report
     low, high = found.fit.band_hz
     print(f"loop around the {found.fit.model.name} model, {found.of}; lines {low:g} … {high:g} Hz")
     print(f"  {found.checked.sentence}")
@@ -71,24 +72,24 @@ def show_loop(found: LoopReport) -> None:
     print(f"  above {high:g} Hz nothing is promised: a mode that the model does not have can reduce the margins")
     print(f"  lines alone, without the model: Ms is at least {size:.3g} ± {bound:.2g} (at {at_hz:g} Hz)")
     if len(found.places) > 1:
-        print(f"worst of {len(found.places)} fits, at 12 places and of the whole run: {_in_short(found.tuning.before)}")
-    _show_tuning(found.tuning)
+        print(f"worst of {len(found.places)} fits, at 12 places and of the whole run: {_in_short(of.tuning.before)}")
+    _show_tuning(of.tuning)
 
 
 def _show_margins(margins: Margins) -> None:
     import numpy as np
 
-    from livebode.margins import WORDS
+    from livebode.analysis import MARGIN_WORDS
 
     bound = margins.bound()[0]
     for i, (name, unit) in enumerate(zip(margins.names, margins.units)):
         value, f = margins.value[0, i], margins.frequency_hz[0, i]
         if np.isnan(f):
-            print(f"  {WORDS[name]:22}{'any amount' if np.isinf(value) else 'none':>16}   (no crossing)")
+            print(f"  {MARGIN_WORDS[name]:22}{'any amount' if np.isinf(value) else 'none':>16}   (no crossing)")
             continue
         mark = "by the model, between the lines" if margins.place[0, i] == "interpolated" else "EXTRAPOLATED"
         known = "" if bound[i] < abs(value) else ", not known"
-        print(f"  {WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}{known}")
+        print(f"  {MARGIN_WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}{known}")
     print("  ± is 1.96 sigma from the covariance of the fit; no line checks the model where it is EXTRAPOLATED")
 
 
@@ -112,8 +113,8 @@ def _show_proposal(proposal: Proposal) -> None:
 
 
 def _in_short(margins: Margins) -> str:
-    from livebode.cli.pictures import margins_in_short
-    from livebode.margins import worst
+    from livebode.analysis import worst
+    from livebode.cli import margins_in_short
 
     least = worst(margins)
     return margins_in_short(least) if least else "no margins"

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
+from livebode.analysis import OpenLoop, peak_sensitivity_at_lines, worst
 from livebode.core import PID, Loop, UsageError
 from livebode.fitting import EvaluationGrid, Fitter, Rigid
-from livebode.margins import OpenLoop, low_pass, notch, peak_sensitivity_at_lines, tuning, worst
-from livebode.margins.filters import notch_over
+from livebode_control.tuning.filter_proposal import tuning
+from livebode_control.tuning.filters import low_pass, notch, notch_over
 from tests.support.belt_loops import BAND_HZ, LINES, responses_of
 from tests.support.errors import refused
 from tools.loops import BELT, MODEL, Case, parameters

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from livebode.analysis import Margins, OpenLoop, against_lines, margins
 from livebode.core import PID, FitError, LivebodeError, Loop, Responses, UsageError
 from livebode.fitting import EvaluationGrid, Fitter, Rigid
-from livebode.margins import Margins, OpenLoop, against_lines, margins
 from tests.support.belt_loops import BAND_HZ, LINES, read, responses_of
 from tests.support.errors import refused
 from tools.loops import BELT, MODEL, Case, parameters, values

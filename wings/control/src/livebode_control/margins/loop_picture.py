@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from livebode.analysis import Margins, OpenLoop
 from livebode.arrays import Complex, Floats
 from livebode.core import Responses
 from livebode.fitting import Fit
 from livebode.language import number, tr, worded
-from livebode.margins import Margins, OpenLoop
-from livebode.pictures._style import Style, drawing, heading, new_figure, plain, style
-from livebode.pictures.png import save
+from livebode.pictures import Style, drawing, heading, new_figure, plain, save, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

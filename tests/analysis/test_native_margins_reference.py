@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.analysis import OpenLoop, margins
+from livebode.analysis.open_loop import series_of
 from livebode.core import PID, Loop, Parameters
 from livebode.fitting import PhysicalModel, Rigid, TwoMass, TwoMassGain
-from livebode.margins import OpenLoop, margins
-from livebode.margins.feedback import series_of
 from tests.support.belt_loops import BAND_HZ
 from tools.loops import BELT, Case, parameters
 

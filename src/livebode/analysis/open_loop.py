@@ -1,8 +1,8 @@
-"""The open loop of a fitted plant and its controllers, for many fits at once, at any frequency."""
+"""The open loop of a fitted plant and its controllers at any frequency, for many fits at once, and its stability."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,7 +13,6 @@ from livebode.arrays import Complex, Floats
 from livebode.core import FitError, Loop, Model
 from livebode.fitting import EvaluationGrid, Hold, PhysicalModel, described
 from livebode.kernel import FeedbackSeries, FitModel, MarginGrid
-from livebode.margins.feedback import series_of
 
 _LOWEST = 1e-7  # of the rate: far below every corner of a drive's controllers
 _PER_DECADE_OUTSIDE, _PER_DECADE = 30, 150
@@ -22,6 +21,12 @@ _POINTS_MAX = 4000
 _FREQUENCY_STEP, _DAMPING_STEP = 1.25, 2.0  # factors, to which resonances are rounded
 _STEPS_MAX, _NO_PEAK = 1000, 1 << 20
 _KNOWN_MAX = 32
+
+# Of the series of the controllers.
+_DEGREE = 15
+_PIECES, _PIECES_MAX = 128, 4096
+_ERROR_MAX = 1e-12  # of the largest |F| in a piece
+_ROUNDING = 2e-15  # of z − 1, by which sampled integrators are inexact, times the rate over the frequency
 
 
 @dataclass(frozen=True)
@@ -156,3 +161,65 @@ class OpenLoop:
 def _spaced(low: float, high: float, per_decade: float) -> Floats:
     count = min(2 + int(per_decade * np.log10(high / low)), _POINTS_MAX)
     return np.geomspace(low, high, count)
+
+
+def series_of(response: Callable[[Floats], Complex], low_hz: float, high_hz: float) -> FeedbackSeries | None:
+    """Controllers as a Chebyshev series over the logarithm of the frequency, for the kernel.
+
+    It has degree 15 in pieces, as many as it takes to be exact to 1e-12 (at low frequencies to the rounding of
+    `response`); None if 4096 are too few.
+
+    Examples
+    --------
+    >>> series_of(lambda f: np.exp(-2j * np.pi * f / 500), 0.01, 2000.0).coefficients.shape
+    (128, 16)
+    >>> series_of(lambda f: np.where(f < 100, 1.0, 2.0 + 0j), 0.01, 2000.0) is None
+    True
+    """
+    begin, end = np.log([low_hz, high_hz])
+    order = np.arange(_DEGREE + 1)
+    angle = np.pi * (order + 0.5) / (_DEGREE + 1)
+    to_series = 2 / (_DEGREE + 1) * np.cos(order[:, np.newaxis] * angle)
+    to_series[0] /= 2
+    tested = np.array([-1.0, -0.95, -0.31, 0.05, 0.52, 0.97, 1.0])
+    polynomials = np.cos(order[:, np.newaxis] * np.arccos(tested))
+    pieces = _PIECES
+    while pieces <= _PIECES_MAX:
+        width = (end - begin) / pieces
+        middle = begin + width * (np.arange(pieces) + 0.5)[:, np.newaxis]
+        sampled, expected = (
+            response(np.exp(middle + width / 2 * x).ravel()).reshape(pieces, -1) for x in (np.cos(angle), tested)
+        )
+        coefficients = np.asarray(sampled @ to_series.T, dtype=np.complex128)
+        error = np.abs(coefficients @ polynomials - expected).max(axis=1)
+        permitted = _ERROR_MAX + _ROUNDING * high_hz / np.exp(middle[:, 0])
+        if (error <= permitted * np.abs(expected).max(axis=1)).all():
+            return FeedbackSeries(float(begin), float(width), np.ascontiguousarray(coefficients))
+        pieces *= 2
+    return None
+
+
+def stable(open_loop: Complex, frequency_hz: Floats, unstable_poles: NDArray[np.int64] | int = 0) -> NDArray[np.bool_]:
+    """By Nyquist's criterion for a sampled loop, shape (rows,).
+
+    Along the upper half of the unit circle, and around its integrators at z = 1, the angle of 1 + L turns by π times
+    the closed loop's poles inside less the open loop's poles inside. As both have equally many, it ends at π times
+    (the open loop's unstable poles less those of the closed loop). With ν integrators it begins at −ν·π/2.
+
+    Parameters
+    ----------
+    open_loop
+        L, shape (rows, frequencies), from where only its integrators matter up to half the rate, and close enough that
+        1 + L turns by less than half a turn between neighbours.
+    frequency_hz
+        Ascending; the last is half the rate.
+    unstable_poles
+        Of the open loop, outside the unit circle.
+    """
+    size = np.log(np.abs(open_loop[:, :2]))
+    integrators = np.rint(-(size[:, 1] - size[:, 0]) / np.log(frequency_hz[1] / frequency_hz[0]))
+    angle = np.unwrap(np.angle(1 + open_loop), axis=1)
+    begin = -integrators * np.pi / 2
+    turns = np.rint((angle[:, 0] - begin) / (2 * np.pi))
+    end = angle[:, -1] - 2 * np.pi * turns
+    return np.asarray(np.abs(end - np.pi * unstable_poles) < np.pi / 2)

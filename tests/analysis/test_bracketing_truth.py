@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.margins.bracketing import find_minima, find_roots
+from livebode.analysis.crossings import find_minima, find_roots
 
 places = st.lists(st.floats(0.1, 9.9), min_size=1, max_size=20).map(np.array)
 

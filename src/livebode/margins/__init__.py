@@ -1,5 +1,0 @@
-"""Margins of the loop around a fitted plant, with bounds, and filters that would increase them."""
-
-from livebode.on_first_use import on_first_use
-
-__getattr__, __dir__, __all__ = on_first_use(__name__, __file__)
