@@ -7,6 +7,8 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from tools.stored import compiled
+
 ROOT = Path(__file__).parents[1]
 KERNEL = ROOT / "kernel"
 BOARD = ROOT / "examples" / "drive" / "mps2"
@@ -42,9 +44,14 @@ class Core:
             run("arm-none-eabi-gcc", *self._all_flags(), *flags, "-c", source, "-o", file)
         return objects
 
-    def kernel(self, directory: Path) -> list[Path]:
+    def kernel(self, directory: Path, *flags: str) -> list[Path]:
         """The kernel's objects."""
-        return self.compile(sorted((KERNEL / "src").glob("*.c")), directory)
+        directory.mkdir(parents=True, exist_ok=True)
+        sources = sorted((KERNEL / "src").glob("*.c"))
+        objects = [directory / f"{source.stem}.o" for source in sources]
+        for source, file in zip(sources, objects):
+            shutil.copyfile(compiled("arm-none-eabi-gcc", [*map(str, self._all_flags()), *flags], source), file)
+        return objects
 
     def link(self, program: Path, objects: list[Path]) -> Path:
         """A program of these objects and the board's."""

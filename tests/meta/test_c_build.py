@@ -5,13 +5,12 @@ import re
 import shutil
 import signal
 import subprocess
-import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-from tests.support.peers.peer import PATIENCE_S
+from tools.stored import compiled
 
 ROOT = Path(__file__).parents[2]
 KERNEL, NATIVE = ROOT / "kernel", ROOT / "native"
@@ -68,8 +67,8 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86, spe
         source, name, extra = job
         file = directory / f"{name}.o"
         folder, own = (NATIVE, [f"-I{KERNEL / 'src'}"]) if file.parent.name == "native" else (KERNEL, [])
-        paths = *INCLUDES, *own, "-c", folder / "src" / f"{source}.c", "-o", file
-        run(compiler, *WARNINGS, *ALWAYS, *switch, *flags, *extra, *paths)
+        every = [*WARNINGS, *ALWAYS, *switch, *flags, *extra, *INCLUDES, *own]
+        shutil.copyfile(compiled(compiler, every, folder / "src" / f"{source}.c"), file)
         return file
 
     (directory / "native").mkdir(parents=True, exist_ok=True)
@@ -109,31 +108,17 @@ def released(directory: Path, compiler: str) -> list[Path]:
     return found
 
 
-def build_once(name: str, tmp_path_factory: pytest.TempPathFactory) -> Built:
-    """The C as it is released, by a named compiler: built by the first test process that asks.
-
-    What `make` has built is not built again.
-    """
-    compiler, base = needed(name), tmp_path_factory.getbasetemp()
-    directory = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / f"kernel-{name}"
-    done = directory / "done"
-    try:
-        directory.mkdir()
-        (directory / "native").mkdir()
-    except FileExistsError:
-        deadline = time.monotonic() + PATIENCE_S
-        while not done.exists():
-            assert time.monotonic() < deadline, f"the other process did not build {directory}"
-            time.sleep(0.1)
-        return compiler, directory, sorted(directory.rglob("*.o"))
+def as_released(name: str, directory: Path) -> Built:
+    """The C as it is released, by a named compiler. What `make` has built is not built again."""
+    compiler = needed(name)
+    (directory / "native").mkdir(parents=True)
     objects = released(directory, compiler) or build(directory, compiler, "-O3", "-ffreestanding")
-    done.touch()
     return compiler, directory, sorted(objects)
 
 
 @pytest.fixture(scope="module", params=["gcc", "clang"])
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Built:
-    return build_once(request.param, tmp_path_factory)
+    return as_released(request.param, tmp_path_factory.mktemp("built") / request.param)
 
 
 def test_no_object_holds_a_fused_multiply_add(built):
@@ -170,8 +155,8 @@ def test_misuse_is_refused(built, tmp_path):
     program(tmp_path, compiler, objects, "misuse")
 
 
-def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factory):
-    builds = {name: build_once(name, tmp_path_factory) for name in ("gcc", "clang")}
+def test_same_bits_from_every_compiler_level_and_width(tmp_path):
+    builds = {name: as_released(name, tmp_path / name) for name in ("gcc", "clang")}
     for name, flags in {
         "gcc one by one": ["-O2", "-DLB_SCALAR"],
         "clang one by one, with assertions": ["-O1", "-DLB_SCALAR", "-DLB_DEBUG"],
@@ -187,7 +172,7 @@ def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factor
     assert len(set(hashes.values())) == 1, hashes
 
 
-def test_arm_has_vectors_and_the_same_bits(tmp_path, tmp_path_factory):
+def test_arm_has_vectors_and_the_same_bits(tmp_path):
     """AArch64 in QEMU: the vectors are NEON's from the same source, and no product is fused with a sum."""
     compiler, emulator = needed("aarch64-linux-gnu-gcc"), needed("qemu-aarch64")
     objects = build(tmp_path / "objects", compiler, "-O1", dispatch=False)
@@ -196,7 +181,7 @@ def test_arm_has_vectors_and_the_same_bits(tmp_path, tmp_path_factory):
     of_tiles = run("aarch64-linux-gnu-objdump", "-d", *(file for file in objects if file.stem in ("tile32", "tile64")))
     for elements in ("4s", "2d"):
         assert len(re.findall(rf"fmul\s+v\d+\.{elements}", of_tiles)) > 100
-    host, _, of_host = build_once("gcc", tmp_path_factory)
+    host, _, of_host = as_released("gcc", tmp_path / "of the host")
     (tmp_path / "host").mkdir()
     made = program(tmp_path, compiler, objects, "bits", FEW, "-static", runner=emulator)
     assert made == program(tmp_path / "host", host, of_host, "bits", FEW)

@@ -21,7 +21,7 @@ PAGE = (ROOT / "docs" / "how-to" / "microcontroller.md").read_text(encoding="utf
 def built(request, tmp_path_factory):
     need_tools()
     core, level = request.param
-    return core, core.compile(sorted((KERNEL / "src").glob("*.c")), tmp_path_factory.mktemp("kernel"), level)
+    return core, core.kernel(tmp_path_factory.mktemp("kernel"), level)
 
 
 def test_the_step_leaves_nothing_undefined(built, tmp_path):

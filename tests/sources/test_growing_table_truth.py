@@ -15,17 +15,19 @@ from livebode.sources import open_log
 from livebode.sources.live import LiveBlock, SourceSettings, make_source, open_source
 from tests.support.command import RATE_HZ, signals, write_csv, write_parquet
 from tests.support.errors import refused
-from tests.support.peers.peer import PATIENCE_S, Feeding
+from tests.support.peers.peer import PATIENCE_S, Feeding, until
 
 SAMPLES = 600
 
 
-def received(path: Path, last: float, **more: object) -> tuple[list[LiveBlock], dict[str, int]]:
-    """Blocks until a sample at time `last` (s) came, and the counts of events."""
+def received(
+    path: Path, last: float, blocks: list[LiveBlock] | None = None, **more: object
+) -> tuple[list[LiveBlock], dict[str, int]]:
+    """Blocks until a sample at time `last` (s) came, appended to `blocks` as they come, and the counts of events."""
+    blocks = [] if blocks is None else blocks
     with open_source(SourceSettings(log=path, follow=True, timeout_s=PATIENCE_S, **more)) as source:
         timer = threading.Timer(PATIENCE_S, source.stop)
         timer.start()
-        blocks = []
         for block in source.blocks():
             blocks.append(block)
             if block["t"][-1] >= last - 1e-9:
@@ -78,15 +80,16 @@ def test_a_table_that_is_replaced_by_another_is_a_restart(tmp_path):
     raw = write_csv(tmp_path / "whole.csv", signals(SAMPLES)).read_bytes()
     path = tmp_path / "log.csv"
     path.write_bytes(raw)
+    blocks: list[LiveBlock] = []
 
     def script() -> None:
-        time.sleep(0.5)
+        until(lambda: sum(map(len, blocks)) == SAMPLES, "the whole table")
         (tmp_path / "next.csv").write_bytes(raw.replace(b"0.0,", b"0.0,-", 1))
         (tmp_path / "next.csv").rename(path)
         grown(path, b"".join(b"%.3f,0,0,0\n" % (n / RATE_HZ) for n in range(SAMPLES, 2 * SAMPLES)), 10)
 
     with Feeding(script):
-        blocks, counts = received(path, (2 * SAMPLES - 1) / RATE_HZ)
+        _, counts = received(path, (2 * SAMPLES - 1) / RATE_HZ, blocks)
     assert counts == {"connected": 2, "replaced": 1, "restart": 1}
     assert [block.start for block in blocks if block.gap] == [SAMPLES]
     assert sum(map(len, blocks)) == 3 * SAMPLES
@@ -96,15 +99,17 @@ def test_a_table_that_is_replaced_by_a_longer_copy_of_itself_continues(tmp_path)
     """As programs do that copy a log again and again."""
     raw = write_csv(tmp_path / "whole.csv", signals(2 * SAMPLES)).read_bytes()
     path = tmp_path / "log.csv"
-    path.write_bytes(raw[: len(raw) // 2])
+    half = raw[: raw.index(b"\n", len(raw) // 2) - 5]
+    path.write_bytes(half)
+    blocks: list[LiveBlock] = []
 
     def script() -> None:
-        time.sleep(0.5)
+        until(lambda: sum(map(len, blocks)) == half.count(b"\n") - 1, "its whole lines")
         (tmp_path / "next.csv").write_bytes(raw)
         (tmp_path / "next.csv").rename(path)
 
     with Feeding(script):
-        blocks, counts = received(path, (2 * SAMPLES - 1) / RATE_HZ)
+        _, counts = received(path, (2 * SAMPLES - 1) / RATE_HZ, blocks)
     assert counts.keys() == {"connected"}
     np.testing.assert_array_equal(np.concatenate([block["t"] for block in blocks]), np.arange(2 * SAMPLES) / RATE_HZ)
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gc
+import pickle
 from collections.abc import Callable
 from functools import cache
+from importlib.metadata import version
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +15,7 @@ from blark import transform as tf
 from blark.parse import parse_source_code
 
 from livebode.structured_text.names import KEYWORDS
+from tools.stored import stored
 from tools.structured_text.expressions import RUNTIME, Scope, assignable
 from tools.structured_text.statements import Body
 from tools.structured_text.types import SCALARS, Array, Kind, Named, RefusedError, Scalar, image, zero
@@ -32,6 +35,11 @@ class ReturnNow(Exception):  # noqa: N818 (no error)
 @cache
 def parse(text: str) -> tuple:
     """blark's declarations in `text`; what it cannot parse fails."""
+    file = stored(f"blark {version('blark')}\0{text}", lambda path: path.write_bytes(pickle.dumps(_parsed(text))))
+    return pickle.loads(file.read_bytes())
+
+
+def _parsed(text: str) -> tuple:
     gc.disable()  # it makes a million objects and no circles, and each pass of the collector visits them all
     try:
         result = parse_source_code(text)
