@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import cache, wraps
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import typer
 
@@ -85,9 +85,9 @@ def with_keys(**sections: Mapping[str, tuple[str, str]]) -> Callable[[Callable[.
 def _parameter(section: str, key: str, option: str, metavar: str) -> inspect.Parameter:
     found = _keys(section)[key]
     names = f"{option}/--no-{option[2:]}" if found.type is bool else option
-    annotation = Annotated[found.type | None, typer.Option(names, metavar=metavar or None, help=found.help)]
+    default = typer.Option(None, names, metavar=metavar or None, help=found.help)
     name = option[2:].replace("-", "_") + "_" * (option == "--from")
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=found.type | None)
 
 
 @cache
