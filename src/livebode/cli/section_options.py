@@ -63,7 +63,7 @@ def with_keys(**sections: Mapping[str, tuple[str, str]]) -> Callable[[Callable[.
 
     def decorated(command: Callable[..., None]) -> Callable[..., None]:
         signature = inspect.signature(command, eval_str=True)
-        parameters = []
+        parameters: list[inspect.Parameter] = []
         for name, parameter in signature.parameters.items():
             parameters += options if name == "sections" else [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
 
