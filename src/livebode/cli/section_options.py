@@ -84,7 +84,8 @@ def with_keys(**sections: Mapping[str, tuple[str, str]]) -> Callable[[Callable[.
 
 def _parameter(section: str, key: str, option: str, metavar: str) -> inspect.Parameter:
     found = _keys(section)[key]
-    names = f"{option}/--no-{option[2:]}" if found.type is bool else option
+    negated = "no-" + option[2:]
+    names = f"{option}/--{negated}" if found.type is bool else option
     default = typer.Option(None, names, metavar=metavar or None, help=found.help)
     name = option[2:].replace("-", "_") + "_" * (option == "--from")
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=found.type | None)
