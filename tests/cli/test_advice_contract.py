@@ -348,7 +348,6 @@ NOT_HERE = {
     "choose one with --machine": "needs a lake with two machines",
     "livebode archive": "needs a lake: tests/archive",
     "livebode fleet": "needs a log: tests/fleet",
-    "--user": "writes keys: tests/cli/test_fleet_contract.py",
     "doctor --bundle": "after results that are not exactly once, which no situation makes",
     "livebode that wrote them": "another version of the package",
     "livebode doctor": "needs a machine",

@@ -87,6 +87,10 @@ def test_a_run_is_fitted_afterwards(machine: Path) -> None:
     for name, truth in (("Js", 0.0028), ("mL", 6.7), ("Keff", 5e5), ("bs", 130.0)):
         quantity = found["quantities"][name]
         assert abs(quantity["value"] - truth) < 2 * quantity["bound_95"], name
+    delayed = ("--model", "two-mass", "--radius", 0.019, "--free", "delay", "--json")
+    sampled, continuous = (livebode("fit", out, *delayed, "--hold", hold) for hold in ("zero-order", "none"))
+    delays_s = [json.loads(one.out)["quantities"]["delay"]["value"] for one in (sampled, continuous)]
+    assert delays_s == pytest.approx([0, 0.5 / 4000], abs=3e-6)  # a hold delays by half a tick
     held = livebode("fit", out, "--model", "two-mass", "--radius", 0.019, "--fix", "Js=0.0028", "--band", "40:140")
     assert "40 … 140 Hz" in held.out
     assert "Js " not in held.out

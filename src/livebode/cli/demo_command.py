@@ -18,12 +18,13 @@ if TYPE_CHECKING:
     from livebode.runtime import Document
 
 _SHOWN = 4
+_SEED = 1
+"""Of the noise: each demonstration is the same run."""
 
 
 def demo_command(
     seconds: Annotated[float, typer.Option(help="Duration of the simulation.")] = 22.0,
     fast: Annotated[bool, typer.Option("--fast", help="As fast as possible, not in real time.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise; the same seed gives the same run.")] = 1,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Run directory; a previous demo there is replaced.")] = Path(
         "runs/demo"
     ),
@@ -57,7 +58,7 @@ def demo_command(
         if not as_json
         else nullcontext()
     ):
-        baseline = demo_baseline(seed + 1)
+        baseline = demo_baseline(_SEED + 1)
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
     # A first user sees the page without asking for it, on any free port, so that the default port stays free.
     shown = serve or (not fast and find_spec("uvicorn") is not None)
@@ -76,7 +77,7 @@ def demo_command(
 
             draw = drawing("simulated belt axis", ("u", "velocity"))
             to = Destination(out, draw, force=True, subscribers=(*subscribers_of("demo"), show_numbers))
-            outcome = demo(to, seconds=seconds, seed=seed, real_time=not fast, baseline=baseline)
+            outcome = demo(to, seconds=seconds, seed=_SEED, real_time=not fast, baseline=baseline)
         if as_json:
             print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
             return

@@ -67,7 +67,7 @@ def export_command(
     directly. `livebode archive list --sql` is the same for all runs of a lake.
     """
     chosen = {"--at": at is not None, "--mean": mean, "--parameters": parameters, "--lpv": lpv}
-    check_query(sql, as_csv=as_csv, as_json=as_json, others={"--to": to, "--out": out, "--entry": entry} | chosen)
+    check_query(sql, as_csv=as_csv, as_json=as_json, others={"--to": to, "--out": out, "--entry": entry, **chosen})
     if sql is not None:
         _print_rows(run, sql, rows, as_csv=as_csv, as_json=as_json)
         return

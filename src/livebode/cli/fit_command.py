@@ -9,6 +9,7 @@ import typer
 
 from livebode.cli.band import parsed_band
 from livebode.cli.options import Json
+from livebode.cli.section_options import with_keys
 from livebode.core import UsageError
 from livebode.estimates import kind_of, rule
 from livebode.locations import location
@@ -21,6 +22,15 @@ if TYPE_CHECKING:
 _OPTIONS = {"radius_m": "radius", "inertia_ratio": "ratio", "fixed": "fix"}
 
 
+@with_keys(
+    fit={
+        "side": ("--side", ""),
+        "radius_m": ("--radius", "M"),
+        "inertia_ratio": ("--ratio", ""),
+        "free": ("--free", "NAME"),
+        "hold": ("--hold", ""),
+    }
+)
 def fit_command(
     directories: Annotated[
         list[Path],
@@ -30,6 +40,7 @@ def fit_command(
             parser=location,
         ),
     ],
+    *,
     model: Annotated[
         str | None,
         typer.Option(
@@ -45,20 +56,10 @@ def fit_command(
         str | None,
         typer.Option(help="Quantity of y: velocity, position or auto (by its kind; without a unit, the better fit)."),
     ] = None,
-    side: Annotated[str | None, typer.Option(help="Where y is measured: motor or load. \\[default: motor]")] = None,
-    radius: Annotated[
-        float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
-    ] = None,
-    ratio: Annotated[float | None, typer.Option(help="Ratio of the load's inertia to the motor's, if known.")] = None,
     fix: Annotated[list[str] | None, typer.Option(metavar="NAME=VALUE", help="Fix a parameter at this value.")] = None,
-    free: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Fit a parameter that is fixed by default: delay, B, BL.")
-    ] = None,
+    sections: dict[str, dict[str, Any]],
     band: Annotated[
         str | None, typer.Option(metavar="LOW:HIGH", help="Use only the lines from LOW to HIGH Hz.")
-    ] = None,
-    hold: Annotated[
-        str | None, typer.Option(help="zero-order (the input is constant between samples) or none.")
     ] = None,
     entry: Annotated[
         list[str] | None,
@@ -79,15 +80,10 @@ def fit_command(
     given: dict[str, Any] = {
         "model": model,
         "output": output,
-        "side": side,
-        "radius_m": radius,
-        "inertia_ratio": ratio,
         "fixed": dict(_pair(text) for text in fix) if fix else None,
-        "free": free or None,
         "band_hz": parsed_band(band) if band else None,
-        "hold": hold,
     }
-    specified = {name: value for name, value in given.items() if value is not None}
+    specified = {name: value for name, value in given.items() if value is not None} | sections.get("fit", {})
     if not entry and (model is None or model in POLE_MODELS) and (fit := _fit_rule(directories)) is not None:
         run = RunRecord.open(directories[0], matrix=True)
         _check_options(kind := cast(Kind, model or "rational"), specified)

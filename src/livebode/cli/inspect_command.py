@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -123,7 +124,7 @@ def inspect_command(
         console.print(f"estimator of a run: --estimator {found.estimator} ({_SUITS[found.estimator]})", soft_wrap=True)
 
 
-def _check_out(out: Path | None, without: dict[str, object], needing: dict[str, object]) -> None:
+def _check_out(out: Path | None, without: Mapping[str, object], needing: Mapping[str, object]) -> None:
     """UsageError for an option that belongs to the list of channels, or to the configuration."""
     given = [option for option, value in (needing if out is None else without).items() if value is not None]
     if given and out is None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import cache, wraps
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import typer
 
@@ -63,7 +63,7 @@ def with_keys(**sections: Mapping[str, tuple[str, str]]) -> Callable[[Callable[.
 
     def decorated(command: Callable[..., None]) -> Callable[..., None]:
         signature = inspect.signature(command, eval_str=True)
-        parameters = []
+        parameters: list[inspect.Parameter] = []
         for name, parameter in signature.parameters.items():
             parameters += options if name == "sections" else [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
 
@@ -84,10 +84,11 @@ def with_keys(**sections: Mapping[str, tuple[str, str]]) -> Callable[[Callable[.
 
 def _parameter(section: str, key: str, option: str, metavar: str) -> inspect.Parameter:
     found = _keys(section)[key]
-    names = f"{option}/--no-{option[2:]}" if found.type is bool else option
-    annotation = Annotated[found.type | None, typer.Option(names, metavar=metavar or None, help=found.help)]
+    negated = "no-" + option[2:]
+    names = f"{option}/--{negated}" if found.type is bool else option
+    default = typer.Option(None, names, metavar=metavar or None, help=found.help)
     name = option[2:].replace("-", "_") + "_" * (option == "--from")
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=found.type | None)
 
 
 @cache

@@ -20,7 +20,7 @@ class FitSection(ConfigurationSection):
     output
         What the output is. "auto": by its kind, velocity if it has neither a unit nor a kind.
     side
-        Where the output is measured. Default: motor.
+        Where the output is measured: "motor" or "load". Default: motor.
     radius_m
         Radius of a belt's pulley in metres: the load is then a mass in kg, without it an inertia in kg m².
     inertia_ratio
@@ -28,11 +28,12 @@ class FitSection(ConfigurationSection):
     fixed
         Parameters with a fixed value, such as { Js = 0.0028 }, in the unit of the parameter.
     free
-        Additional parameters to fit, such as ["delay", "BL"].
+        Parameters to fit that are fixed by default: "delay", "B", "BL".
     band_hz
         Lowest and highest frequency of the lines that are fitted, in Hz. Default: all lines.
     hold
-        Hold of the sampled plant; "none" for the response of a plant without a sampling hold.
+        Hold of the sampled plant: "zero-order", the input is constant between samples; "none" for the
+        response of a plant without a sampling hold.
     """
 
     model: str = "auto"

@@ -62,7 +62,7 @@ def checked_credentials(path: Path) -> str:
         change = f"run `{command}`, and make another key if others may have read it"
         raise _unusable(path, f"can be used by other users (mode {mode:04o})", change)
     if not _SEED.fullmatch(content):
-        raise _unusable(path, "has no secret key of a user", "make one with `livebode fleet setup --user`")
+        raise _unusable(path, "has no secret key of a user", "make one with `livebode fleet setup`")
     return str(path)
 
 

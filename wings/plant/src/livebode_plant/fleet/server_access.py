@@ -133,7 +133,7 @@ def server_access(settings: FleetSettings, host: str) -> ServerAccess:
         raise FleetError(
             "server-open",
             f"a server at {host} would be open to everyone who reaches it",
-            "set server.certificate, server.key and users.fleet; `livebode fleet setup --user` makes keys",
+            "set server.certificate, server.key and users.fleet; `livebode fleet setup` makes keys",
             host=host,
         )
     limited = settings.users.edges or settings.users.leaves

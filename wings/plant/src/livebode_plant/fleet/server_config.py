@@ -101,7 +101,7 @@ def _check_closed(leaf: LeafSection, server: ServerSection, keys: list[str], hos
         raise FleetError(
             "server-open",
             f"a server at {host} would be open to everyone who reaches it",
-            "set server.certificate, server.key and users.edges; `livebode fleet setup --user` makes keys",
+            "set server.certificate, server.key and users.edges; `livebode fleet setup` makes keys",
             host=host,
         )
     for url in leaf.urls:

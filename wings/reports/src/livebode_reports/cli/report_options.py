@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from livebode.cli import key_help
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
@@ -31,8 +32,9 @@ def _text(text: str | None) -> str | None:
     return text
 
 
-def _option(names: str, words: str) -> Any:
-    return typer.Option(names, metavar="TEXT", callback=_text, help=words)
+def _option(key: str) -> Any:
+    names = "--" + key.replace("_", "-")
+    return typer.Option(names, metavar="TEXT", callback=_text, help=key_help(f"report.{key}"))
 
 
 def _paper(name: str | None) -> str | None:
@@ -47,15 +49,13 @@ def _paper(name: str | None) -> str | None:
     return name
 
 
-Machine = Annotated[str | None, _option("--machine", "Name or type of the machine.")]
-SerialNumber = Annotated[str | None, _option("--serial-number", "Serial number of the machine.")]
-Operator = Annotated[str | None, _option("--operator", "Who measured.")]
-Company = Annotated[str | None, _option("--company", "Whose report it is.")]
-Customer = Annotated[str | None, _option("--customer", "Whom it is for.")]
-Conditions = Annotated[
-    str | None, _option("--conditions", "Conditions of the measurement: load, temperature, position.")
-]
-LogoFile = Annotated[Path | None, typer.Option("--logo", metavar="FILE", help="PNG or SVG of at most 1 MiB.")]
+Machine = Annotated[str | None, _option("machine")]
+SerialNumber = Annotated[str | None, _option("serial_number")]
+Operator = Annotated[str | None, _option("operator")]
+Company = Annotated[str | None, _option("company")]
+Customer = Annotated[str | None, _option("customer")]
+Conditions = Annotated[str | None, _option("conditions")]
+LogoFile = Annotated[Path | None, typer.Option("--logo", metavar="FILE", help=key_help("report.logo"))]
 PaperSize = Annotated[
     str | None, typer.Option("--paper", metavar="SIZE", callback=_paper, help="a4 or letter. \\[default: a4]")
 ]

@@ -63,8 +63,11 @@ def setup_command(
     from livebode_plant.fleet.server_config import leaf_configuration
 
     settings = FleetSettings.read(fleet)
-    at = {"host": host, "port": port}
-    text = leaf_configuration(settings, **at) if leaf else _server(settings, store, member, **at)
+    text = (
+        leaf_configuration(settings, host=host, port=port)
+        if leaf
+        else _server(settings, store, member, host=host, port=port)
+    )
     print(to_json({"configuration": text}) + "\n" if as_json else text, end="")
 
 
