@@ -97,7 +97,7 @@ def _degrees(value: Complex) -> Floats:
 def _bode(
     magnitude: Axes, phase: Axes, look: Style, found: LoopCurves, f: Floats, curves: tuple[Complex, Any, Any]
 ) -> None:
-    from livebode.pictures.scales import frequency_axis
+    from livebode.pictures import frequency_axis
 
     value, low, high = curves
     inside = (f >= found.fit.band_hz[0]) & (f <= found.fit.band_hz[1])
