@@ -39,7 +39,8 @@ run example/gantry-2.toml --out runs/gantry-2
 run example/gantry-tune.toml --out runs/gantry-tune
 inspect example/standstill.csv
 inspect example/standstill.csv --excitation w --json
-new example/moving.parquet --out new.toml --yes --excitation w --input u --output velocity --schedule x
+new example/moving.parquet --out new.toml --yes --excitation w --input u --output velocity --schedule x \
+=> inspect example/moving.parquet --out new.toml --yes --excitation w --input u --output velocity --schedule x
 fit runs/standstill --model two-mass --json
 fit runs/moving --model two-mass
 fit runs/gantry
@@ -58,32 +59,33 @@ compare runs/gantry runs/gantry-2 --json
 report runs/standstill --template example/acceptance.toml
 report runs/gantry
 export runs/ambient --parameters --to csv --out modes.csv
-query runs/moving "SELECT count(*), min(frequency_hz), max(time_s) FROM responses"
+query runs/moving "SELECT count(*), min(frequency_hz), max(time_s) FROM responses" \
+=> export runs/moving --sql "SELECT count(*), min(frequency_hz), max(time_s) FROM responses"
 export runs/moving --to csv --out moving.csv
 export runs/standstill --to mat --out standstill.mat
 design example/experiment.toml --out designs/belt
 design example/several-motors.toml --out designs/gantry
 plc example/moving.toml --limit 2 --amplitude 0.1 --rate 4000 --out plc
 archive run example/archive.toml
-archive list example/lake --json
-schema axis
+schema axis => doctor --schema axis
 doctor example/standstill.toml
 """
 
 
-def commands(now: bool) -> list[list[str]]:
-    """Words of each command; a line `OLD => NEW` is a command that has another name now."""
-    return [shlex.split(line.split(" => ")[-1 if now else 0]) for line in COMMANDS.strip().splitlines()]
+def commands(now: bool) -> dict[str, list[str]]:
+    """Words of each command by number and first word; a line `OLD => NEW` is a command that has another name now."""
+    lines = [line.split(" => ") for line in COMMANDS.strip().splitlines()]
+    return {f"{i:02} {line[0].split()[0]}": shlex.split(line[-1 if now else 0]) for i, line in enumerate(lines)}
 
 
-def perform(python: Path, work: Path, lines: list[list[str]]) -> None:
+def perform(python: Path, work: Path, lines: dict[str, list[str]]) -> None:
     """Run the commands in a new directory, and keep what each prints in its file of `printed`."""
     (work / "printed").mkdir(parents=True)
     settings = environment() | {"COLUMNS": "100", "TZ": "UTC", "SOURCE_DATE_EPOCH": "1700000000"}
-    for number, words in enumerate(lines):
+    for name, words in lines.items():
         done = subprocess.run([python.parent / "livebode", *words], cwd=work, env=settings, capture_output=True)
         text = done.stdout + b"--- standard error\n" + done.stderr + f"--- exit code {done.returncode}\n".encode()
-        (work / "printed" / f"{number:02} {words[0]}.txt").write_bytes(text)
+        (work / "printed" / f"{name}.txt").write_bytes(text)
 
 
 def facts(path: Path) -> dict[str, Any]:
