@@ -115,7 +115,7 @@ def test_a_command_with_pictures_says_once_how_to_get_them(answers: dict[str, An
         ("foreign", "parquet", "foreign.parquet needs the package pyarrow, which is not installed; run "),
         ("arrow", "parquet", "foreign.arrow needs the package pyarrow, which is not installed; run "),
         ("query", "query", "a query needs PyArrow, which is not installed; run "),
-        ("lake", "archive", "a lake needs PyArrow, which is not installed; run "),
+        ("lake", "archive", "the command archive needs PyArrow, which is not installed; run "),
         ("archive", "archive", "the command archive needs PyArrow, which is not installed; run "),
         ("fleet", "fleet", "the command fleet needs PyArrow, which is not installed; run "),
     ],

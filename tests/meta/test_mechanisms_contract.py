@@ -24,9 +24,10 @@ SOURCES = (ROOT / "src/livebode", *ROOT.glob("wings/*/src"))
         (
             r"(TemporaryDirectory|NamedTemporaryFile)\(",
             {
-                *("cli/validate_command.py", "dashboard/app.py", "export/universal.py", "livebode_reports/pdf.py"),
+                *("dashboard/app.py", "export/universal.py", "livebode_reports/pdf.py"),
+                "livebode_control/validation/validate_command.py",
                 *(f"livebode_plant/{name}.py" for name in ("archive/alone", "archive/tasks", "lake/compaction")),
-                "livebode_plant/cli/fleet/demo_command.py",
+                "livebode_plant/cli/fleet/run_command.py",
             },
         ),
         (r"\bfsync\(", {"core/files.py", "doctor/computer.py"}),

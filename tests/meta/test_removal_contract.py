@@ -24,7 +24,7 @@ WINGS = [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("wings/*
 _BESIDE, _NEW, _TEMPORARY = "a file beside its place", "a file in a new directory", "a file in a temporary directory"
 WRITING_MODULES = {
     _BESIDE: (
-        "cli/schema_command",
+        "cli/file_schema",
         "export/delimited", "export/lpv", "export/matrix_delimited", "export/parameters", "export/universal",
         "livebode_control/strokes/angle_table", "livebode_design/files", "livebode_design/matrix/matrix_files",
         "livebode_drives/plc_command",

@@ -85,6 +85,6 @@ def model_test(directory: Path, on: Path) -> ModelTest:
     raise UsageError(
         "missing",
         "a model is tested by the wing control, which is not installed",
-        "install this wing too, or leave out --on",
-        argument="--on",
+        "install the wing control of livebode",
+        argument="on",
     )

@@ -12,9 +12,9 @@ import pytest
 from livebode.configuration import kind_of_file
 from livebode.core import ConfigError, LivebodeError
 from livebode_design import Experiment, MachineLimits
-from livebode_design.commands import FILES
 from livebode_design.experiment import BELT, made_of
 from livebode_design.experiment_schema import experiment_schema
+from livebode_design.file_kinds import FILES
 from livebode_design.matrix.matrix_experiment import TABLES as MACHINES
 from tests.support.schemas import tables, validator, values_of, with_value
 

@@ -10,6 +10,7 @@ COMMANDS: Mapping[str, Command] = {
     "margins": Command(
         "Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.",
         "livebode_control.margins.margins_command:margins_command",
+        panel=CONTROL,
     ),
     "check-loop": Command(
         "Compare the described controllers with the recorded signals: as described, or the change that explains them.",

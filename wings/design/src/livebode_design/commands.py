@@ -1,11 +1,10 @@
-"""The commands of this wing and the kinds of files that they read; see `livebode.cli.Command`."""
+"""The commands of this wing; see `livebode.cli.Command`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from livebode.cli import MEASURE, Command
-from livebode.configuration import FileKind
 
 COMMANDS: Mapping[str, Command] = {
     "design": Command(
@@ -18,20 +17,5 @@ COMMANDS: Mapping[str, Command] = {
         "Design an excitation, play it on the controller, record, and track the response; Ctrl-C ramps it down.",
         "livebode_design.measure_command:measure_command",
         panel=MEASURE,
-    ),
-}
-
-FILES: Mapping[str, FileKind] = {
-    "experiment": FileKind(
-        "livebode_design.experiment_schema:experiment_schema",
-        "an experiment",
-        frozenset({"excitation"}),
-        "livebode_design.experiment:Experiment",
-    ),
-    "matrix-experiment": FileKind(
-        "livebode_design.experiment_schema:matrix_experiment_schema",
-        "an experiment of several motors",
-        frozenset({"gantry", "corexy", "modes", "measured_matrix"}),
-        "livebode_design.matrix.matrix_experiment:MatrixExperiment",
     ),
 }

@@ -1,11 +1,10 @@
-"""The commands of many machines: the first sentence of the help of each and its function; the kind of their file."""
+"""The commands of many machines: the first sentence of the help of each and its function."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from livebode.cli import MANY, Command
-from livebode.configuration import FileKind
 
 _ARCHIVE: Mapping[str, Command] = {
     "run": Command(
@@ -72,5 +71,3 @@ COMMANDS: Mapping[str, Command] = {
         panel=MANY,
     ),
 }
-
-FILES: Mapping[str, FileKind] = {"archive": FileKind("livebode_plant.archive.archive_settings:archive_schema")}
