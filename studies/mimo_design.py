@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block
-from livebode.mimo import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
-from livebode.mimo.design.spec import KINDS
 from livebode.simulation import CoreXYLoop, GantryLoop
+from livebode_design import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
+from livebode_design.matrix.spec import KINDS
 from livebode_matrix import MatrixSettings, MatrixTracker
 
 RECORDINGS, TIME_S = 100, 10.0

@@ -1,10 +1,3 @@
-from livebode.mimo.design import MatrixDesign as MatrixDesign
-from livebode.mimo.design import MatrixLimits as MatrixLimits
-from livebode.mimo.design import MatrixMachine as MatrixMachine
-from livebode.mimo.design import MatrixSpec as MatrixSpec
-from livebode.mimo.design import MeasuredMachine as MeasuredMachine
-from livebode.mimo.design import MechanismMachine as MechanismMachine
-from livebode.mimo.design import choose_matrix as choose_matrix
 from livebode.mimo.equivalent import equivalent_plant as equivalent_plant
 from livebode.mimo.excitation import MatrixExcitation as MatrixExcitation
 from livebode.mimo.loop import MatrixLoop as MatrixLoop

@@ -21,7 +21,13 @@ from livebode_design.machine import QUANTITIES as QUANTITIES
 from livebode_design.machine import UNITS as UNITS
 from livebode_design.machine import Machine as Machine
 from livebode_design.machine import OperatingPoint as OperatingPoint
+from livebode_design.matrix.choose import choose_matrix as choose_matrix
+from livebode_design.matrix.machine import MatrixLimits as MatrixLimits
 from livebode_design.matrix.matrix_experiment import MatrixExperiment as MatrixExperiment
+from livebode_design.matrix.measured import MeasuredMachine as MeasuredMachine
+from livebode_design.matrix.mechanism import MechanismMachine as MechanismMachine
+from livebode_design.matrix.result import MatrixDesign as MatrixDesign
+from livebode_design.matrix.spec import MatrixSpec as MatrixSpec
 from livebode_design.measured import MeasuredResponse as MeasuredResponse
 from livebode_design.measured import Output as Output
 from livebode_design.measured import measured_machine as measured_machine

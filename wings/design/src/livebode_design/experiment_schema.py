@@ -9,10 +9,11 @@ from annotated_types import MinLen
 from pydantic import BaseModel, ConfigDict, create_model
 
 from livebode.configuration import Schema, schema_of
-from livebode.mimo import MatrixLimits, MatrixSpec
 from livebode_design.experiment import BELT, SIGNALS, Experiment
 from livebode_design.limits import MachineLimits
+from livebode_design.matrix.machine import MatrixLimits
 from livebode_design.matrix.matrix_experiment import MACHINES, Drives, MatrixExperiment
+from livebode_design.matrix.spec import MatrixSpec
 from livebode_design.spec import KIND_OF_KEY, ExperimentSpec
 
 _CONFIG = ConfigDict(extra="forbid")

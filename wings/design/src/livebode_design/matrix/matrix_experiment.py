@@ -13,11 +13,15 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from livebode.configuration import read_table
 from livebode.core import ConfigError
-from livebode.mimo import MatrixDesign, MatrixLimits, MatrixMachine, MatrixSpec, MechanismMachine, choose_matrix
 from livebode.simulation import CoreXY, CoreXYLoop, Gantry, GantryLoop, ModalLoop, ModalMachine, MotorLoop
 from livebode_design.experiment import first_of, made_of
+from livebode_design.matrix.choose import choose_matrix
+from livebode_design.matrix.machine import MatrixLimits, MatrixMachine
 from livebode_design.matrix.matrix_files import MATRIX_FORMATS
 from livebode_design.matrix.measured_matrix import MeasuredMatrixSection, loop_of, measured_machine
+from livebode_design.matrix.mechanism import MechanismMachine
+from livebode_design.matrix.result import MatrixDesign
+from livebode_design.matrix.spec import MatrixSpec
 
 T = TypeVar("T")
 _Positive = Annotated[float, Gt(0)]

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from livebode.mimo import MatrixDesign
 from livebode.version import __version__
 from livebode_design.files import as_lines, c_rows, identifier, write_struct
+from livebode_design.matrix.result import MatrixDesign
 
 
 def facts(design: MatrixDesign) -> dict[str, Any]:

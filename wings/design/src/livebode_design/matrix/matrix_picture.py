@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from livebode.mimo import MatrixDesign
+    from livebode_design.matrix.result import MatrixDesign
 
 _DASHES = ((), (5, 2), (1.5, 1.5), (5, 2, 1.5, 2))
 

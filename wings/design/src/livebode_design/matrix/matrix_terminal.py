@@ -5,8 +5,8 @@ from __future__ import annotations
 from rich.console import Console
 
 from livebode.cli import console
-from livebode.mimo import MatrixDesign
 from livebode_design.design_terminal import lines_shown, plain_table
+from livebode_design.matrix.result import MatrixDesign
 
 
 def show_matrix_design(design: MatrixDesign) -> None:

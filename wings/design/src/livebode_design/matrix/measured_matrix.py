@@ -11,8 +11,9 @@ from pydantic import BaseModel, ConfigDict
 
 from livebode.configuration import ControllerSection, recorded_configuration, without_null
 from livebode.core import ConfigError, Model, split_plant_unit
-from livebode.mimo import MatrixLoop, MeasuredMachine
+from livebode.mimo import MatrixLoop
 from livebode.records import RunRecord
+from livebode_design.matrix.measured import MeasuredMachine
 
 _Positive = Annotated[float, Gt(0)]
 _LOOP = ("input_logged", "excitation_logged", "output_logged")

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
-from livebode.mimo.excitation import MatrixExcitation
-from livebode.mimo.loop import MatrixLoop
+from livebode.mimo import MatrixExcitation, MatrixLoop
 
 _Positive = Annotated[float, Gt(0)]
 _Each = _Positive | Sequence[_Positive]

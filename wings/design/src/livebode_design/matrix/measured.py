@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, UsageError
-from livebode.mimo.design.machine import MatrixMachine
-from livebode.mimo.excitation import MatrixExcitation
-from livebode.mimo.loop import MatrixLoop
+from livebode.mimo import MatrixExcitation, MatrixLoop
+from livebode_design.matrix.machine import MatrixMachine
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

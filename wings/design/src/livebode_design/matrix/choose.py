@@ -8,12 +8,12 @@ from math import sqrt
 import numpy as np
 
 from livebode.core import DesignError, Lines, UsageError
-from livebode.mimo.design.candidate import REPETITIONS_MAX, REPETITIONS_MIN, Candidate, candidate, repetitions
-from livebode.mimo.design.explain import explained
-from livebode.mimo.design.machine import MatrixLimits, MatrixMachine
-from livebode.mimo.design.result import Alternative, MatrixDesign
-from livebode.mimo.design.spec import ACCURACY, KINDS, MatrixSpec
-from livebode.mimo.prediction import predict
+from livebode.mimo import predict
+from livebode_design.matrix.candidate import REPETITIONS_MAX, REPETITIONS_MIN, Candidate, candidate, repetitions
+from livebode_design.matrix.explain import explained
+from livebode_design.matrix.machine import MatrixLimits, MatrixMachine
+from livebode_design.matrix.result import Alternative, MatrixDesign
+from livebode_design.matrix.spec import ACCURACY, KINDS, MatrixSpec
 
 
 def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits) -> MatrixDesign:
@@ -30,7 +30,7 @@ def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits
 
     Examples
     --------
-    >>> from livebode.mimo.design import MechanismMachine
+    >>> from livebode_design import MechanismMachine
     >>> from livebode.simulation import GantryLoop
     >>> machine = MechanismMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001))
     >>> spec = MatrixSpec(lines="10:60:10", window=400, kind="orthogonal")

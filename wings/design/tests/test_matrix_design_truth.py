@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from livebode.core import Block, DesignError, MatrixResponses, UsageError
-from livebode.mimo import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
-from livebode.mimo.design.amplitude import best_amplitudes
-from livebode.mimo.design.candidate import RESERVE
 from livebode.simulation import CoreXYLoop, GantryLoop
+from livebode_design import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
+from livebode_design.matrix.amplitude import best_amplitudes
+from livebode_design.matrix.candidate import RESERVE
 from livebode_matrix import MatrixSettings, MatrixTracker
 
 GANTRY = MechanismMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001), torque_constant_n_m_per_a=0.5)

@@ -10,10 +10,10 @@ import numpy as np
 from livebode.arrays import Floats
 from livebode.core import DesignError, Lines, UsageError
 from livebode.excitation import low_crest_phases
-from livebode.mimo.design.amplitude import best_amplitudes
-from livebode.mimo.design.machine import LimitedPeak, MatrixLimits, MatrixMachine
-from livebode.mimo.design.spec import Kind, MatrixSpec
-from livebode.mimo.excitation import MatrixExcitation
+from livebode.mimo import MatrixExcitation
+from livebode_design.matrix.amplitude import best_amplitudes
+from livebode_design.matrix.machine import LimitedPeak, MatrixLimits, MatrixMachine
+from livebode_design.matrix.spec import Kind, MatrixSpec
 
 RESERVE = 0.1
 """Share of each limit that remains for errors of the prediction and for noise."""

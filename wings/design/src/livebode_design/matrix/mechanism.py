@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import CHANNELS_MAX, UsageError, counted
-from livebode.mimo.design.machine import MatrixMachine, each_of
-from livebode.mimo.excitation import MatrixExcitation
-from livebode.mimo.loop import MatrixLoop
+from livebode.mimo import MatrixExcitation, MatrixLoop
 from livebode.simulation import MotorLoop
+from livebode_design.matrix.machine import MatrixMachine, each_of
 
 _REPETITIONS = 2  # that are simulated from rest; later ones repeat the second
 

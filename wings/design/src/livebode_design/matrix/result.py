@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from livebode.arrays import Complex, Floats
-from livebode.mimo.design.machine import LimitedPeak, MatrixLimits, MatrixMachine
-from livebode.mimo.design.spec import HOLDING_95, MatrixSpec
-from livebode.mimo.excitation import MatrixExcitation
+from livebode.mimo import MatrixExcitation
+from livebode_design.matrix.machine import LimitedPeak, MatrixLimits, MatrixMachine
+from livebode_design.matrix.spec import HOLDING_95, MatrixSpec
 
 
 @dataclass(frozen=True)

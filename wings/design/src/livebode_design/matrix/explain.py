@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.core import counted
-from livebode.mimo.design.candidate import RESERVE
+from livebode_design.matrix.candidate import RESERVE
 
 if TYPE_CHECKING:
-    from livebode.mimo.design.result import MatrixChoice, MatrixDesign
+    from livebode_design.matrix.result import MatrixChoice, MatrixDesign
 
 _KIND = {
     "orthogonal": "all motors at all lines, with signs or phases that differ from experiment to experiment",
@@ -21,7 +21,7 @@ _KIND = {
 
 def explained(design: MatrixDesign) -> tuple[MatrixChoice, ...]:
     """The rows of the table."""
-    from livebode.mimo.design.result import MatrixChoice
+    from livebode_design.matrix.result import MatrixChoice
 
     used, lines = design.excitation, design.excitation.lines
     f, count = lines.frequency_hz, len(design.inputs)
