@@ -27,7 +27,8 @@ def read(module: str, path: Path, **options: object) -> dict[str, np.ndarray]:
 
 
 def test_every_format_has_a_writer():
-    assert {format_.reader.partition(":")[0].rpartition(".")[2] for format_ in all_formats()} == WRITERS.keys()
+    modules = {format_.reader.partition(":")[0].rpartition(".")[2] for format_ in all_formats()}
+    assert modules | {"matlab73"} == WRITERS.keys()  # a MATLAB file of version 7.3 is one of HDF5, read by its module
 
 
 @pytest.mark.parametrize("module", MODULES)
