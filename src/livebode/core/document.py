@@ -160,8 +160,8 @@ class Document:
 def document_function(name: str) -> Any:
     """What a plug-in makes of documents: the part of this name in its table.
 
-    `files` writes a Document as HTML and PDF: (document, path, *, force) → files and a remark. `comparison` makes a
-    page of two runs: (before, after, language) → HTML.
+    `files` writes a Document as HTML and PDF: ``(document, path, *, force)`` → files and a remark. `comparison` makes
+    a page of two runs: ``(before, after, language)`` → HTML.
 
     Raises
     ------
