@@ -79,7 +79,7 @@ def is_truth(blocks: list[LiveBlock]) -> None:
 
 
 def test_every_kind_has_a_peer():
-    # These do not send what they are told to: test_klipper_truth.py, test_daq_truth.py, test_hal_truth.py of the wing.
+    # These do not send what a test gives them: test_klipper_truth.py, test_daq_truth.py, test_hal_truth.py of the wing.
     own = {"klipper", "daqref", "daq.nd", "hal"}
     assert {name.split("-")[0] for name in PEERS} | {"mqtts"} | own == named("sources").keys()
 

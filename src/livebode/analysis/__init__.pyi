@@ -39,6 +39,7 @@ from livebode.analysis.run_trend import fitted_rows as fitted_rows
 from livebode.analysis.run_trend import trend_points as trend_points
 from livebode.analysis.table import Analysis as Analysis
 from livebode.analysis.table import ModelTest as ModelTest
+from livebode.analysis.table import first_analysis as first_analysis
 from livebode.analysis.table import loop_section as loop_section
 from livebode.analysis.table import model_test as model_test
 from livebode.analysis.table import proposed_filter as proposed_filter

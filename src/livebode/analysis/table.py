@@ -42,22 +42,22 @@ class Analysis(NamedTuple):
     trial: str = ""
 
 
+def first_analysis(attribute: str) -> Any:
+    """What the first analysis that has this attribute names by it; None if none has it."""
+    references = (getattr(analysis, attribute) for analysis in named("analyses").values())
+    return next((loaded(reference) for reference in references if reference), None)
+
+
 def proposed_filter(loop: LoopReport) -> dict[str, Any] | None:
-    """The filter for a loop, of the first analysis that proposes filters; None if there is none."""
-    for analysis in named("analyses").values():
-        if analysis.filter:
-            found: dict[str, Any] = loaded(analysis.filter)(loop)
-            return found
-    return None
+    """The filter for a loop; None if no analysis proposes filters."""
+    propose = first_analysis("filter")
+    return None if propose is None else propose(loop)
 
 
 def loop_section(loop: LoopReport, over_time: Sequence[Part]) -> Section | str:
-    """The section of the report on the margins of a loop, of the first analysis that has one, or why there is none."""
-    for analysis in named("analyses").values():
-        if analysis.loop:
-            found: Section = loaded(analysis.loop)(loop, over_time)
-            return found
-    return tr("No margins: the wing control is not installed.")
+    """The section of the report on the margins of a loop, or why there is none."""
+    section = first_analysis("loop")
+    return tr("No margins: the wing control is not installed.") if section is None else section(loop, over_time)
 
 
 class ModelTest(Protocol):
@@ -71,20 +71,20 @@ class ModelTest(Protocol):
 
 
 def model_test(directory: Path, on: Path) -> ModelTest:
-    """The model of a run tested on another recording, by the first analysis that tests models.
+    """The model of a run tested on another recording.
 
     Raises
     ------
     UsageError
-        If none does.
+        If no analysis tests models.
     """
-    for analysis in named("analyses").values():
-        if analysis.test:
-            found: ModelTest = loaded(analysis.test)(directory, on)
-            return found
-    raise UsageError(
-        "missing",
-        "a model is tested by the wing control, which is not installed",
-        "install the wing control of livebode",
-        argument="on",
-    )
+    test = first_analysis("test")
+    if test is None:
+        raise UsageError(
+            "missing",
+            "a model is tested by the wing control, which is not installed",
+            "install the wing control of livebode",
+            argument="on",
+        )
+    found: ModelTest = test(directory, on)
+    return found

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+from livebode.analysis import first_analysis
 from livebode.core import ServerError
 from livebode.dashboard.past import Past
 from livebode.dashboard.quantities import Quantities
-from livebode.plugins import loaded, named
 
 _MISSING, _REMEDY = "the wing control is not installed", "install this wing too"
 
@@ -36,8 +36,6 @@ class NoTrials:
 
 def loop_trials() -> LoopTrialAnswers:
     """Those of the first analysis that has some."""
-    for analysis in named("analyses").values():
-        if analysis.trial:
-            trials: LoopTrialAnswers = loaded(analysis.trial)()
-            return trials
-    return NoTrials()
+    trials = first_analysis("trial") or NoTrials
+    found: LoopTrialAnswers = trials()
+    return found

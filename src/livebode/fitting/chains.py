@@ -41,24 +41,8 @@ class Chain(PhysicalModel):
     radius_m: float | None = None
 
     def __post_init__(self) -> None:
-        if self.output not in ("velocity", "position"):
-            raise UsageError(
-                "not-one-of",
-                f"output={self.output!r} is not supported",
-                "choose 'velocity' or 'position'",
-                argument="output",
-                value=self.output,
-                allowed=["velocity", "position"],
-            )
-        if self.side not in ("motor", "load"):
-            raise UsageError(
-                "not-one-of",
-                f"side={self.side!r} is not supported",
-                "choose 'motor' or 'load'",
-                argument="side",
-                value=self.side,
-                allowed=["motor", "load"],
-            )
+        _check_choice("output", self.output, ["velocity", "position"])
+        _check_choice("side", self.side, ["motor", "load"])
         if self.radius_m is not None and not (np.isfinite(self.radius_m) and self.radius_m > 0):
             raise UsageError(
                 "out-of-range",
@@ -255,15 +239,7 @@ class TwoMassGain(PhysicalModel):
     name = Message("two-mass-gain")
 
     def __post_init__(self) -> None:
-        if self.output not in ("velocity", "position"):
-            raise UsageError(
-                "not-one-of",
-                f"output={self.output!r} is not supported",
-                "choose 'velocity' or 'position'",
-                argument="output",
-                value=self.output,
-                allowed=["velocity", "position"],
-            )
+        _check_choice("output", self.output, ["velocity", "position"])
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
@@ -340,3 +316,16 @@ class ThreeMass(Chain):
         inertia, spring, damper = chain_of(weights, omega)
         found = [inertia[..., :1], *(x / self.arm for x in (inertia[..., 1:], spring, damper))]
         return self._whole(np.concatenate(found, axis=-1), grid)
+
+
+def _check_choice(argument: str, value: str, allowed: list[str]) -> None:
+    """UsageError if a model does not have this value of an argument."""
+    if value not in allowed:
+        raise UsageError(
+            "not-one-of",
+            f"{argument}={value!r} is not supported",
+            f"choose {' or '.join(map(repr, allowed))}",
+            argument=argument,
+            value=value,
+            allowed=allowed,
+        )

@@ -8,11 +8,14 @@ from itertools import product
 
 import numpy as np
 
-from livebode.sources.recording import Column, Skipped
+from livebode.sources.damage import oversized
+from livebode.sources.recording import COLUMNS_MAX, Column, Skipped
 from livebode.sources.units import split_unit
 
 WIDTH_MAX = 64
 """A matrix with more rows and more columns than this is not a set of channels."""
+DEPTH_MAX = 32
+"""A file whose parts are nested deeper is treated as damaged."""
 
 
 @dataclass(frozen=True)
@@ -89,3 +92,13 @@ def array_columns(
         slot = Slot(array, shape, time_axis, others)
         columns.append(Column(f"{name}{index}", unit, shape[time_axis], named, key=slot))
     return columns, None
+
+
+def check_nesting(name: str, depth: int, parts: int) -> None:
+    """RecordingError at a part that is nested too deep, or one too many of those visited."""
+    if depth > DEPTH_MAX or parts > COLUMNS_MAX:
+        raise oversized(
+            f"the file is nested deeper than {DEPTH_MAX} levels or has more than {COLUMNS_MAX} parts at {name!r}",
+            COLUMNS_MAX,
+            part=name,
+        )

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from livebode.core import not_installed
-from livebode.sources.arrays import array_columns
+from livebode.sources.arrays import DEPTH_MAX, array_columns, check_nesting
 from livebode.sources.damage import oversized
 from livebode.sources.friendly import with_friendly_names
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
@@ -20,7 +20,6 @@ from livebode.tables import PACKED_MAX
 
 UNIT_ATTRIBUTES = "unit", "units", "Unit", "Units"
 CHUNK_BYTES_MAX = 1 << 28
-DEPTH_MAX = 32
 PARTS_MAX = 2 * COLUMNS_MAX
 
 
@@ -172,12 +171,7 @@ class Hdf5Collector:
 
     def visit(self, name: str, item: Any, depth: int) -> None:
         self._steps += 1
-        if depth > DEPTH_MAX or self._steps > COLUMNS_MAX:
-            raise oversized(
-                f"the file is nested deeper than {DEPTH_MAX} levels or has more than {COLUMNS_MAX} parts at {name!r}",
-                COLUMNS_MAX,
-                part=name,
-            )
+        check_nesting(name, depth, self._steps)
         if isinstance(item, self.h5py.Group):
             for field in item:
                 self._field(name, field, item[field], depth)

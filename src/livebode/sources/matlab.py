@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import needing
-from livebode.sources.arrays import array_columns
-from livebode.sources.damage import damaged, oversized, truncated
+from livebode.sources.arrays import array_columns, check_nesting
+from livebode.sources.damage import damaged, truncated
 from livebode.sources.friendly import with_friendly_names
 from livebode.sources.mat5check import (
     COMPRESSED,
@@ -27,7 +27,7 @@ from livebode.sources.mat5check import (
     Variable,
     list_variables,
 )
-from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+from livebode.sources.recording import Chunk, Column, Recording, Skipped
 
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 LENGTH_MIN = 1024
@@ -78,7 +78,6 @@ with needing("SciPy", "analysis", "a MATLAB file"):
 NUMERIC = {
     "double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64",
 }  # fmt: skip
-DEPTH_MAX = 32
 
 
 class MatlabRecording(Recording):
@@ -146,12 +145,7 @@ class MatlabCollector:
 
     def visit(self, name: str, value: Any, depth: int) -> None:
         self._steps += 1
-        if depth > DEPTH_MAX or self._steps > COLUMNS_MAX:
-            raise oversized(
-                f"the file is nested deeper than {DEPTH_MAX} levels or has more than {COLUMNS_MAX} parts at {name!r}",
-                COLUMNS_MAX,
-                part=name,
-            )
+        check_nesting(name, depth, self._steps)
         if not isinstance(value, np.ndarray):
             self.skipped.append(Skipped(name, f"it is of type {type(value).__name__}"))
         elif value.dtype.names:

@@ -18,5 +18,5 @@ byId("form").addEventListener("submit", async (event) => {
   if (answer?.ok) location.replace("/");
   else byId("wrong").textContent = answer ? (await refusal(answer)).message : tr("The server does not answer.");
 });
-// Before this script runs, the browser would send the form to this page itself, and nobody is told whether it is right.
+// Before this script runs, the browser would send the form to this page itself, and nobody sees whether it is right.
 byId("log-in", HTMLButtonElement).disabled = false;

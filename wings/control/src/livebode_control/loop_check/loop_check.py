@@ -120,12 +120,6 @@ class LoopCheck:
         return float(away[at]), bound, float(self.residual.frequency_hz[at])
 
     @property
-    def smallest_seen(self) -> float:
-        """Bound (95 %) of the controller at the line where it is known best, relative; NaN if unknown."""
-        sigma = self.residual.ratio_sigma
-        return float(np.sqrt(-np.log(0.05)) * np.nanmin(sigma)) if np.isfinite(sigma).any() else float("nan")
-
-    @property
     def sentence(self) -> str:
         """The verdict."""
         if self.verdict == "as described":
