@@ -8,12 +8,12 @@ from typing import Annotated, Literal
 
 import typer
 
-from livebode.cli import Json
-from livebode.core import UsageError
+from livebode.cli import Json, check_use
 from livebode_plant.cli.archive.options import LakeOf
 
 
 def run_command(
+    context: typer.Context,
     archive: LakeOf,
     retry: Annotated[
         Literal["all", "older"] | None,
@@ -38,13 +38,7 @@ def run_command(
     """
     from livebode_plant.cli.archive.showing import track
 
-    if compact and retry is not None:
-        raise UsageError(
-            "conflict",
-            "--retry and --compact exclude each other",
-            "give them one after the other",
-            options=["--retry", "--compact"],
-        )
+    check_use(context, "--compact", ())
     if compact:
         _compact(archive, as_json=as_json)
     elif retry is not None:
