@@ -78,7 +78,7 @@ def messages(responses: Responses, axes: int, seconds: float) -> Iterator[Stored
                 name: getattr(own, name) * (1 + SCATTER * rng.standard_normal(own.value.shape)) for name in SCATTERED
             }
             own = replace(own, **scattered, time_s=number * EVERY_S + np.arange(count) / RESPONSES_PER_S)
-            parts.append(AxisRows(key, 1, number * count, own))
+            parts.append(AxisRows.of(key, 1, number * count, own))
             found = 1e5 * (1 + SCATTER * rng.standard_normal((count, PARAMETERS)))
             covariance = np.broadcast_to(1e4 * np.eye(2), (count, 2, 2)).copy()
             fitted = Parameters(

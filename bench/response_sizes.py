@@ -72,7 +72,7 @@ def found_of(responses: Responses) -> dict[str, object]:
 def in_messages(responses: Responses) -> str:
     """Bytes of a response in a message of results of a partition with some axes, by form."""
     parts = [
-        AxisRows(f"hall.2.machine {i}.x", 1, 0, responses[EACH * i : EACH * (i + 1)]) for i in range(AXES_IN_MESSAGE)
+        AxisRows.of(f"hall.2.machine {i}.x", 1, 0, responses[EACH * i : EACH * (i + 1)]) for i in range(AXES_IN_MESSAGE)
     ]
     grids = {part.axis: grid_of(part.responses) for part in parts}
     rounded = len(ResultMessage(1, "worker:1", rows=response_table(parts), grids=grids).to_bytes())

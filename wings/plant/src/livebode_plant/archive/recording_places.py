@@ -11,7 +11,7 @@ import pyarrow as pa
 from livebode.core import LEVELS, ArchiveError
 from livebode.locations import Location, find, location
 from livebode_plant.archive.template import Template
-from livebode_plant.lake import FILES, Key, Lake
+from livebode_plant.lake import TABLES, Key, Lake
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def file_rows(contents: Iterable[tuple[RecordingPlace, str]], machine: dict[str,
         | levels_of(place, machine)
         for place, content in contents
     ]
-    return pa.Table.from_pylist(rows, schema=FILES)
+    return pa.Table.from_pylist(rows, schema=TABLES["files"].schema)
 
 
 def untracked(

@@ -26,7 +26,7 @@ from livebode_plant.fleet.log import FleetLog, StoredMessage
 from livebode_plant.fleet.message import read_message
 from livebode_plant.fleet.reader import stored_messages
 from livebode_plant.fleet.subjects import LOG, LOG_STREAM, axis_names, axis_path, axis_token
-from livebode_plant.lake import FLEET_SAMPLES, TABLES, Lake, StreamTable
+from livebode_plant.lake import TABLES, Lake, StreamTable
 from livebode_plant.lake.wide_responses import wide_options
 
 KINDS = (*ALARMS, "axis-failed")
@@ -34,6 +34,7 @@ KINDS = (*ALARMS, "axis-failed")
 AROUND_S = 60.0
 _LATE_S = 5.0
 _FOLDER = "fleet_alarm_samples"
+_SCHEMA = TABLES["fleet_samples"].schema
 
 
 class RaisedAlarm(NamedTuple):
@@ -122,14 +123,14 @@ class AlarmSamples:
             place = location(self._lake.url)
             target = place.joinpath(file) if isinstance(place, Path) else place / file
             write_whole(target, buffer.getvalue().to_pybytes())
-            rows.append({name: about[name] for name in FLEET_SAMPLES.names if name in about} | {"file": file})
+            rows.append({name: about[name] for name in _SCHEMA.names if name in about} | {"file": file})
         return rows
 
     def _note(self, alarm: RaisedAlarm, rows: Sequence[dict[str, Any]]) -> None:
         own = {"log": self._name, "kind": alarm.kind, "logged": _time(alarm.logged_s)}
         own |= dict(zip(LEVELS, axis_names(alarm.axis)))
         found = [own | row for row in rows or [{"samples": 0}]]
-        self._lake.add_rows("fleet_samples", pa.Table.from_pylist(found, FLEET_SAMPLES))
+        self._lake.add_rows("fleet_samples", pa.Table.from_pylist(found, _SCHEMA))
 
 
 def _tuples(table: pa.Table) -> Iterator[tuple[Any, ...]]:

@@ -168,7 +168,7 @@ class _Again:
         stream = self._streams[key]
         output = stream.process(data, number, stored_s)
         if output.responses is not None:
-            rows = response_table([AxisRows(key, stream.run, output.number, output.responses)])
+            rows = response_table([AxisRows.of(key, stream.run, output.number, output.responses)])
             for _, run, response, digest in _digests(rows):
                 self._expected.setdefault((key, run), {})[response] = digest
         fits = [AxisFits(key, stream.run, output.fitted, one) for one in output.parameters]

@@ -15,7 +15,6 @@ from livebode_plant.fleet.axis_stream import RESPONSE_BYTES, AxisStream, Output,
 from livebode_plant.fleet.wide_rows import (
     PARAMETERS,
     ROWS,
-    AxesRows,
     AxisFits,
     AxisRows,
     grid_of,
@@ -112,7 +111,7 @@ class PendingResults:
     """Outputs that are not stored yet."""
 
     def __init__(self) -> None:
-        self._responses: list[AxisRows | AxesRows] = []
+        self._responses: list[AxisRows] = []
         self._parameters: list[AxisFits] = []
         self._events: list[dict[str, Any]] = []
         self._recipes: dict[str, str] = {}
@@ -128,7 +127,7 @@ class PendingResults:
         # The details repeat the message as its template and its facts.
         self.nbytes += sum(_EVENT_BYTES + 3 * len(event.message) for event in output.events)
         if output.responses is not None:
-            self._responses.append(AxisRows(key, stream.run, output.number, output.responses))
+            self._responses.append(AxisRows.of(key, stream.run, output.number, output.responses))
             self.nbytes += output.responses.value.size * RESPONSE_BYTES
         for parameters in output.parameters:
             self._parameters.append(AxisFits(key, stream.run, output.fitted, parameters))
@@ -139,7 +138,7 @@ class PendingResults:
     def add_rows(self, keys: Sequence[str], streams: Sequence[AxisStream], stack: StackedRows) -> None:
         """Append the responses of several axes."""
         runs = [stream.run for stream in streams]
-        self._responses.append(AxesRows(keys, runs, stack.numbers, stack.responses))
+        self._responses.append(AxisRows(keys, runs, stack.numbers, stack.responses))
         self.nbytes += stack.responses.value.size * RESPONSE_BYTES
         for key, stream in zip(keys, streams):
             self._recipes[key], self._logged_s[key] = stream.recipe, stream.log_s
@@ -164,6 +163,5 @@ class PendingResults:
     def _grids(self) -> dict[str, Mapping[str, Any]]:
         found: dict[str, Mapping[str, Any]] = {}
         for part in self._responses:
-            grid = grid_of(part.responses)
-            found |= dict.fromkeys([part.axis] if isinstance(part, AxisRows) else part.axes, grid)
+            found |= dict.fromkeys(part.axes, grid_of(part.responses))
         return found

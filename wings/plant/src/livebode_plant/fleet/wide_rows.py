@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from livebode.core import Parameters, Responses
 from livebode.records import PARAMETER_SCHEMA, parameter_rows
 from livebode.tables import from_numpy, text
-from livebode_plant.lake.wide_responses import wide_schema
+from livebode_plant.lake.wide_responses import wide_columns, wide_schema
 
 _PLACE = (("axis", pa.string()), ("run", pa.int64()), ("number", pa.int64()))
 _DIGEST_BYTES = 8
@@ -21,14 +21,12 @@ _BITS = (
     "first", "sample", "time_s", "schedule", "dof", "ready", "valid", "value", "weight", "sigma", "coherence",
     "input_coherence", "distortion",
 )  # fmt: skip
-
-
-def _any_length(field: pa.Field[Any]) -> pa.Field[Any]:
-    kind = field.type
-    return field.with_type(pa.list_(kind.value_type)) if isinstance(kind, pa.FixedSizeListType) else field
-
-
-_WIDE = [_any_length(field) for field in wide_schema(1)]
+_WIDE = pa.schema(
+    [
+        field.with_type(pa.list_(field.type.value_type)) if pa.types.is_fixed_size_list(field.type) else field
+        for field in wide_schema(1)
+    ]
+)
 ROWS = pa.schema([*_PLACE, ("digest", pa.int64()), *_WIDE])
 """A row for each response: key of the axis; number in the log of the first message of its run; number of the response
 within that run; digest of all its bits in full precision; and the columns of `wide_schema`, as lists of any length,
@@ -39,16 +37,7 @@ are those of parameters.parquet."""
 
 
 class AxisRows(NamedTuple):
-    """Consecutive responses of a run of an axis, from this number on."""
-
-    axis: str
-    run: int
-    number: int
-    responses: Responses
-
-
-class AxesRows(NamedTuple):
-    """A response of each of several axes: key, run and number of each row."""
+    """Responses of one axis or of several: key, run and number of each row."""
 
     axes: Sequence[str]
     runs: Sequence[int]
@@ -56,11 +45,10 @@ class AxesRows(NamedTuple):
     responses: Responses
 
     @classmethod
-    def of(cls, part: AxisRows) -> AxesRows:
-        """The rows of one axis."""
-        count = len(part.responses)
-        numbers = range(part.number, part.number + count)
-        return cls([part.axis] * count, [part.run] * count, numbers, part.responses)
+    def of(cls, axis: str, run: int, number: int, responses: Responses) -> AxisRows:
+        """Consecutive responses of a run of an axis, from this number on."""
+        count = len(responses)
+        return cls([axis] * count, [run] * count, range(number, number + count), responses)
 
 
 class AxisFits(NamedTuple):
@@ -72,31 +60,18 @@ class AxisFits(NamedTuple):
     parameters: Parameters
 
 
-def response_table(parts: Sequence[AxisRows | AxesRows]) -> pa.Table:
-    """Rows of `ROWS`, part by part. All axes are converted at once: each conversion costs as much as many rows."""
+def response_table(parts: Sequence[AxisRows]) -> pa.Table:
+    """Rows of `ROWS`, part by part."""
     if not parts:
         return ROWS.empty_table()
-    found = [AxesRows.of(part) if isinstance(part, AxisRows) else part for part in parts]
-    every = [part.responses for part in found]
-    lines = np.repeat([len(one.lines) for one in every], [len(one) for one in every])
-    ends = pa.array(np.concatenate([[0], np.cumsum(lines)]).astype(np.int32))
-    words = [axis for part in found for axis in part.axes]
-    columns: dict[str, pa.Array[Any]] = {
-        "axis": text(words),
-        "run": from_numpy(np.array([run for part in found for run in part.runs], dtype=np.int64)),
-        "number": from_numpy(np.array([number for part in found for number in part.numbers], dtype=np.int64)),
-        "digest": from_numpy(np.concatenate([digests(one) for one in every])),
-    }
-    with np.errstate(over="ignore", under="ignore"):
-        for field in _WIDE:
-            if isinstance(field.type, pa.ListType):
-                kind = field.type.value_type.to_pandas_dtype()
-                flat = np.concatenate([_quantity(one, field.name).ravel() for one in every]).astype(kind, copy=False)
-                columns[field.name] = pa.ListArray.from_arrays(ends, from_numpy(flat))
-            else:
-                flat = np.concatenate([getattr(one, field.name) for one in every])
-                columns[field.name] = from_numpy(flat.astype(field.type.to_pandas_dtype(), copy=False))
-    return pa.Table.from_arrays([columns[name] for name in ROWS.names], schema=ROWS)
+    every = [part.responses for part in parts]
+    own = [
+        text([axis for part in parts for axis in part.axes]),
+        from_numpy(np.array([run for part in parts for run in part.runs], dtype=np.int64)),
+        from_numpy(np.array([number for part in parts for number in part.numbers], dtype=np.int64)),
+        from_numpy(np.concatenate([digests(batch) for batch in every])),
+    ]
+    return pa.Table.from_arrays([*own, *wide_columns(every, _WIDE)], schema=ROWS)
 
 
 def parameter_table(parts: Sequence[AxisFits]) -> pa.Table:
@@ -134,11 +109,3 @@ def grid_of(responses: Responses) -> Mapping[str, Any]:
     lines = responses.lines
     grid = {"bins": list(lines.bins), "quiet_bins": list(lines.quiet), "window": lines.window}
     return grid | {"rate_hz": lines.rate_hz, "quantity": responses.quantity, "unit": responses.unit}
-
-
-def _quantity(responses: Responses, name: str) -> NDArray[Any]:
-    """A column of lists, shape (rows, lines)."""
-    if name in ("re", "im", "weight_re", "weight_im"):
-        pair = responses.weight if name.startswith("weight") else responses.value
-        return np.asarray(pair.real if name.endswith("re") else pair.imag)
-    return np.asarray(getattr(responses, name))

@@ -7,7 +7,7 @@ each line.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,13 +59,30 @@ def to_wide(responses: Responses, *, lossless: bool = False) -> pa.Table:
     (40, 'fixed_size_list<item: float>[13]')
     """
     schema = wide_schema(len(responses.lines), lossless=lossless)
-    columns: dict[str, NDArray[Any]] = {name: getattr(responses, name) for name in (*_COUNTED, "time_s", *_ROUNDED)}
-    columns |= {name: getattr(responses, name) for name in ("ready", "valid", *_REAL)}
-    for name, (real, imaginary) in _COMPLEX.items():
-        columns[real], columns[imaginary] = getattr(responses, name).real, getattr(responses, name).imag
+    return pa.Table.from_arrays(wide_columns([responses], schema), schema=schema)
+
+
+def wide_columns(batches: Sequence[Responses], schema: pa.Schema) -> list[pa.Array[Any]]:
+    """The columns of this schema, batch by batch; lists of any length if the batches have different lines.
+
+    All batches are converted at once: each conversion costs as much as many rows.
+    """
+    lines = np.repeat([len(batch.lines) for batch in batches], [len(batch) for batch in batches])
+    ends = pa.array(np.concatenate([[0], np.cumsum(lines)]).astype(np.int32))
     with np.errstate(over="ignore", under="ignore"):
-        arrays = [as_arrow(columns[field.name], field.type) for field in schema]
-    return pa.Table.from_arrays(arrays, schema=schema)
+        return [
+            as_arrow(np.concatenate([_quantity(batch, field.name).ravel() for batch in batches]), field.type, ends)
+            for field in schema
+        ]
+
+
+def _quantity(responses: Responses, column: str) -> NDArray[Any]:
+    """What a column has, shape (rows,) or (rows, lines)."""
+    for name, (real, imaginary) in _COMPLEX.items():
+        if column in (real, imaginary):
+            values = getattr(responses, name)
+            return np.asarray(values.real if column == real else values.imag)
+    return np.asarray(getattr(responses, column))
 
 
 def from_wide(table: pa.Table, found: Mapping[str, Any]) -> Responses:
@@ -130,12 +147,13 @@ def wide_options(schema: pa.Schema) -> dict[str, Any]:
     }
 
 
-def as_arrow(values: NDArray[Any], kind: pa.DataType) -> pa.Array[Any]:
-    """A column of this type, shape (rows,), or of lists of fixed length, shape (rows, lines)."""
-    if not isinstance(kind, pa.FixedSizeListType):
-        return from_numpy(values.astype(kind.to_pandas_dtype(), copy=False))
-    flat = from_numpy(values.astype(kind.value_type.to_pandas_dtype(), copy=False).ravel())
-    return pa.FixedSizeListArray.from_arrays(flat, type=kind)
+def as_arrow(values: NDArray[Any], kind: pa.DataType, ends: pa.Array[Any] | None = None) -> pa.Array[Any]:
+    """A column of this type from its values in order; lists have a fixed length, or these `ends`, shape (rows + 1,)."""
+    nested = pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind)
+    flat = from_numpy(values.ravel().astype((kind.value_type if nested else kind).to_pandas_dtype(), copy=False))
+    if pa.types.is_list(kind):
+        return pa.ListArray.from_arrays(ends, flat)
+    return pa.FixedSizeListArray.from_arrays(flat, type=kind) if nested else flat
 
 
 def as_numpy(table: pa.Table, field: pa.Field[Any], lines: Lines) -> NDArray[Any]:
