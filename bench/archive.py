@@ -39,22 +39,22 @@ from livebode.core import Lines
 from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
 from livebode_plant.archive.alone import handle_alone
-from livebode_plant.archive.archive_settings import ArchiveSettings, ClusterSection
-from livebode_plant.archive.clusters import Cluster, started
-from livebode_plant.archive.coordinator import Committer
-from livebode_plant.archive.distribution import Distribution
-from livebode_plant.archive.groups import RecordingGroups
-from livebode_plant.archive.job import Job
-from livebode_plant.archive.recording_places import (
+from livebode_plant.archive.archive_settings import ArchiveSettings, ClusterSection, Template
+from livebode_plant.archive.archived_recordings import (
     ArchivedRecording,
     RecordingPlace,
+    RecordingResults,
+    TrackedResult,
+    each_result,
     file_rows,
     find_places,
     longest_first,
+    lost,
 )
-from livebode_plant.archive.results import RecordingResults, TrackedResult, each_result, lost
-from livebode_plant.archive.tasks import handle, handle_one
-from livebode_plant.archive.template import Template
+from livebode_plant.archive.clusters import Cluster, started
+from livebode_plant.archive.coordinator import Committer
+from livebode_plant.archive.distribution import Distribution, RecordingGroups
+from livebode_plant.archive.tasks import Job, handle, handle_one
 from livebode_plant.lake import TABLES, Lake
 
 WORKERS, RATE_HZ, WINDOW = 2, 4000.0, 400

@@ -21,9 +21,15 @@ from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 from livebode_plant.fleet.fleet_settings import SinkSection
 from livebode_plant.fleet.log import StoredMessage
-from livebode_plant.fleet.result_message import ResultMessage
+from livebode_plant.fleet.result_message import (
+    AxisFits,
+    AxisRows,
+    ResultMessage,
+    grid_of,
+    parameter_table,
+    response_table,
+)
 from livebode_plant.fleet.sink_tables import SinkTables
-from livebode_plant.fleet.wide_rows import AxisFits, AxisRows, grid_of, parameter_table, response_table
 from livebode_plant.lake import Lake
 
 RATE_HZ, WINDOW, LINES, HOP, TRACKED_S = 4000.0, 400, 7, 2000, 60.0

@@ -22,8 +22,7 @@ from livebode.records import RESPONSES, ColumnTable, as_batch
 from livebode.records.table_file import TableFile
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 from livebode.tables import Table
-from livebode_plant.fleet.result_message import ResultMessage
-from livebode_plant.fleet.wide_rows import AxisRows, grid_of, response_table
+from livebode_plant.fleet.result_message import AxisRows, ResultMessage, grid_of, response_table
 from livebode_plant.lake.wide_responses import from_wide, to_wide, wide_options
 
 RATE_HZ, WINDOW, HOP, SECONDS = 4000.0, 400, 20, 60.0

@@ -16,30 +16,27 @@ from packaging.version import Version
 from livebode.version import __version__
 from livebode_plant.archive.alone import handle_alone
 from livebode_plant.archive.archive_settings import ArchiveSettings
-from livebode_plant.archive.contents import quarantine
-from livebode_plant.archive.groups import RecordingGroups
-from livebode_plant.archive.job import Job, short
-from livebode_plant.archive.recording_places import (
+from livebode_plant.archive.archived_recordings import (
     ArchivedRecording,
-    RecordingPlace,
-    file_rows,
-    find_places,
-    known_contents,
-    levels_of,
-    longest_first,
-    place_of,
-    untracked,
-)
-from livebode_plant.archive.results import (
     HashedContent,
+    RecordingPlace,
     RecordingResults,
     Result,
     TrackedResult,
     TrackingFailure,
     each_result,
+    file_rows,
+    find_places,
+    known_contents,
+    levels_of,
+    longest_first,
     lost,
+    place_of,
+    untracked,
 )
-from livebode_plant.archive.tasks import handle
+from livebode_plant.archive.contents import quarantine
+from livebode_plant.archive.distribution import RecordingGroups
+from livebode_plant.archive.tasks import Job, handle, short
 from livebode_plant.lake import TABLES, DataFile, Lake
 
 if TYPE_CHECKING:

@@ -31,9 +31,8 @@ from livebode.locations import (
     write_whole,
 )
 from livebode.records import VerifiedFiles
-from livebode_plant.lake.data_file import DataFile, Key, file_bytes
+from livebode_plant.lake.data_file import DamagedTableError, DataFile, Key, Snapshot, file_bytes
 from livebode_plant.lake.schemas import TABLES
-from livebode_plant.lake.snapshot import DamagedTableError, Snapshot
 from livebode_plant.lake.table_directory import check_directory, check_names, delta_options, remove_data
 
 Row = tuple[Any, ...]

@@ -16,8 +16,7 @@ import pyarrow as pa
 
 from livebode.core import LEVELS
 from livebode.records import PARAMETER_SCHEMA
-from livebode_plant.lake.wide_matrices import covariance_schema, entry_schema
-from livebode_plant.lake.wide_responses import wide_schema
+from livebode_plant.lake.wide_responses import covariance_schema, entry_schema, wide_schema
 
 TIME: Final = pa.timestamp("us", tz="UTC")
 MACHINE: Final = [(level, pa.string()) for level in LEVELS]
