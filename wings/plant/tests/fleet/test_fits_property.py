@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from livebode.configuration import Axis
 from livebode.core import Responses
-from livebode_plant.fleet.axis_stream import AxisStream, Output, outputs_together
+from livebode_plant.fleet.alike_axes import Output, outputs_together
+from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.result_message import PendingResults, ResultMessage
 from livebode_plant.fleet.status_message import (
     ACTIVE,

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from livebode.core import FleetError, Parameters, Responses
 from livebode.records import PARAMETER_SCHEMA, parameter_rows
 from livebode.tables import from_numpy, text
-from livebode_plant.fleet.axis_stream import RESPONSE_BYTES, AxisStream, Output, StackedRows
+from livebode_plant.fleet.alike_axes import Output, StackedRows
+from livebode_plant.fleet.axis_stream import RESPONSE_BYTES, AxisStream
 from livebode_plant.lake.wide_responses import wide_columns, wide_schema
 
 _PLACE = (("axis", pa.string()), ("run", pa.int64()), ("number", pa.int64()))
