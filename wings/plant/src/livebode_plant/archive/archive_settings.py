@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 from urllib.parse import urlsplit
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from livebode.configuration import Axis, File, Schema, read_table, schema_of, tables_of
 from livebode.core import LEVELS, ConfigError, on_loopback
-from livebode_plant.settings_section import SettingsSection, first_error
+from livebode_plant.settings_section import SettingsFile, SettingsSection, place_beside
 
 _PARTS = re.compile(r"\*\*/|\*|\?|\{(\w*)\}")
 _WILD = {"**/": "(?:.*/)?", "*": "[^/]*", "?": "[^/]"}
@@ -146,7 +146,7 @@ class ClusterSection(SettingsSection):
             )
 
 
-class ArchiveSettings(SettingsSection):
+class ArchiveSettings(SettingsFile):
     """An archive of recordings, and the lake of their results.
 
     Parameters
@@ -173,37 +173,23 @@ class ArchiveSettings(SettingsSection):
     baselines: Text | None = None
     cluster: ClusterSection = ClusterSection()
 
-    @classmethod
-    def read(cls, path: Path) -> Self:
-        """The settings in a TOML file.
+    def check(self) -> None:
+        """ConfigError if the cluster would be open to others, or a template is invalid."""
+        self.cluster.checked()
+        for template in self.templates:
+            template.checked()
+        if self.baselines is not None:
+            check_baselines(self.baselines, "baselines")
 
-        Raises
-        ------
-        ConfigError
-            If the file cannot be read, is not TOML, or a key or a value is invalid, or a cluster would be open to
-            others.
-        """
-        try:
-            found = cls.model_validate(read_table(path))
-            found.cluster.checked()
-            for template in found.templates:
-                template.checked()
-            if found.baselines is not None:
-                check_baselines(found.baselines, "baselines")
-        except ValidationError as error:
-            raise first_error(error, cls).at(str(path)) from None
-        except ConfigError as error:
-            raise (error if error.place else error.at(str(path))) from None
-        folder = path.absolute().parent
-        return found.model_copy(
-            update={
-                "inputs": [_beside(folder, one) for one in found.inputs],
-                "recipe": folder / found.recipe,
-                "lake": _beside(folder, found.lake),
-                "baselines": None if found.baselines is None else str(folder / found.baselines),
-                "cluster": found.cluster.with_files(folder, "certificate", "key", "authority"),
-            }
-        )
+    def beside(self, folder: Path) -> Self:
+        """The settings with their paths relative to a folder."""
+        folder = folder.absolute()  # places of recordings are stored in the lake
+        places = {
+            "inputs": [place_beside(folder, text) for text in self.inputs],
+            "lake": place_beside(folder, self.lake),
+            "baselines": None if self.baselines is None else str(folder / self.baselines),
+        }
+        return super().beside(folder).model_copy(update=places)
 
     @property
     def templates(self) -> list[Template]:
@@ -275,7 +261,3 @@ def archive_schema() -> Schema:
 def lake_url(target: str) -> str:
     """The lake of an archive.toml, or this path or URL itself."""
     return ArchiveSettings.read(Path(target)).lake if target.lower().endswith(".toml") else target
-
-
-def _beside(folder: Path, place: str) -> str:
-    return place if "://" in place else str(folder / place)
