@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from livebode.cli import Csv, Json, RowsMax, check_query, console, is_terminal, print_result
-from livebode_plant.cli.archive.options import LakeOf
+from livebode_plant.cli.archive.selection import LakeOf
 
 _COLUMNS = ("machine", "runs", "judged", "alarming", "quarantined", "first", "last")
 
