@@ -137,12 +137,12 @@ class Axis(ConfigurationSection):
         if axis.source.replay is not None:
             check_keys(axis.source, "replay")
         try:
-            rule(MATRIX if axis.signals.is_matrix else RESPONSE, "check")(axis)
-        except ConfigError as error:
-            raise error.at(origin) from None
-        if axis.output_only is not None:
-            check_output_only(axis, origin)
-        try:
+            if axis.signals.is_matrix:
+                rule(MATRIX, "check")(axis)
+            else:
+                _check_no_matrix(axis.experiments, axis.loop, axis.monitoring)
+            if axis.output_only is not None:
+                check_output_only(axis)
             check_publish(axis.publish)
         except ConfigError as error:
             raise error.at(origin) from None
@@ -220,6 +220,22 @@ def _with(path: Path, only: type[Only], name: str) -> Only | Axis:
         return only.model_validate(data)
     except ValidationError as error:
         raise _first_of(error).at(str(path)) from None
+
+
+def _check_no_matrix(experiments: ExperimentsSection | None, loop: LoopSection, monitoring: MonitoringSection) -> None:
+    """ConfigError if an axis with a single response sets what only a matrix has."""
+    unused = ["experiments"] if experiments is not None else []
+    if loop.controllers:
+        unused.append("loop.controllers")
+    if monitoring.gantry is not None:
+        unused.append("monitoring.gantry")
+    if unused:
+        raise ConfigError(
+            "key-conflict",
+            f"{unused[0]} belongs to a matrix of responses, but [signals] names one output and one input",
+            "remove it, or list several channels in signals.output or signals.input",
+            key=unused[0],
+        )
 
 
 def _of_one_recording(axis: Axis) -> list[str]:

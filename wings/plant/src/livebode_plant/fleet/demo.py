@@ -22,12 +22,12 @@ from livebode.configuration import Axis
 from livebode.core import Lines, counted
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 from livebode.sources.live import Batch
-from livebode_plant.fleet.check import CheckResult, check_results
 from livebode_plant.fleet.coordinator import FleetCoordinator
 from livebode_plant.fleet.edge import Edge, send_edges
 from livebode_plant.fleet.edge_buffer import FILE_BYTES, EdgeBuffer
 from livebode_plant.fleet.fleet_settings import FleetSettings
 from livebode_plant.fleet.log import FleetLog
+from livebode_plant.fleet.replay import CheckResult, check_results
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.fleet.status import fleet_status, silences
 

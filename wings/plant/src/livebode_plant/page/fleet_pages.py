@@ -14,13 +14,15 @@ Numbers are little endian.
 
 from __future__ import annotations
 
+import asyncio
 import gzip
 import struct
 import time
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from starlette.requests import Request
@@ -28,12 +30,14 @@ from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from livebode.core import ServerError
+from livebode.core import LivebodeError, ServerError
 from livebode.dashboard import (
     Act,
+    AlarmRequest,
     Board,
     BrowserSocket,
     Order,
+    Pulse,
     Role,
     alarm_request,
     error_answer,
@@ -42,13 +46,81 @@ from livebode.dashboard import (
 )
 from livebode.language import Message
 from livebode.records import to_json
-from livebode_plant.page.fleet_view import FleetView
+from livebode_plant.page.fleet_board import FleetBoard
+from livebode_plant.page.fleet_feed import StatusFeed
 
-if TYPE_CHECKING:
-    from starlette.responses import Response
-    from starlette.routing import BaseRoute
+TICK_S, IDLE_S = 0.25, 1.0
+"""Between two updates of the board, with and without browsers."""
+RETRY_S = 2.0
+_WAITING_MAX = 1 << 14
 
-    from livebode.dashboard import Board
+
+@dataclass
+class FleetView:
+    """What `livebode fleet status --serve` shows: passes the messages of a feed to the board, and wakes the browsers.
+
+    Attributes
+    ----------
+    feed
+        Source of the messages.
+    plan
+        SVG of a floor plan; None without one.
+    trends
+        Address of a page of trends, to which "#axis=PATH" is appended; empty without one.
+    lake
+        Directory or URL of the lake with the results of the fleet; empty without one.
+    """
+
+    feed: StatusFeed
+    plan: str | None = None
+    trends: str = ""
+    lake: str = ""
+    board: FleetBoard = field(default_factory=FleetBoard)
+    pulse: Pulse = field(default_factory=Pulse)
+    browsers: int = 0
+    _messages: deque[bytes] = field(default_factory=lambda: deque(maxlen=_WAITING_MAX))
+    _acts: deque[bytes] = field(default_factory=deque)
+
+    @property
+    def static(self) -> Path:
+        """Directory of the files of the page."""
+        return Path(__file__).parent / "static"
+
+    def routes(self, board: Board, file: Callable[[str], Response], order: Order) -> list[BaseRoute]:
+        """Routes of the page."""
+        return FleetPages(self, board, file, order).routes
+
+    async def run(self) -> None:
+        """Follow the feed until it is cancelled."""
+        following = asyncio.create_task(self._follow())
+        try:
+            while not following.done():
+                self._tick()
+                await asyncio.wait([following], timeout=TICK_S if self.browsers else IDLE_S)
+            following.result()
+        finally:
+            following.cancel()
+
+    async def act(self, act: Act, asked: AlarmRequest) -> None:
+        """Do what a person asks for; LivebodeError if it is impossible."""
+        await self.feed.publish(self.board.act(act, asked, time.time()))
+
+    async def _follow(self) -> None:
+        while True:
+            try:
+                await self.feed.run(self._messages.append, self._acts.append)
+            except LivebodeError as error:
+                self.feed.trouble = str(error)
+            await asyncio.sleep(RETRY_S)
+
+    def _tick(self) -> None:
+        now_s, board = time.time(), self.board
+        messages = [self._messages.popleft() for _ in range(len(self._messages))]
+        board.process(messages, now_s)
+        while self._acts:
+            board.process_act(self._acts.popleft())
+        board.refresh(now_s)
+        self.pulse.beat()
 
 
 _HEADER = struct.Struct("<4sBBxxII")
@@ -276,25 +348,3 @@ class FleetPages:
 
 def _unknown() -> Response:
     return JSONResponse(error_answer(Message("log in first")), 401)
-
-
-@dataclass(frozen=True)
-class FleetSite:
-    """A fleet for `Dashboard.show`; it can be made without the packages of the dashboard."""
-
-    view: FleetView
-
-    @property
-    def static(self) -> Path:
-        """Directory of the files of the page."""
-        return Path(__file__).parent / "static"
-
-    def routes(self, board: Board, file: Callable[[str], Response], order: Order) -> list[BaseRoute]:
-        """The routes of the page."""
-        from livebode_plant.page.fleet_pages import FleetPages
-
-        return FleetPages(self.view, board, file, order).routes
-
-    async def run(self) -> None:
-        """Follow the fleet until it is cancelled."""
-        await self.view.run()

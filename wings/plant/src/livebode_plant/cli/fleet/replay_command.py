@@ -12,9 +12,8 @@ from livebode.cli import Json
 from livebode_plant.cli.fleet.options import Fleet
 
 if TYPE_CHECKING:
-    from livebode_plant.fleet.check import CheckResult
     from livebode_plant.fleet.fleet_settings import FleetSettings
-    from livebode_plant.fleet.replay import ReplayedAxis
+    from livebode_plant.fleet.replay import CheckResult, ReplayedAxis
 
 
 def replay_command(
@@ -48,9 +47,8 @@ def _compare(settings: FleetSettings, *, as_json: bool) -> None:
     import asyncio
 
     from livebode.records import to_json
-    from livebode_plant.cli.fleet.verdict import require_exact, verdict
-    from livebode_plant.fleet.check import check_results
     from livebode_plant.fleet.log import FleetLog
+    from livebode_plant.fleet.replay import check_results, require_exact, verdict
 
     axes = settings.read_axes()
 

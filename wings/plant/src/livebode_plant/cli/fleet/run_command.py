@@ -48,7 +48,7 @@ def run_command(
 
 
 def _run(fleet: Path, *, as_json: bool) -> None:
-    from livebode_plant.fleet.worker_process import import_early
+    from livebode_plant.fleet.coordinator import import_early
 
     import_early()  # beside the imports of this process
     import asyncio
@@ -82,8 +82,8 @@ def _run_demo(*, as_json: bool) -> None:
     import tempfile
 
     from livebode.records import to_json
-    from livebode_plant.cli.fleet.verdict import require_exact, verdict
     from livebode_plant.fleet.demo import demo
+    from livebode_plant.fleet.replay import require_exact, verdict
 
     began = time.monotonic()
 

@@ -1,5 +1,5 @@
 // @ts-check
-// The web socket of a fleet's page: looks of all axes as bytes (fleet_frames.py), lists as JSON.
+// The web socket of a fleet's page: looks of all axes as bytes (fleet_pages.py), lists as JSON.
 import { below } from "./link.js";
 
 /**
