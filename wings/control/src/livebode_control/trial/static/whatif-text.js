@@ -5,7 +5,7 @@ import { biquadsOf } from "./trial.js";
 import { worded } from "./worded.js";
 import { plain } from "./words.js";
 
-/** @import { LoopFacts } from "./messages.js" */
+/** @import { LoopFacts } from "./loop.js" */
 /** @import { Trial } from "./trial.js" */
 
 /**

@@ -6,14 +6,17 @@ import { ask, reason } from "./link.js";
 import { byId as $, element } from "./make.js";
 import { slider } from "./slider.js";
 import { factor, isNothing, NOTCHES_MAX, nothing, textOf, trialOf } from "./trial.js";
+import { attach } from "./whatif-elements.js";
 import { briefWords, TrialMargins } from "./whatif-margins.js";
+import { TriedCurve } from "./whatif-marks.js";
 import { TrialSteps } from "./whatif-steps.js";
 import { checkWords, filtersText, tomlText } from "./whatif-text.js";
 import { worded } from "./worded.js";
 import { signed } from "./words.js";
 
 /** @import { Bode } from "./bode.js" */
-/** @import { LoopAnswer, LoopFacts, Page, Quantity } from "./messages.js" */
+/** @import { LoopAnswer, LoopFacts } from "./loop.js" */
+/** @import { Addition, Page, Quantity } from "./messages.js" */
 /** @import { Trial } from "./trial.js" */
 
 const AGAIN_MS = 10_000; // of a live run: its mean changes slowly
@@ -39,6 +42,8 @@ export class WhatIfCard {
     this.bode = bode;
     this.watch = watch;
     this.complain = complain;
+    attach();
+    this.curve = bode.derived = new TriedCurve(bode);
     this.card = $("what-if-card");
     this.button = $("what-if");
     this.rows = $("what-if-rows");
@@ -56,7 +61,7 @@ export class WhatIfCard {
       this.open(false);
     });
     $("what-if-close").addEventListener("click", () => this.open(false));
-    $("what-if-reset").addEventListener("click", () => this.take(nothing()));
+    $("what-if-reset").addEventListener("click", () => this.try(nothing()));
     $("what-if-toml").addEventListener("click", () => this.copy(tomlText));
     $("what-if-biquads").addEventListener("click", () => this.copy(filtersText));
     $("what-if-open-loop").addEventListener("click", () => watch("open loop"));
@@ -73,7 +78,7 @@ export class WhatIfCard {
     this.card.parentElement?.classList.toggle("trying", open);
     this.button.setAttribute("aria-expanded", String(open));
     $("what-if-brief").hidden = !open;
-    this.bode.trying = open;
+    this.curve.alone = open;
     this.bode.rebuild();
   }
 
@@ -82,7 +87,7 @@ export class WhatIfCard {
     remember("sliders", open ? "1" : "", "");
     this.show(open);
     this.begin();
-    this.page.dirty.add("trial");
+    this.page.dirty.add("additions");
     if (!open) this.button.focus();
     else this.card.querySelector("input")?.focus();
   }
@@ -146,7 +151,7 @@ export class WhatIfCard {
   }
 
   /** @param {Trial} trial */
-  take(trial) {
+  try(trial) {
     this.trial = trial;
     this.fill();
     this.changed();
@@ -154,12 +159,12 @@ export class WhatIfCard {
 
   /** The trial has changed: its curve and its margins follow at the next frame. */
   changed() {
-    const { bode, facts, trial, page } = this,
+    const { curve, facts, trial, page } = this,
       on = !isNothing(trial);
     remember("what-if", on ? textOf(trial) : "", "");
-    bode.factor = on && facts ? (curve) => factor(facts, trial, curve) : null;
+    curve.factor = on && facts ? (one) => factor(facts, trial, one) : null;
     this.button.classList.toggle("changed", on);
-    page.dirty.add("bode").add("trial");
+    page.dirty.add("bode").add("additions");
   }
 
   /** The table follows the sliders; called once a frame. */
@@ -367,3 +372,6 @@ export class WhatIfCard {
     }
   }
 }
+
+/** @type {Addition} */
+export const addition = (page, bode, actions) => new WhatIfCard(page, bode, actions);

@@ -5,7 +5,7 @@ import { filter, lowPassOf, notchOf } from "./biquads.js";
 
 /** @import { Biquad, Notch } from "./biquads.js" */
 /** @import { Curve, Numbers } from "./curves.js" */
-/** @import { LoopFacts, LoopParts, LoopTerm } from "./messages.js" */
+/** @import { LoopFacts, LoopParts, LoopTerm } from "./loop.js" */
 /** `values` are those that differ from the described ones; a corner and a delay of zero are without them. @typedef {{values: Record<string, number>, notches: Notch[], lowPassHz: number, delayMs: number}} Trial */
 /** @typedef {{re: Float64Array, im: Float64Array}} Complexes */
 

@@ -8,7 +8,7 @@ import { orNoLimit } from "./whatif-text.js";
 import { worded } from "./worded.js";
 import { fixed, hertz } from "./words.js";
 
-/** @import { LoopBand, LoopFacts } from "./messages.js" */
+/** @import { LoopBand, LoopFacts } from "./loop.js" */
 /** @import { Disc, Predicted } from "./predicted.js" */
 /** @import { Trial } from "./trial.js" */
 /** `worst` is null where a plant within the bounds is unstable. @typedef {{measured: Predicted, worst: Predicted | null} | null} Both null where the measured loop is unstable */

@@ -10,7 +10,7 @@ import { textOf } from "./trial.js";
 import { plain, signed } from "./words.js";
 
 /** @import { Chart } from "./chart.js" */
-/** @import { LoopFacts, NoiseRange, StepBand, StepsAnswer, StepsSide } from "./messages.js" */
+/** @import { LoopFacts, NoiseRange, StepBand, StepsAnswer, StepsSide } from "./loop.js" */
 /** @import { Trial } from "./trial.js" */
 /** @typedef {"reference" | "disturbance"} Kind */
 
