@@ -179,7 +179,7 @@ class ResponseMatrix(Estimate):
         if len(results):
             self._remember(results)
             yield results
-        if (shedding := self.run.shedding) is not None:
+        if (shedding := self.shedding) is not None:
             shedding.monitors()
             if not shedding.to_monitor(results):
                 return
