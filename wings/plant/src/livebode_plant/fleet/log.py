@@ -376,6 +376,16 @@ class FleetLog:
         self.trouble = reason
 
 
+def with_log(settings: LogSection, name: str, ask: Callable[[FleetLog], Awaitable[T]]) -> T:
+    """The result of `ask`, which receives a connection of this name; errors as of `FleetLog`."""
+
+    async def connected() -> T:
+        async with FleetLog(settings, name) as log:
+            return await ask(log)
+
+    return asyncio.run(connected())
+
+
 def _stored(raw: Any) -> StoredMessage:
     headers = raw.headers or {}
     stored_s = raw.time.timestamp() if raw.time is not None else time.time()

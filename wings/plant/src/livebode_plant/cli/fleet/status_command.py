@@ -59,25 +59,18 @@ def status_command(
 
 
 def _print_status(fleet: Path, *, as_json: bool) -> None:
-    import asyncio
-
     from livebode.records import to_json
     from livebode_plant.fleet.fleet_settings import FleetSettings
-    from livebode_plant.fleet.log import FleetLog
+    from livebode_plant.fleet.log import with_log
     from livebode_plant.fleet.status import fleet_status
 
     settings = FleetSettings.read(fleet)
     axes = settings.read_axes()
-
-    async def status() -> dict[str, Any]:
-        async with FleetLog(settings.log, "livebode status") as log:
-            return await fleet_status(log, axes)
-
-    found = asyncio.run(status())
+    status = with_log(settings.log, "livebode status", lambda log: fleet_status(log, axes))
     if as_json:
-        print(to_json(found))
-        return
-    _show(found)
+        print(to_json(status))
+    else:
+        _show(status)
 
 
 def _show(found: dict[str, Any]) -> None:
