@@ -28,15 +28,15 @@ def merged(groups: Sequence[TimedColumns], times: Iterator[Chunk]) -> list[Timed
     same = [0] * len(groups)  # the first group with equal times so far
     rows = 0
     for chunk in times:
-        for at, values in enumerate(chunk):
+        for index, values in enumerate(chunk):
             filled = np.flatnonzero(~np.isnan(values))
-            lengths[at] = rows + int(filled[-1]) + 1 if filled.size else lengths[at]
+            lengths[index] = rows + int(filled[-1]) + 1 if filled.size else lengths[index]
         same = split(same, chunk)
         rows += len(chunk[0])
     united = [
         replace(
             groups[first],
-            channels=tuple(c for at, group in enumerate(groups) if same[at] == first for c in group.channels),
+            channels=tuple(c for index, group in enumerate(groups) if same[index] == first for c in group.channels),
             samples=lengths[first],
         )
         for first in dict.fromkeys(same)
@@ -48,7 +48,7 @@ def split(same: Sequence[int], chunk: Chunk) -> list[int]:
     """For each column the first one that equals it, among those that were equal before."""
     first: dict[tuple[int, bytes], int] = {}
     contents = (np.where(np.isnan(values), np.nan, values).tobytes() for values in chunk)
-    return [first.setdefault(key, at) for at, key in enumerate(zip(same, contents, strict=True))]
+    return [first.setdefault(key, index) for index, key in enumerate(zip(same, contents, strict=True))]
 
 
 def as_columns(groups: Sequence[TimedColumns]) -> list[Column]:

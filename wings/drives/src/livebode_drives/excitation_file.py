@@ -1,4 +1,4 @@
-"""Read the excitation of `livebode design` for a PLC."""
+"""The excitation that `livebode design` wrote, for a PLC."""
 
 from __future__ import annotations
 
