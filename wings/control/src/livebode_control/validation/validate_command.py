@@ -73,7 +73,7 @@ def validate_command(
     check_use(context, "--loop", ("--axis",), ("--output", "--input", "--excitation"))
     channels = {"output": output, "input": input, "excitation": excitation}
     if loop:
-        from livebode_control.loop_check.loop_check_output import validate_loop
+        from livebode_control.loop_check.loop_check_command import validate_loop
 
         validate_loop(directory, axis, channels, as_json=as_json)
     elif on is None:
