@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex
 from livebode.core import REASONS, Lines, MatrixResponses
 from livebode.records import response_table
-from livebode.records.table_file import ColumnTable
+from livebode.records.column_table import ColumnTable
 from livebode.tables import Field, Schema, Table, Text
 
 SCHEMA = Schema(

@@ -81,11 +81,10 @@ def thinned(run: RunRecord, bin_s: float, span_s: tuple[float, float] | None = N
     Responses from before the run had tiers, and those that are not in a segment yet, are averaged when they are read.
     Of a matrix run `run` is the view of an entry.
     """
-    parts = run.parts()
     tables = [table for table, each_s in BIN_S.items() if each_s <= bin_s]
-    if parts is None or not tables:
+    if not tables:
         return None
-    segments, rows = parts
+    segments, rows = run.parts()
     tier = [segment for segment in segments if segment.table == tables[-1]]
     if not tier:
         return None
@@ -93,9 +92,9 @@ def thinned(run: RunRecord, bin_s: float, span_s: tuple[float, float] | None = N
     before = [one for one in segments if one.table == "responses" and one.last_sample < begin]
     means: list[BinnedMeans] = []
     for segment in [one for one in (*before, *tier) if _within(one, span_s)]:
-        if (file := reading.whole(run.path, segment, run.report)) is not None:
-            each_s = None if segment.table in BIN_S else bin_s
-            means.append(_means_of(run, file.table(), each_s))
+        each_s = None if segment.table in BIN_S else bin_s
+        if groups := list(reading.segment_rows(run.path, segment, run.report)):
+            means.append(_means_of(run, Table.join(groups), each_s))
     if "responses" in rows:
         means.append(_means_of(run, Table.join(rows["responses"]), bin_s))
     if not means:

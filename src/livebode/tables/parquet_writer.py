@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import lz4.block
 import numpy as np
@@ -143,6 +143,14 @@ _RLE = integer(RLE)
 _NO_NULLS = integer(0)
 
 
+class ByteSink(Protocol):
+    """What a Parquet file is written to: a file, or what passes its bytes on."""
+
+    def write(self, data: bytes, /) -> object: ...
+
+    def writelines(self, lines: Iterable[bytes | memoryview], /) -> None: ...
+
+
 class ParquetWriter:
     """Writes each table as one row group, with statistics, compressed by LZ4 where that makes it smaller.
 
@@ -161,7 +169,7 @@ class ParquetWriter:
         If a column is of half precision.
     """
 
-    def __init__(self, file: BinaryIO, schema: Schema, repeating: Collection[str] = ()) -> None:
+    def __init__(self, file: ByteSink, schema: Schema, repeating: Collection[str] = ()) -> None:
         if wrong := [field.name for field in schema if field.kind not in FORMS]:
             raise TypeError(f"column {wrong[0]!r} is of half precision")
         self._file, self._schema, self._repeating = file, schema, frozenset(repeating)

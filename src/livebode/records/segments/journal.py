@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from livebode.core import RecordError, replace_file, sync_directory
+from livebode.records.column_table import ColumnTable
 from livebode.records.inside import check_folder, open_read
 from livebode.records.json_format import check_version, format_of
 from livebode.records.segments.damage import Damage
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE, Frame, frames, to_frame
-from livebode.records.table_file import ColumnTable
 from livebode.tables import Schema, Table, from_message, schema_from_message, schema_to_message
 
 FOLDER, ASIDE = "open", "damaged"

@@ -22,26 +22,50 @@ NAME = "manifest.jsonl"
 TIERS = ("responses_1s", "responses_1min", "responses_1h")
 TABLES = ("responses", "covariance", "parameters", "samples", *TIERS)
 _SHA256 = re.compile("[0-9a-f]{64}")
-SEGMENT_NAME = re.compile(r"[a-z0-9_]+/(\d{6,9})(?:-(\d{6,9}))?\.parquet")
-_COUNTS = ("rows", "first_sample", "last_sample", "size_bytes")
+SEGMENT_NAME = re.compile(r"[a-z0-9_]+(?:/(\d{6,9})(?:-(\d{6,9}))?)?\.parquet")
+
+
+@dataclass(frozen=True)
+class SegmentPart:
+    """Consecutive bytes of a segment: a row group, or, with no rows, the bytes after the last one."""
+
+    rows: int
+    size_bytes: int
+    sha256: str
+
+    @property
+    def sound(self) -> bool:
+        """Whether a run can have written it."""
+        numbers = type(self.rows) is int and type(self.size_bytes) is int
+        return numbers and self.rows >= 0 < self.size_bytes and bool(_SHA256.fullmatch(self.sha256))
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A closed segment: one table's rows from one journal, or from several that were merged, as a Parquet file.
+    """A closed segment: rows of one table as a Parquet file.
 
-    `name` is its path in the run's directory; `first_s` and `last_s` are the times of its first and last row.
+    Its rows are from one journal, from several that were merged, or, with the name of the table, those of a whole run.
+    `name` is its path in the run's directory; `first_sample`, `last_sample`, `first_s` and `last_s` are the extremes of
+    its rows, 0 if it has none; `parts` are its row groups and the end of the file.
     """
 
     name: str
     table: str
-    rows: int
     first_sample: int
     last_sample: int
     first_s: float
     last_s: float
-    size_bytes: int
-    sha256: str
+    parts: tuple[SegmentPart, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of its rows."""
+        return sum(part.rows for part in self.parts)
+
+    @property
+    def size_bytes(self) -> int:
+        """Size of its file."""
+        return sum(part.size_bytes for part in self.parts)
 
     @property
     def numbers(self) -> tuple[int, int]:
@@ -51,18 +75,20 @@ class Segment:
     @classmethod
     def of(cls, first: int, last: int, values: Mapping[str, Any]) -> Segment:
         """The segment of these journals in a line; ValueError if a run cannot have written it."""
-        found = cls(**values)
-        numbers = [*(getattr(found, name) for name in _COUNTS), found.first_s, found.last_s]
+        parts = tuple(SegmentPart(**part) for part in values["parts"])
+        segment = cls(**{**values, "parts": parts})
+        samples, times_s = (segment.first_sample, segment.last_sample), (segment.first_s, segment.last_s)
         sound = (
-            found.table in TABLES
-            and found.name == name_of(found.table, first, last)
-            and all(type(value) is int for value in numbers[:4])
-            and all(type(value) in (int, float) and math.isfinite(value) for value in numbers)
-            and _SHA256.fullmatch(found.sha256)
+            segment.table in TABLES
+            and segment.name in (name_of(segment.table, first, last), f"{segment.table}.parquet")
+            and all(type(value) is int for value in samples)
+            and all(type(value) in (int, float) and math.isfinite(value) for value in (*samples, *times_s))
+            and all(part.sound for part in parts)
+            and all(part.rows for part in parts[:-1])
         )
-        if not sound or found.rows < 1 or found.size_bytes < 1:
+        if not sound or not parts or parts[-1].rows:
             raise ValueError("the segment is invalid")
-        return found
+        return segment
 
 
 @dataclass(frozen=True)
@@ -115,7 +141,7 @@ class Manifest:
 
     @classmethod
     def read(cls, run: Path) -> Manifest:
-        """All intact lines; OSError if there is no file, RecordError if a newer livebode wrote it."""
+        """All intact lines; OSError if there is no file, RecordError if it has another version."""
         data = read_bytes(run, NAME)
         length = data.rfind(b"\n") + 1
         found, before = cls(length=length, torn=data[length:]), b""
@@ -237,11 +263,12 @@ def name_of(table: str, first: int, last: int) -> str:
 
 
 def segment_numbers(name: str) -> tuple[int, int]:
-    """The numbers in `name_of`; ValueError for another name."""
-    found = SEGMENT_NAME.fullmatch(name)
-    if found is None:
+    """The numbers in `name_of`, 1 and 1 for the name of a table; ValueError for another name."""
+    numbers = SEGMENT_NAME.fullmatch(name)
+    if numbers is None:
         raise ValueError(f"{name!r} is not the name of a segment")
-    return int(found[1]), int(found[2] or found[1])
+    first = int(numbers[1] or 1)
+    return first, int(numbers[2] or first)
 
 
 def short_line(

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from livebode.records.inside import is_folder
 from livebode.records.segments.manifest import SEGMENT_NAME, TABLES, Manifest, Segment, segment_numbers
-from livebode.records.segments.segment_file import open_segment
+from livebode.records.segments.segment_file import SegmentFile
+from livebode.records.segments.segment_writer import GROUP_ROWS
 from livebode.tables import Table
 
 _MERGED_MAX = 4 << 20
 _BUDGET_SHARE = 32  # the budget removes whole segments
 _FAN_IN = 16
-_GROUP_ROWS = 1 << 15
 
 
 def merged_bytes_max(budget_bytes: int | None) -> int:
@@ -46,7 +46,10 @@ def rows_to_merge(run: Path, parts: list[Segment]) -> list[Table] | None:
     tables = []
     for part in parts:
         try:
-            tables.append(open_segment(run, part).table())
+            with SegmentFile(run, part) as file:
+                if not all(file.intact):
+                    return None
+                tables.append(Table.join([file.rows(group) for group in range(len(file.intact))]))
         except (FileNotFoundError, TypeError, ValueError):
             return None
         if tables[-1].schema != tables[0].schema:
@@ -59,7 +62,7 @@ def row_groups(tables: list[Table]) -> Iterator[Table]:
     waiting: list[Table] = []
     for table in tables:
         waiting.append(table)
-        if sum(one.num_rows for one in waiting) >= _GROUP_ROWS:
+        if sum(one.num_rows for one in waiting) >= GROUP_ROWS:
             yield Table.join(waiting)
             waiting = []
     if waiting:

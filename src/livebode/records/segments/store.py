@@ -13,6 +13,7 @@ from typing import Any
 
 from livebode.core import Emit, Event, LivebodeError, RecordError, ignore, sync_directory, why, write_whole, writing
 from livebode.language import Message
+from livebode.records.column_table import ColumnTable
 from livebode.records.inside import check_own
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.closing import Closing
@@ -30,7 +31,6 @@ from livebode.records.segments.shelf import Shelf, Tiers, no_tiers
 from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import UnsyncedRows
 from livebode.records.summary_file import COPY, RUN, to_document
-from livebode.records.table_file import ColumnTable
 from livebode.tables import Table
 
 _NEARLY = 15 / 16  # of the bytes of a journal: the next commit may fill it

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 from livebode.core import Event, needing
 from livebode.records.segments import reading
 from livebode.records.segments.manifest import Segment
+from livebode.tables import ParquetFile
 
 with needing("PyArrow", "query", "a query"):
     import pyarrow as pa
@@ -40,15 +42,14 @@ def segment_groups(run: Path, segments: list[Segment], damages: list[Event]) -> 
     OSError
         If a file cannot be read.
     """
-    first = next((found for one in segments if (found := reading.whole(run, one, damages.append)) is not None), None)
-    if first is None:
+    schema = _schema(run, segments, damages)
+    if schema is None:
         return []
-    schema = pa.schema(first.schema)
     named = {segment.name: segment for segment in segments}
 
     def opened(name: str) -> pa.NativeFile | None:
-        file = reading.whole(run, named[name], damages.append)
-        return None if file is None else pa.BufferReader(file.content)
+        file = reading.intact_file(run, named[name], damages.append)
+        return None if file is None else pa.PythonFile(_OwnedFile(file), "r")
 
     files = PyFileSystem(VerifiedFiles(schema, opened))
     parquet = ds.ParquetFileFormat()
@@ -62,10 +63,46 @@ def segment_groups(run: Path, segments: list[Segment], damages: list[Event]) -> 
     return groups
 
 
+def _schema(run: Path, segments: list[Segment], damages: list[Event]) -> pa.Schema | None:
+    """The columns of the first segment that is not damaged; None if all are."""
+    for segment in segments:
+        file = reading.intact_file(run, segment, damages.append)
+        if file is not None:
+            with file:
+                return pa.schema(ParquetFile(file).schema)
+    return None
+
+
 def _within(segment: Segment) -> ds.Expression:
     sample, time_s = ds.field("sample"), ds.field("time_s")
     of_samples = (sample >= segment.first_sample) & (sample <= segment.last_sample)
     return of_samples & (time_s >= segment.first_s) & (time_s <= segment.last_s)
+
+
+class _OwnedFile(io.RawIOBase):
+    """A file to read that is closed with the last reference to it, because Arrow closes none."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def read(self, size: int = -1) -> bytes:
+        return self._file.read(size)
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
 
 
 class VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
