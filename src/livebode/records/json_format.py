@@ -43,20 +43,20 @@ def format_of(name: str) -> dict[str, Any]:
     return {"format": f"livebode {name}", "version": VERSIONS[name]}
 
 
-def check_version(path: Path, name: str, found: Any) -> None:
+def check_version(path: Path, name: str, version_found: Any) -> None:
     """RecordError if this file has another version of its format than the one that this livebode reads."""
     version = VERSIONS[name]
-    if type(found) is not int or found == version:
+    if type(version_found) is not int or version_found == version:
         return
     code, remedy = "older-version", "run the recording again"
-    if found > version:
+    if version_found > version:
         code, remedy = "newer-version", "update livebode"
     raise RecordError(
         code,
-        f"{str(path)!r} has version {found} of its format, and this livebode reads version {version}",
+        f"{str(path)!r} has version {version_found} of its format, and this livebode reads version {version}",
         remedy,
         path=str(path),
         format=name,
-        found=found,
+        found=version_found,
         readable=version,
     )

@@ -217,7 +217,7 @@ class RunRecord:
         """All matrices of a matrix run, as written; no rows before the first. RecordError of another run."""
         shape = self._matrix_shape
         none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
-        return MatrixResponses.join(list(self.matrix_batches()) or [self._with_units(one) for one in none])
+        return MatrixResponses.join(list(self.matrix_batches()) or [self._with_units(responses) for responses in none])
 
     def matrix_batches(
         self, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
@@ -296,17 +296,17 @@ class RunRecord:
 
     def _whole(self, tables: Iterator[Table], rows: int, columns: Collection[list[str]]) -> Iterator[Table]:
         """The rows of whole responses, `rows` each, in parts of bounded size; RecordError if they are of no run."""
-        rest: Table | None = None
+        remainder: Table | None = None
         for part in tables:
             self._check_columns(part, columns)
             for start in range(0, part.num_rows, _ROWS):
                 piece = part.slice(start, _ROWS)
-                table = piece if rest is None else Table.join([rest, piece])
+                table = piece if remainder is None else Table.join([remainder, piece])
                 whole = table.num_rows // rows * rows
-                rest = table.slice(whole)
+                remainder = table.slice(whole)
                 if whole:
                     yield table.slice(0, whole)
-        if rest is not None and rest.num_rows:
+        if remainder is not None and remainder.num_rows:
             raise RecordError(
                 "unexpected-content",
                 f"the record in {str(self.path)!r} ends within a response",

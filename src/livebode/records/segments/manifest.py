@@ -144,15 +144,15 @@ class Manifest:
         """All intact lines; OSError if there is no file, RecordError if it has another version."""
         data = read_bytes(run, NAME)
         length = data.rfind(b"\n") + 1
-        found, before = cls(length=length, torn=data[length:]), b""
+        manifest, before = cls(length=length, torn=data[length:]), b""
         for number, line in enumerate(data.splitlines(keepends=True), 1):
             if line != before:  # each is written twice
-                found._take(line, number)
+                manifest._read_line(line, number)
             before = line
-        check_version(run / NAME, "manifest", found.version)
-        found.gone += [segment for segment in found.segments if segment.name in found._removed]
-        found.segments = [segment for segment in found.segments if segment.name not in found._removed]
-        return found
+        check_version(run / NAME, "manifest", manifest.version)
+        manifest.gone += [segment for segment in manifest.segments if segment.name in manifest._removed]
+        manifest.segments = [segment for segment in manifest.segments if segment.name not in manifest._removed]
+        return manifest
 
     def is_closed(self, number: int) -> bool:
         """Whether this journal has become segments."""
@@ -165,12 +165,12 @@ class Manifest:
 
     def place(self, name: str) -> tuple[Segment, int] | None:
         """The segment that has the rows of a merged one now, and the number of its rows before them."""
-        before, found = 0, None
+        before, segment = 0, None
         while (step := self.merged.get(name)) is not None:
-            found, name, before = step[0], step[0].name, before + step[1]
-        return None if found is None or found.name in self._removed else (found, before)
+            segment, name, before = step[0], step[0].name, before + step[1]
+        return None if segment is None or segment.name in self._removed else (segment, before)
 
-    def _take(self, line: bytes, number: int) -> None:
+    def _read_line(self, line: bytes, number: int) -> None:
         for value in in_line(line):
             try:
                 if isinstance(value, bytes):
@@ -208,16 +208,16 @@ class Manifest:
         until = value["closed_until"]
         if type(until) is not int or not 0 <= until < 10**9:
             raise ValueError
-        segments = [Segment.of(*segment_numbers(one["name"]), one) for one in value["segments"]]
-        retained = [Retained.of(int(one["number"]), one) for one in value["retained"]]
+        segments = [Segment.of(*segment_numbers(values["name"]), values) for values in value["segments"]]
+        retained = [Retained.of(int(values["number"]), values) for values in value["retained"]]
         by_name = {segment.name: segment for segment in segments}
         for new, name, rows in value["places"]:
             self.merged[str(name)] = by_name[new], int(rows)
         self.segments, self.retained, self.until, self.closed = segments, retained, until, set()
 
     def _merge(self, names: Sequence[str], values: Mapping[str, Any]) -> None:
-        at = {segment.name: number for number, segment in enumerate(self.segments)}
-        parts = [self.segments[at[name]] for name in names]
+        index = {segment.name: number for number, segment in enumerate(self.segments)}
+        parts = [self.segments[index[name]] for name in names]
         segment = Segment.of(parts[0].numbers[0], parts[-1].numbers[1], values)
         if len(parts) < 2 or {part.table for part in parts} != {segment.table}:
             raise ValueError
@@ -227,9 +227,9 @@ class Manifest:
             before += part.rows
         if before != segment.rows:
             raise ValueError
-        self.segments[at[names[0]]] = segment
+        self.segments[index[names[0]]] = segment
         self.gone += parts
-        self.segments = [one for one in self.segments if one.name not in self.merged]
+        self.segments = [segment for segment in self.segments if segment.name not in self.merged]
 
     @property
     def missing(self) -> list[tuple[int, int]]:
@@ -281,7 +281,7 @@ def short_line(
 
     `places` are those of `Manifest.merged` that a reader may still need: new name, old name, number of rows before.
     """
-    damaged = [{"number": one.number} | _to_json(one) for one in retained]
+    damaged = [{"number": damaged_journal.number} | _to_json(damaged_journal) for damaged_journal in retained]
     line = {"closed_until": until, "segments": [asdict(segment) for segment in segments]}
     return to_line(line | {"retained": damaged, "places": list(places)}) * 2
 

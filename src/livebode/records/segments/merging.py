@@ -62,24 +62,24 @@ def row_groups(tables: list[Table]) -> Iterator[Table]:
     waiting: list[Table] = []
     for table in tables:
         waiting.append(table)
-        if sum(one.num_rows for one in waiting) >= GROUP_ROWS:
+        if sum(rows.num_rows for rows in waiting) >= GROUP_ROWS:
             yield Table.join(waiting)
             waiting = []
     if waiting:
         yield Table.join(waiting)
 
 
-def unlisted(run: Path, found: Manifest) -> list[str]:
+def unlisted(run: Path, manifest: Manifest) -> list[str]:
     """Files that a kill left before their line was written, or after the line on their removal; none if lines of the
     manifest are damaged, which may have listed them.
     """
-    if found.broken:
+    if manifest.broken:
         return []
-    listed = {segment.name for segment in found.segments}
+    listed = {segment.name for segment in manifest.segments}
     folders = [table for table in TABLES if is_folder(run / table)]
     names = [f"{table}/{path.name}" for table in folders for path in (run / table).iterdir()]
     names = [name for name in names if name not in listed and SEGMENT_NAME.fullmatch(name)]
-    return [name for name in names if found.is_closed(segment_numbers(name)[1])]
+    return [name for name in names if manifest.is_closed(segment_numbers(name)[1])]
 
 
 def _level(segment: Segment) -> int:

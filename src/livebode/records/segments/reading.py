@@ -33,20 +33,20 @@ def parts(run: Path, report: Report, manifest_bytes: int | None) -> tuple[list[S
     for number in reversed(journal.numbers(run)):
         following = journals.get(number + 1)
         journals[number] = _read(run, number, following, report)
-    found = read_manifest(run, report)
-    if found is None:
-        found = Manifest()
-    elif found.is_short(list(journals)):
+    manifest = read_manifest(run, report)
+    if manifest is None:
+        manifest = Manifest()
+    elif manifest.is_short(list(journals)):
         message = Message(
             "{file} is damaged: its last lines are missing; the segments of journals {first} to {last} are not read",
             file=NAME,
-            first=found.last_closed + 1,
+            first=manifest.last_closed + 1,
             last=min(journals) - 1,
         )
         report(Event(KIND, 0, 0.0, message))
     else:
-        _tell_of(found, manifest_bytes, report)
-    left = [number for number in sorted(journals) if not found.is_closed(number)]
+        _tell_of(manifest, manifest_bytes, report)
+    left = [number for number in sorted(journals) if not manifest.is_closed(number)]
     for number in left:
         if places := journals[number].damages:
             report(event_of(journal.name_of(number), places, None))
@@ -54,7 +54,7 @@ def parts(run: Path, report: Report, manifest_bytes: int | None) -> tuple[list[S
     for number in left:
         for table, batches in journals[number].rows.items():
             rows.setdefault(table, []).extend(batches)
-    return found.segments, rows
+    return manifest.segments, rows
 
 
 def read_manifest(run: Path, report: Report) -> Manifest | None:
@@ -264,8 +264,8 @@ def _read(run: Path, number: int, following: Journal | None, report: Report) -> 
         return Journal()
 
 
-def _tell_of(found: Manifest, whole_bytes: int | None, report: Report) -> None:
-    if whole_bytes is not None and (missing := whole_bytes - found.length - len(found.torn)) > 0:
+def _tell_of(manifest: Manifest, whole_bytes: int | None, report: Report) -> None:
+    if whole_bytes is not None and (missing := whole_bytes - manifest.length - len(manifest.torn)) > 0:
         message = Message(
             "{file} is damaged: its last {missing_bytes} bytes are missing; the segments that they name are not read",
             file=NAME,
@@ -274,13 +274,13 @@ def _tell_of(found: Manifest, whole_bytes: int | None, report: Report) -> None:
         report(Event(KIND, 0, 0.0, message))
         return
     # The end of an unfinished one is still being written, but not with zeros, which a power cut leaves.
-    torn = found.torn and (whole_bytes is not None or 0 in found.torn)
-    if not found.broken and not torn:
+    torn = manifest.torn and (whole_bytes is not None or 0 in manifest.torn)
+    if not manifest.broken and not torn:
         return
-    lost = ", ".join(f"{first} to {last}" for first, last in found.missing)
+    lost = ", ".join(f"{first} to {last}" for first, last in manifest.missing)
     what = Message("each line is written twice, so nothing is lost")
     if lost:
         what = Message("the segments of journals {journals} are not read", journals=lost)
-    numbers = ", ".join(map(str, found.broken)) or Message("the last")
+    numbers = ", ".join(map(str, manifest.broken)) or Message("the last")
     message = Message("{file} is damaged in line {numbers}; {what}", file=NAME, numbers=numbers, what=what)
-    report(Event(KIND, 0, 0.0, message, {"lines": found.broken}))
+    report(Event(KIND, 0, 0.0, message, {"lines": manifest.broken}))

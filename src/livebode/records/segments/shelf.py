@@ -52,14 +52,14 @@ class Shelf:
     """
 
     def __init__(
-        self, run: Path, tables: Mapping[str, ColumnTable], found: Manifest, sealed: list[int], tiers: Tiers = no_tiers
+        self, run: Path, tables: Mapping[str, ColumnTable], listed: Manifest, sealed: list[int], tiers: Tiers = no_tiers
     ) -> None:
         self._run, self._tables, self._tiers = run, tables, tiers
-        self._file = AppendFile(run, manifest.NAME, found.length)
-        self._segments = list(found.segments)
-        self._retained = list(found.retained)
-        self._closed, self._sound = found.last_closed, not found.broken
-        places = [(found.place(name), name) for name in found.merged]
+        self._file = AppendFile(run, manifest.NAME, listed.length)
+        self._segments = list(listed.segments)
+        self._retained = list(listed.retained)
+        self._closed, self._sound = listed.last_closed, not listed.broken
+        places = [(listed.place(name), name) for name in listed.merged]
         self._places = [(place[0].name, name, place[1]) for place, name in places if place is not None]
         self._sealed = list(sealed)
         self._unwanted: list[str] = []
@@ -76,7 +76,7 @@ class Shelf:
     @property
     def used_bytes(self) -> int:
         """The recorded segments and retained damaged journals of the manifest."""
-        sizes = [one.size_bytes for one in self._segments] + [one.size_bytes for one in self._retained]
+        sizes = [each.size_bytes for each in self._segments] + [each.size_bytes for each in self._retained]
         return self._file.length + sum(sizes)
 
     @property
@@ -107,7 +107,9 @@ class Shelf:
         """
         gone: list[Segment] = []
         excess = self.used_bytes - bytes_max
-        order = sorted(self._segments, key=lambda one: (one.table != FIRST_TO_GO) + (one.table in manifest.TIERS))
+        order = sorted(
+            self._segments, key=lambda segment: (segment.table != FIRST_TO_GO) + (segment.table in manifest.TIERS)
+        )
         for segment in order:
             if excess <= 0:
                 break
@@ -164,7 +166,7 @@ class Shelf:
         segment = self._put(name, parts[0].table, *row_groups(rows))
         self._file.append_synced(manifest.merge_line(parts, segment))
         self._segments[self._segments.index(parts[0])] = segment
-        self._segments = [one for one in self._segments if one not in parts]
+        self._segments = [listed for listed in self._segments if listed not in parts]
         before = 0
         for part in parts:
             self._places = [
@@ -220,21 +222,21 @@ class Shelf:
         return segment
 
 
-def sweep(run: Path, found: Manifest) -> None:
+def sweep(run: Path, listed: Manifest) -> None:
     """Remove what a kill left between two steps: segments with a line on their removal or merging, merged ones without
     a line, and closed journals.
 
     Other remainders of a kill are written again with the same name.
     """
-    for segment in found.gone:
+    for segment in listed.gone:
         _removed(run, segment.name)
-    for name in unlisted(run, found):
+    for name in unlisted(run, listed):
         _removed(run, name)
-    retained = {one.number for one in found.retained}
+    retained = {each.number for each in listed.retained}
     for number in journal.numbers(run):
         if number in retained:
             journal.set_aside(run, number)
-        elif found.is_closed(number):
+        elif listed.is_closed(number):
             _removed(run, journal.name_of(number))
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, NoReturn
 
 from livebode.core import Event, needing
 from livebode.records.segments import reading
@@ -49,7 +50,10 @@ def segment_groups(run: Path, segments: list[Segment], damages: list[Event]) -> 
 
     def opened(name: str) -> pa.NativeFile | None:
         file = reading.intact_file(run, named[name], damages.append)
-        return None if file is None else pa.PythonFile(_OwnedFile(file), "r")
+        if file is None:
+            return None
+        with file:
+            return pa.PythonFile(_OwnedFile(os.dup(file.fileno())), "r")
 
     files = PyFileSystem(VerifiedFiles(schema, opened))
     parquet = ds.ParquetFileFormat()
@@ -57,9 +61,11 @@ def segment_groups(run: Path, segments: list[Segment], damages: list[Event]) -> 
     groups = []
     for begin in range(0, len(segments), size):
         part = segments[begin : begin + size]
-        pieces = [parquet.make_fragment(one.name, files, partition_expression=_within(one)) for one in part]
+        pieces = [parquet.make_fragment(segment.name, files, partition_expression=_within(segment)) for segment in part]
         rows = ds.FileSystemDataset(pieces, schema, parquet, files)
-        groups.append(SegmentGroup(rows, min(one.first_s for one in part), max(one.last_s for one in part)))
+        groups.append(
+            SegmentGroup(rows, min(segment.first_s for segment in part), max(segment.last_s for segment in part))
+        )
     return groups
 
 
@@ -79,30 +85,11 @@ def _within(segment: Segment) -> ds.Expression:
     return of_samples & (time_s >= segment.first_s) & (time_s <= segment.last_s)
 
 
-class _OwnedFile(io.RawIOBase):
-    """A file to read that is closed with the last reference to it, because Arrow closes none."""
+class _OwnedFile(io.FileIO):
+    """A file that is closed with the last reference to it, without a warning, because Arrow closes none."""
 
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def read(self, size: int = -1) -> bytes:
-        return self._file.read(size)
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._file.tell()
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
+    def __del__(self) -> None:
+        self.close()
 
 
 class VerifiedFiles(FileSystemHandler):  # type: ignore[misc]
