@@ -43,20 +43,13 @@ def format_of(name: str) -> dict[str, Any]:
     return {"format": f"livebode {name}", "version": VERSIONS[name]}
 
 
-def check_version(path: Path, name: str, version_found: Any) -> None:
+def check_version(path: Path, name: str, version: Any) -> None:
     """RecordError if this file has another version of its format than the one that this livebode reads."""
-    version = VERSIONS[name]
-    if type(version_found) is not int or version_found == version:
+    readable = VERSIONS[name]
+    if type(version) is not int or version == readable:
         return
-    code, remedy = "older-version", "run the recording again"
-    if version_found > version:
-        code, remedy = "newer-version", "update livebode"
-    raise RecordError(
-        code,
-        f"{str(path)!r} has version {version_found} of its format, and this livebode reads version {version}",
-        remedy,
-        path=str(path),
-        format=name,
-        found=version_found,
-        readable=version,
-    )
+    message = f"{str(path)!r} has version {version} of its format, and this livebode reads version {readable}"
+    facts = {"path": str(path), "format": name, "found": version, "readable": readable}
+    if version > readable:
+        raise RecordError("newer-version", message, "update livebode", **facts)
+    raise RecordError("older-version", message, "run the recording again", **facts)
